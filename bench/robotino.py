@@ -1,0 +1,139 @@
+"""The real Robotino as it stands: share of each state, and the error of the modelled current.
+
+    .venv/bin/python bench/robotino.py [--surface gray]
+
+Plays every drive of a surface through the three stages. The description holds the published
+constants and the friction of the bench only; nothing is fitted to the drives.
+"""
+
+import argparse
+import json
+import os
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from tomr_fault_diag.cli.diagnose import STAGE_NODES
+from tomr_fault_diag.diagnosis.offline import diagnose
+from tomr_fault_diag.diagnosis.pipeline import Pipeline
+from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
+from tomr_fault_diag.diagnosis.summary import Summariser
+from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS
+from tomr_power_model.cli import run_main
+from tomr_power_model.recordings import open_recording
+from tomr_power_model.robot import load_robot, read_node_sections
+from tomr_sim_bridge.cli.import_robotino import import_robotino
+from tomr_sim_bridge.importers.dataset import default_dataset
+
+ROBOT = "robotino_v2"
+Array = NDArray[np.float64]
+
+
+@frozen
+class Drive:
+    """One drive: ticks by state, stale ticks, and measured and modelled values (n, 3)."""
+
+    states: Counter[str]
+    stale: float
+    measured: Array  # A
+    commanded: Array  # A, modelled from the command
+    derived: Array  # A, modelled from the encoders
+    speed_error: Array  # rad/s
+
+
+def play(bag: Path) -> Drive:
+    """Play one recording through the stages."""
+    settings = DiagnosisSettings.of(read_node_sections(ROBOT, STAGE_NODES), ROBOT)
+    pipeline = Pipeline(load_robot(ROBOT), settings)
+    summariser, frames = Summariser(), []
+    with open_recording(bag) as recording:
+        for _, step in diagnose(recording, pipeline):
+            for diagnosis in step.diagnoses:
+                summariser.diagnosis(diagnosis, [])
+            for frame in step.frames:
+                summariser.frame(frame)
+                frames.append(frame)
+    residual = np.array([[item.residual for item in frame.residuals] for frame in frames])
+    modelled = np.array([[item.modelled for item in frame.residuals] for frame in frames])
+    motors, encoders = list(MOTORS), list(ENCODERS)
+    summary = summariser.summary()
+    counts = Counter({name: round(share * summary.ticks) for name, share in summary.shares.items()})
+    return Drive(
+        counts,
+        float(np.mean(np.isnan(residual[:, motors]))),
+        residual[:, motors] + modelled[:, motors],
+        modelled[:, motors],
+        modelled[:, encoders],
+        residual[:, list(SPEEDS)],
+    )
+
+
+def scores(measured: Array, modelled: Array) -> dict[str, float]:
+    """Accuracy, NRMSE and R2 over ticks; R2 also over the mean of each drive's motor."""
+    known = np.isfinite(measured) & np.isfinite(modelled)
+    error = measured[known] - modelled[known]
+    spread = measured[known].std()
+    return {
+        "accuracy": 1.0 - float(np.abs(error).sum() / np.abs(measured[known]).sum()),
+        "nrmse": float(np.sqrt(np.mean(error**2)) / spread),
+        "r2": 1.0 - float(np.mean(error**2) / spread**2),
+        "mean_measured_A": float(measured[known].mean()),
+        "mean_modelled_A": float(modelled[known].mean()),
+    }
+
+
+def report(drives: Sequence[Drive]) -> dict[str, object]:
+    """Everything of all drives together."""
+    states: Counter[str] = sum((drive.states for drive in drives), Counter())
+    ticks = sum(states.values())
+    measured = np.concatenate([drive.measured for drive in drives])
+    means = np.array([np.nanmean(drive.measured, axis=0) for drive in drives])
+    modelled = np.array([np.nanmean(drive.commanded, axis=0) for drive in drives])
+    speed = np.concatenate([drive.speed_error for drive in drives])
+    return {
+        "drives": len(drives),
+        "ticks": ticks,
+        "states": {name: count / ticks for name, count in states.most_common()},
+        "drives_with_a_fault_named": sum(
+            any(name not in ("normal", "unknown") for name in drive.states) for drive in drives
+        ),
+        "stale_share_of_motor_currents": float(np.mean([drive.stale for drive in drives])),
+        "current_from_command": scores(
+            measured, np.concatenate([drive.commanded for drive in drives])
+        ),
+        "current_from_encoders": scores(
+            measured, np.concatenate([drive.derived for drive in drives])
+        ),
+        "mean_current_per_drive_and_motor": scores(means, modelled),
+        "speed_rms_error_rad_s": float(np.sqrt(np.nanmean(speed**2))),
+    }
+
+
+def _main(arguments: Sequence[str] | None) -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--surface", default="gray")
+    parser.add_argument("--dataset", type=Path, default=default_dataset())
+    options = parser.parse_args(arguments)
+    if not options.dataset.exists():
+        print(f"skipped: {options.dataset} is absent; set TOMR_RECORDINGS", file=sys.stderr)
+        return 0
+    with TemporaryDirectory() as folder:
+        out = Path(folder) / "bags"
+        import_robotino([str(options.dataset), "--out", str(out), "--surface", options.surface])
+        bags = sorted((out / options.surface).iterdir())
+        with ProcessPoolExecutor(os.cpu_count()) as pool:
+            drives = list(tqdm(pool.map(play, bags), total=len(bags), desc="drives"))
+    print(json.dumps(report(drives), indent=2))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(run_main(_main))

@@ -1,0 +1,35 @@
+"""Build description of tomr_fault_diag for colcon and pip."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+NAME = "tomr_fault_diag"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Faults of a three-wheeled omni robot, told from the power of its motors.",
+    maintainer="TOMR maintainers",
+    maintainer_email="maintainers@tomr.dev",
+    license="Apache-2.0",
+    python_requires=">=3.11",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={NAME: ["py.typed", "weights/*.npz", "weights/*.json"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/launch", sorted(glob("launch/*.launch.py"))),
+    ],
+    install_requires=["setuptools"],
+    extras_require={"test": ["pytest"]},
+    zip_safe=False,
+    entry_points={
+        "console_scripts": [
+            f"power_residuals = {NAME}.nodes.power_residuals_node:main",
+            f"fault_classifier = {NAME}.nodes.fault_classifier_node:main",
+            f"tomr_diagnose = {NAME}.cli.diagnose:main",
+            f"tomr_train = {NAME}.cli.train:main",
+        ],
+    },
+)

@@ -1,0 +1,148 @@
+"""The network and its filter in time."""
+
+import json
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tomr_fault_diag.classifier.messages import diagnosis_message
+from tomr_fault_diag.classifier.network import Network
+from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
+from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STATES, UNKNOWN
+from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
+from tomr_power_model.errors import InputError
+from tomr_power_model.messages.outgoing import Level
+from tomr_power_model.robot import shipped_robot
+
+MS = 1_000_000
+BASE = 1_700_000_000_000 * MS
+# Wang 2024, Table 1, columns first to sixth.
+TABLE_1 = {
+    SLIP: (-1, -1, -1, 0, 0, 0, 0, -1, -1, 0),
+    CONTROL: (-1, -1, 0, 0, -1, 0, 0, 0, 0, 0),
+    MOTOR: (1, 1, 0, 0, -1, 0, 0, 1, 0, 0),
+    MOTOR + 1: (1, 0, 1, 0, 0, -1, 0, 0, 1, 0),
+    MOTOR + 2: (1, 0, 0, 1, 0, 0, -1, 0, 0, 1),
+    NORMAL: (0,) * 10,
+}
+HEALTHY = TABLE_1[NORMAL]
+
+
+def _frame(tick: int, codes: tuple[int, ...], stale: bool = False) -> ResidualFrame:
+    value = float("nan") if stale else 2.0
+    residuals = tuple(Residual(value * code if code else value * 0.0, 1.0, 5.0) for code in codes)
+    return ResidualFrame(BASE + tick * 50 * MS, residuals)
+
+
+def _run(*spells: tuple[tuple[int, ...], int]) -> list[Diagnosis]:
+    """Diagnoses over spells of (codes, number of ticks)."""
+    classifier = FaultClassifier(Network.load())
+    found, tick = [], 0
+    for codes, count in spells:
+        for _ in range(count):
+            tick += 1
+            diagnosis = classifier.classify(_frame(tick, codes))
+            if diagnosis is not None:
+                found.append(diagnosis)
+    return found
+
+
+def test_softmax_by_hand() -> None:
+    network = Network(np.zeros((30, 10)), np.zeros(30), np.zeros((6, 30)), np.log(np.arange(1, 7)))
+    np.testing.assert_allclose(network.probabilities(np.ones(10)), np.arange(1, 7) / 21.0)
+
+
+def test_inference_equals_the_training_framework() -> None:
+    """Scores of torch for the shipped weights, stored by `tomr_train` beside them."""
+    shipped = json.loads(
+        files("tomr_fault_diag").joinpath("weights").joinpath("wang2024.json").read_text()
+    )
+    inputs = np.array(shipped["torch_check"]["inputs"], dtype=np.float64)
+    expected = np.array(shipped["torch_check"]["probabilities"])
+    np.testing.assert_allclose(Network.load().probabilities(inputs), expected, atol=1e-6)
+
+
+def test_inference_equals_torch_itself() -> None:
+    torch = pytest.importorskip("torch", reason="torch is only needed to train")
+    network = Network.load()
+    inputs = np.random.default_rng(0).integers(-1, 2, (500, 10)).astype(np.float64)
+    module = torch.nn.Sequential(
+        torch.nn.Linear(10, 30), torch.nn.ReLU(), torch.nn.Linear(30, 6), torch.nn.Softmax(dim=1)
+    ).double()
+    weights = [
+        network.hidden_weight, network.hidden_bias, network.output_weight, network.output_bias,
+    ]  # fmt: skip
+    with torch.no_grad():
+        for parameter, value in zip(module.parameters(), weights, strict=True):
+            parameter.copy_(torch.tensor(value))
+        expected = module(torch.tensor(inputs)).numpy()
+    np.testing.assert_allclose(network.probabilities(inputs), expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("state", [NORMAL, CONTROL, MOTOR, MOTOR + 1, MOTOR + 2])
+def test_the_papers_table_is_named(state: int) -> None:
+    named = int(Network.load().probabilities(np.array(TABLE_1[state], dtype=float)).argmax())
+    assert STATES[named].name == STATES[state].name
+
+
+def test_a_fault_is_named_after_its_time_and_recovers_after_its_own() -> None:
+    found = _run((HEALTHY, 40), (TABLE_1[MOTOR], 20), (HEALTHY, 40))
+    changes = [(d.state.name, (d.stamp_ns - BASE) // (50 * MS)) for d in found if d.changed]
+    assert [name for name, _ in changes] == ["normal", "motor system fault 1", "normal"]
+    named, recovered = changes[1][1], changes[2][1]
+    assert 41 < named <= 41 + 8
+    assert 61 + 20 <= recovered <= 61 + 26
+
+
+def test_a_blip_is_no_fault() -> None:
+    found = _run((HEALTHY, 40), (TABLE_1[MOTOR], 2), (HEALTHY, 40))
+    assert {d.state.name for d in found} == {"normal"}
+
+
+def test_reports_come_once_a_second_and_on_changes() -> None:
+    found = _run((HEALTHY, 200))
+    gaps = np.diff([d.stamp_ns for d in found]) // MS
+    assert set(gaps[1:].tolist()) == {1000}
+
+
+def test_nothing_to_compare_is_unknown_not_normal() -> None:
+    classifier = FaultClassifier(Network.load())
+    diagnosis = classifier.classify(_frame(1, HEALTHY, stale=True))
+    assert diagnosis is not None
+    assert diagnosis.state is UNKNOWN
+    assert diagnosis.state.level is Level.STALE
+
+
+def test_a_clock_that_goes_back_starts_afresh() -> None:
+    classifier = FaultClassifier(Network.load())
+    for tick in range(100, 130):
+        classifier.classify(_frame(tick, TABLE_1[MOTOR]))
+    assert classifier.classify(_frame(129, HEALTHY)) is None
+    diagnosis = classifier.classify(_frame(1, HEALTHY))
+    assert diagnosis is not None
+    assert diagnosis.state is STATES[NORMAL]
+
+
+def test_the_message_is_for_people_and_plots() -> None:
+    robot = shipped_robot("reference")
+    found = [d for d in _run((HEALTHY, 40), (TABLE_1[MOTOR], 20)) if d.changed][-1]
+    status = diagnosis_message(robot, found, "robot_7").statuses[0]
+    values = dict(status.values)
+    assert status.level is Level.ERROR
+    assert status.message == "motor system fault 1 (wheel_1_joint)"
+    assert status.hardware_id == "robot_7"
+    assert sum(float(values[f"p {state.name}"]) for state in STATES) == pytest.approx(1, abs=1e-3)
+    assert float(values["since"]) * 1e9 == pytest.approx(found.since_ns)
+    assert "wheel_1 power" in values["evidence 2"]
+
+
+def test_damaged_weights_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "weights.npz"
+    file.write_bytes(b"no zip")
+    with pytest.raises(InputError, match="train it again"):
+        Network.load(file)
+    np.savez(file, hidden_weight=np.zeros((3, 3)))
+    with pytest.raises(InputError, match="train it again"):
+        Network.load(file)

@@ -1,0 +1,237 @@
+"""The residual stage: codes, bands, staleness, and the ways in which power may be published."""
+
+import math
+from types import SimpleNamespace as Message
+from typing import Any
+
+import pytest
+from attrs import evolve
+
+from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL, Residual, ResidualFrame
+from tomr_fault_diag.residuals.messages import frame_of, residual_message
+from tomr_fault_diag.residuals.sources import residual_inputs
+from tomr_fault_diag.residuals.stage import ResidualStage
+from tomr_power_model.messages.bag import bag_header, bag_message
+from tomr_power_model.messages.intake import Unusable
+from tomr_power_model.messages.readings import SupplyReading
+from tomr_power_model.messages.to_bag import to_bag
+from tomr_power_model.model.prediction import Prediction
+from tomr_power_model.robot import Robot, shipped_robot
+
+MS = 1_000_000
+BASE = 1_700_000_000_000 * MS
+NAN = math.nan
+SPEED = (4.0, -4.0, 0.0)
+
+
+def _robot(**measurement: object) -> Robot:
+    robot = shipped_robot("reference")
+    return evolve(robot, measurement=evolve(robot.measurement, **measurement))
+
+
+def _prediction(stamp: int, power: float = 10.0, current: float | None = None) -> Prediction:
+    drawn = power / 24.0 if current is None else current
+    reading = SupplyReading.rounded(24.0, drawn)
+    total = SupplyReading.rounded(24.0, (3 * power + 12.0) / 24.0)
+    motors = (reading, reading, reading)
+    return Prediction(stamp, SPEED, (0.1, 0.1, 0.1), motors, total, motors)
+
+
+def _battery(stamp: int, voltage: float, current: float) -> Any:
+    return bag_message(
+        "sensor_msgs/msg/BatteryState", header=bag_header(stamp), voltage=voltage, current=current
+    )
+
+
+def _joints(stamp: int, effort: tuple[float, ...] = ()) -> Any:
+    robot = shipped_robot("reference")
+    seconds = 1e-9 * (stamp - BASE)
+    return bag_message(
+        "sensor_msgs/msg/JointState",
+        header=bag_header(stamp),
+        name=["other", *reversed(robot.wheel_names)],
+        position=[9.0, *(speed * seconds for speed in reversed(SPEED))],
+        velocity=[9.0, *reversed(SPEED)],
+        effort=[9.0, *reversed(effort)] if effort else [],
+    )
+
+
+def _frames(robot: Robot, feed: dict[str, Any], power: float = 10.0) -> list[ResidualFrame]:
+    """Half a second of messages; `feed` makes those of a topic from a stamp."""
+    stage = ResidualStage(robot)
+    takers = {item.topic: item.take for item in residual_inputs(robot, stage)}
+    assert set(feed) <= set(takers)
+    frames: list[ResidualFrame] = []
+    for step in range(51):
+        stamp = BASE + step * 10 * MS
+        if step % 5 == 0:
+            stage.prediction(_prediction(stamp, power))
+        for topic, make in feed.items():
+            takers[topic](make(stamp), stamp)
+        frames.extend(stage.due())
+    return frames
+
+
+WATTS = {f"wheel_{n}/power": lambda t: _battery(t, 24.0, -10.0 / 24.0) for n in (1, 2, 3)}
+ALL = {
+    **WATTS,
+    "battery_state": lambda t: _battery(t, 24.0, -42.0 / 24.0),
+    "joint_states": _joints,
+}
+
+
+def test_a_healthy_robot_has_ten_known_zeros() -> None:
+    frames = _frames(_robot(), ALL)
+    assert len(frames) >= 8
+    for frame in frames[1:]:
+        assert frame.codes == (0,) * 10
+        assert not any(residual.stale for residual in frame.residuals)
+        assert all(abs(residual.residual) < 1e-2 for residual in frame.residuals)
+
+
+def test_signs_and_places() -> None:
+    feed = {**ALL, "wheel_2/power": lambda t: _battery(t, 24.0, -20.0 / 24.0)}
+    frame = _frames(_robot(), feed)[-1]
+    assert frame.codes == (0, 0, 1, 0, 0, 0, 0, 0, 1, 0)
+    assert frame.residuals[MOTORS[1]].residual == pytest.approx(10.0, abs=1e-3)
+
+
+def test_slower_than_told_is_negative_whichever_way_it_turns() -> None:
+    stage_frames = _frames(_robot(), {**ALL, "joint_states": lambda t: _slow(t)})
+    codes = stage_frames[-1].codes
+    assert [codes[place] for place in SPEEDS] == [-1, -1, 0]
+
+
+def _slow(stamp: int) -> Any:
+    message = _joints(stamp)
+    message.position = message.position * 0.5
+    return message
+
+
+@pytest.mark.parametrize(
+    ("lost", "places"),
+    [
+        ("wheel_1/power", {MOTORS[0], ENCODERS[0]}),
+        ("battery_state", {TOTAL}),
+        ("joint_states", set(SPEEDS)),
+    ],
+)
+def test_a_missing_input_makes_only_its_residuals_stale(lost: str, places: set[int]) -> None:
+    feed = {topic: make for topic, make in ALL.items() if topic != lost}
+    frame = _frames(_robot(), feed)[-1]
+    stale = {index for index, residual in enumerate(frame.residuals) if residual.stale}
+    assert stale == places
+    assert all(lost in frame.residuals[index].missing for index in places)
+
+
+def test_an_input_that_falls_silent_goes_stale_after_its_time() -> None:
+    def silent(stamp: int) -> Any:
+        return _battery(stamp if stamp < BASE + 100 * MS else BASE + 90 * MS, 24.0, -10.0 / 24.0)
+
+    robot = _robot()
+    stage = ResidualStage(robot)
+    takers = {item.topic: item.take for item in residual_inputs(robot, stage)}
+    known: list[tuple[int, bool]] = []
+    for step in range(120):
+        stamp = BASE + step * 10 * MS
+        if step % 5 == 0:
+            stage.prediction(_prediction(stamp))
+        for topic, make in {**ALL, "wheel_3/power": silent}.items():
+            takers[topic](make(stamp), stamp)
+        for frame in stage.due():
+            known.append(((frame.stamp_ns - BASE) // MS, frame.residuals[MOTORS[2]].stale))
+    assert all(stale == (at >= 590) for at, stale in known)
+    assert known[-1][1]
+
+
+def test_without_predictions_everything_is_stale_and_says_so() -> None:
+    robot = _robot()
+    stage = ResidualStage(robot)
+    takers = {item.topic: item.take for item in residual_inputs(robot, stage)}
+    frames = []
+    for step in range(100):
+        for topic, make in ALL.items():
+            takers[topic](make(BASE + step * 10 * MS), 0)
+        frames.extend(stage.due())
+    assert frames
+    assert all("power_model" in r.missing for r in frames[-1].residuals)
+
+
+def test_a_current_without_voltage_is_compared_in_amperes() -> None:
+    feed = {
+        **ALL,
+        **{f"wheel_{n}/power": lambda t: _battery(t, NAN, -10.0 / 24.0) for n in (1, 2, 3)},
+    }
+    frame = _frames(_robot(), feed)[-1]
+    assert {frame.residuals[index].unit for index in MOTORS} == {"A"}
+    assert frame.codes == (0,) * 10
+    assert frame.residuals[MOTORS[0]].modelled == pytest.approx(10.0 / 24.0, rel=1e-5)
+
+
+def test_an_array_of_powers() -> None:
+    feed = {
+        "power": lambda t: bag_message("std_msgs/msg/Float64MultiArray", data=[10.0, 10.0, 30.0]),
+        "joint_states": _joints,
+        "battery_state": ALL["battery_state"],
+    }
+    frame = _frames(_robot(source="multi_array"), feed)[-1]
+    assert frame.codes == (0, 0, 0, 1, 0, 0, 0, 0, 0, 1)
+
+
+def test_effort_as_current() -> None:
+    robot = _robot(source="joint_effort", quantity="motor_current", total="sum")
+    drawn = 10.0 / 24.0
+    feed = {"joint_states": lambda t: _joints(t, (drawn, 3.0 * drawn, drawn))}
+    frame = _frames(robot, feed)[-1]
+    assert frame.codes == (1, 0, 1, 0, 0, 0, 0, 0, 1, 0)
+    assert {residual.unit for residual in frame.residuals[:4]} == {"A"}
+
+
+def test_one_total_only() -> None:
+    feed = {"joint_states": _joints, "battery_state": lambda t: _battery(t, 24.0, -60.0 / 24.0)}
+    frame = _frames(_robot(source="total_only"), feed)[-1]
+    assert frame.codes[TOTAL] == 1
+    assert all(frame.residuals[index].stale for index in (*MOTORS, *ENCODERS))
+    assert not any(frame.residuals[index].stale for index in SPEEDS)
+
+
+def test_unsigned_currents_are_magnitudes() -> None:
+    robot = _robot(signed=False, total="sum")
+    feed = {
+        **{f"wheel_{n}/power": lambda t: _battery(t, NAN, 10.0 / 24.0) for n in (1, 2, 3)},
+        "joint_states": _joints,
+    }
+    assert _frames(robot, feed)[-1].codes == (0,) * 10
+
+
+def test_a_frame_survives_its_message() -> None:
+    robot = _robot()
+    values = [0.123456, -4.0, 1e-7, NAN, 2.0, 3.0, -123456.0, 0.0, 1.5, 7.0]
+    residuals = tuple(
+        Residual(value, 1.0, 2.5, unit, missing="lost" if math.isnan(value) else "")
+        for value, unit in zip(values, ["W", "A", "rad/s"] * 4, strict=False)
+    )
+    frame = ResidualFrame(BASE, residuals)
+    back = frame_of(to_bag(residual_message(robot, frame)), BASE)
+    assert back.codes == frame.codes
+    for one, other in zip(back.residuals, frame.residuals, strict=True):
+        assert (one.residual == other.residual) or (one.stale and other.stale)
+        assert one.missing == other.missing
+        assert one.stale or one.unit == other.unit
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        Message(status=[]),
+        Message(status=[Message(name="x", message="", values=[])] * 10),
+        Message(
+            status=[
+                Message(name="x", message="", values=[Message(key="residual", value="a")])
+            ] * 10
+        ),
+    ],
+)  # fmt: skip
+def test_a_strange_message_is_refused(message: Any) -> None:
+    with pytest.raises(Unusable):
+        frame_of(message, BASE)

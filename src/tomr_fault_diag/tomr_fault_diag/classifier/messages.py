@@ -1,0 +1,46 @@
+"""A diagnosis as a DiagnosticArray (REP-107)."""
+
+from tomr_fault_diag.classifier.stage import Diagnosis
+from tomr_fault_diag.classifier.states import STATES, UNKNOWN
+from tomr_fault_diag.residuals.frame import residual_names
+from tomr_fault_diag.residuals.messages import sentence
+from tomr_power_model.messages.outgoing import DiagnosticMessage, Status
+from tomr_power_model.model.ticks import NANOSECONDS
+from tomr_power_model.robot import Robot
+
+TOPIC = "/diagnostics"
+NAME = "fault_classifier: drive"
+
+
+def diagnosis_message(robot: Robot, diagnosis: Diagnosis, hardware_id: str) -> DiagnosticMessage:
+    """The message of one diagnosis: state, since when, probabilities, evidence."""
+    seconds, rest = divmod(diagnosis.since_ns, NANOSECONDS)
+    values = [("state", diagnosis.state.name), ("since", f"{seconds}.{rest:09d}")]
+    for state, share in zip(STATES, diagnosis.probabilities, strict=False):
+        values.append((f"p {state.name}", f"{share:.4f}"))
+    evidence = evidence_of(robot, diagnosis)
+    values.extend((f"evidence {number}", text) for number, text in enumerate(evidence, start=1))
+    status = Status(
+        NAME, diagnosis.state.level, _headline(robot, diagnosis), tuple(values), hardware_id
+    )
+    return DiagnosticMessage(TOPIC, diagnosis.stamp_ns, (status,))
+
+
+def evidence_of(robot: Robot, diagnosis: Diagnosis) -> list[str]:
+    """The residuals outside their bands, and those that are missing, in words."""
+    names = residual_names(robot.wheel_topics)
+    return [
+        f"{name.removeprefix('residuals: ')}: {sentence(residual)}"
+        for name, residual in zip(names, diagnosis.frame.residuals, strict=True)
+        if residual.code or residual.stale
+    ]
+
+
+def _headline(robot: Robot, diagnosis: Diagnosis) -> str:
+    state = diagnosis.state
+    if state == UNKNOWN:
+        missing = next((r.missing for r in diagnosis.frame.residuals if r.stale), "too little seen")
+        return f"{state.name}: {missing}"
+    if state.wheel is not None:
+        return f"{state.name} ({robot.wheel_names[state.wheel]})"
+    return state.name

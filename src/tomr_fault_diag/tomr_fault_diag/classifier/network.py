@@ -1,0 +1,63 @@
+"""The paper's network: ten inputs, thirty ReLU, six softmax outputs (Wang 2024, Fig. 11)."""
+
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_fault_diag.classifier.states import STATES
+from tomr_fault_diag.residuals.frame import RESIDUALS
+from tomr_power_model.errors import InputError
+
+Array = NDArray[np.float64]
+
+SHIPPED = "wang2024.npz"
+_SHAPES = {
+    "hidden_weight": (30, RESIDUALS),
+    "hidden_bias": (30,),
+    "output_weight": (len(STATES), 30),
+    "output_bias": (len(STATES),),
+}
+
+
+@frozen
+class Network:
+    """softmax(W2 relu(W1 x + b1) + b2)."""
+
+    hidden_weight: Array  # (30, 10)
+    hidden_bias: Array  # (30,)
+    output_weight: Array  # (6, 30)
+    output_bias: Array  # (6,)
+
+    @classmethod
+    def load(cls, path: Path | str | None = None) -> Self:
+        """Weights of a file, or the shipped ones; raises InputError if they do not fit."""
+        if path:
+            return cls._read(Path(path))
+        with as_file(files("tomr_fault_diag").joinpath("weights").joinpath(SHIPPED)) as shipped:
+            return cls._read(shipped)
+
+    @classmethod
+    def _read(cls, path: Path) -> Self:
+        try:
+            with np.load(path) as stored:
+                weights = {name: np.asarray(stored[name], np.float64) for name in _SHAPES}
+        except (OSError, ValueError, KeyError, EOFError) as error:
+            raise InputError(f"{path}: no weights of a network ({error}): train it again") from None
+        for name, shape in _SHAPES.items():
+            if weights[name].shape != shape or not np.isfinite(weights[name]).all():
+                raise InputError(
+                    f"{path}: {name} has shape {weights[name].shape}, needs finite numbers of "
+                    f"shape {shape}: train it again"
+                )
+        return cls(**weights)
+
+    def probabilities(self, inputs: Array) -> Array:
+        """Probabilities of the states (..., 6) from inputs (..., 10)."""
+        hidden = np.maximum(inputs @ self.hidden_weight.T + self.hidden_bias, 0.0)
+        scores = hidden @ self.output_weight.T + self.output_bias
+        raised = np.exp(scores - scores.max(axis=-1, keepdims=True))
+        return np.asarray(raised / raised.sum(axis=-1, keepdims=True))

@@ -1,0 +1,29 @@
+"""The states that the diagnosis can name, in the order of Wang 2024, section 4."""
+
+from attrs import frozen
+
+from tomr_power_model.messages.outgoing import Level
+
+
+@frozen
+class State:
+    """One state: its stable name, how grave it is, and the wheel (0..2) it concerns."""
+
+    name: str
+    level: Level
+    wheel: int | None = None
+
+
+STATES: tuple[State, ...] = (
+    State("normal", Level.OK),
+    State("slip", Level.WARN),
+    State("control system fault", Level.ERROR),
+    State("motor system fault 1", Level.ERROR, 0),
+    State("motor system fault 2", Level.ERROR, 1),
+    State("motor system fault 3", Level.ERROR, 2),
+)
+NORMAL = 0
+SLIP = 1
+CONTROL = 2
+MOTOR = 3  # of wheel 0; those of wheels 1 and 2 follow
+UNKNOWN = State("unknown", Level.STALE)

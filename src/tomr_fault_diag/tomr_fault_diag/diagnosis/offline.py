@@ -1,0 +1,63 @@
+"""A recording through the pipeline, as fast as it can."""
+
+from collections.abc import Iterator
+
+from tomr_fault_diag.diagnosis.pipeline import Pipeline, Step
+from tomr_power_model.errors import InputError
+from tomr_power_model.messages.inputs import Input
+from tomr_power_model.recordings import Recording, resolve_topic
+
+
+def find_topics(
+    recording: Recording, inputs: tuple[Input, ...], namespace: str | None = None
+) -> dict[str, str]:
+    """Recorded topic of each input that is there: {recorded name: contract name}.
+
+    Raises InputError if a topic has another type, or if so much is missing that nothing could
+    be compared.
+    """
+    found: dict[str, str] = {}
+    for item in inputs:
+        topic = resolve_topic(recording, item.topic, namespace)
+        if topic is None:
+            continue
+        types = (item.type_name, *item.other_types)
+        if recording.topics[topic] not in types:
+            raise InputError(
+                f"{recording.path}: {topic} is a {recording.topics[topic]}, needs {types[0]}: "
+                "remap it or set measurement.source in robot.yaml"
+            )
+        found[topic] = item.topic
+    held = ", ".join(recording.topics)
+    if "joint_states" not in found.values():
+        raise InputError(f"{recording.path}: no joint_states; the recording holds {held}")
+    power = {item.topic for item in inputs} - {"joint_states", "cmd_vel", "imu/data"}
+    if power and not power & set(found.values()):
+        raise InputError(
+            f"{recording.path}: none of {', '.join(sorted(power))}: are the wheels named "
+            f"otherwise in robot.yaml? The recording holds {held}"
+        )
+    return found
+
+
+def check_wheels(recording: Recording, topic: str, wheel_names: tuple[str, str, str]) -> None:
+    """Raise InputError if the first joint_states has none of the robot's wheels."""
+    for _, _, message, _ in recording.messages([topic]):
+        names = list(message.name)
+        if not set(names) & set(wheel_names):
+            raise InputError(
+                f"{recording.path}: {topic} has {', '.join(names) or 'no joints'}, but robot.yaml "
+                f"names {', '.join(wheel_names)}: set robot.wheel_names"
+            )
+        return
+
+
+def diagnose(
+    recording: Recording, pipeline: Pipeline, namespace: str | None = None
+) -> Iterator[tuple[int, Step]]:
+    """Yield (receive stamp [ns], what it brought about) for every message of the inputs."""
+    topics = find_topics(recording, pipeline.inputs, namespace)
+    joints = next(topic for topic, name in topics.items() if name == "joint_states")
+    check_wheels(recording, joints, pipeline.robot.wheel_names)
+    for topic, _, message, receive_ns in recording.messages(topics):
+        yield receive_ns, pipeline.take(topics[topic], message, receive_ns)

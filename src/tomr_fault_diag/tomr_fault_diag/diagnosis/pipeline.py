@@ -1,0 +1,82 @@
+"""The three stages in one process: messages in, the suite's messages out.
+
+The nodes run the same stages apart; both give the same numbers, because the stages are driven by
+stamps and whatever crosses a topic is rounded as its message rounds it.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from attrs import frozen
+
+from tomr_fault_diag.classifier.messages import diagnosis_message
+from tomr_fault_diag.classifier.network import Network
+from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
+from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
+from tomr_fault_diag.residuals.frame import ResidualFrame
+from tomr_fault_diag.residuals.messages import residual_message
+from tomr_fault_diag.residuals.sources import residual_inputs
+from tomr_fault_diag.residuals.stage import ResidualStage
+from tomr_power_model.messages.inputs import TWIST_STAMPED, Complaints, Input, model_inputs
+from tomr_power_model.messages.outgoing import Outgoing
+from tomr_power_model.messages.predictions import prediction_messages
+from tomr_power_model.model.prediction import Prediction
+from tomr_power_model.model.predictor import PowerPredictor
+from tomr_power_model.robot import Robot
+
+Take = Callable[[Any, int], str | None]
+
+
+@frozen
+class Step:
+    """What one message brought about."""
+
+    predictions: tuple[Prediction, ...] = ()
+    frames: tuple[ResidualFrame, ...] = ()
+    diagnoses: tuple[Diagnosis, ...] = ()
+
+
+_NOTHING = Step()
+
+
+class Pipeline:
+    """Model, residuals and classifier of one robot, fed with recorded messages."""
+
+    def __init__(self, robot: Robot, settings: DiagnosisSettings) -> None:
+        self.robot = robot
+        self.settings = settings
+        self.complaints = Complaints()
+        self._predictor = PowerPredictor(robot, settings.model)
+        self._residuals = ResidualStage(robot, settings.residuals)
+        self._classifier = FaultClassifier(Network.load(settings.weights), settings.classifier)
+        self.inputs: tuple[Input, ...] = (
+            *model_inputs(robot, self._predictor, TWIST_STAMPED),
+            *residual_inputs(robot, self._residuals),
+        )
+        self._takers: dict[str, list[Take]] = {}
+        for item in self.inputs:
+            self._takers.setdefault(item.topic, []).append(item.take)
+
+    def take(self, topic: str, message: Any, receive_ns: int) -> Step:
+        """Take a message of one of the inputs' topics (relative names, as in the contract)."""
+        problems = {take(message, receive_ns) for take in self._takers[topic]}
+        for problem in problems - {None}:
+            self.complaints.note(topic, str(problem))
+        predictions = self._predictor.due()
+        for prediction in predictions:
+            self._residuals.prediction(prediction)
+        frames = self._residuals.due()
+        if not predictions and not frames:
+            return _NOTHING
+        diagnoses = (self._classifier.classify(frame) for frame in frames)
+        return Step(tuple(predictions), tuple(frames), tuple(d for d in diagnoses if d is not None))
+
+    def messages(self, step: Step) -> Iterator[Outgoing]:
+        """The messages that the nodes publish at such a step."""
+        hardware_id = self.settings.classifier.hardware_id
+        for prediction in step.predictions:
+            yield from prediction_messages(self.robot, prediction)
+        for frame in step.frames:
+            yield residual_message(self.robot, frame, hardware_id)
+        for diagnosis in step.diagnoses:
+            yield diagnosis_message(self.robot, diagnosis, hardware_id)

@@ -1,0 +1,60 @@
+"""All parameters of the diagnosis together, for tools that run the three stages in one."""
+
+from collections.abc import Iterable, Mapping
+from typing import Self
+
+import yaml
+from attrs import frozen
+
+from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
+from tomr_fault_diag.residuals.settings import RESIDUAL_PARAMETERS, ResidualSettings
+from tomr_power_model.errors import InputError
+from tomr_power_model.model.settings import MODEL_PARAMETERS, ModelSettings
+from tomr_power_model.robot.description import closest
+from tomr_power_model.robot.parameters import ParameterSpec, check_all
+
+# The stages share some parameters by name and meaning; a name stands once.
+PARAMETERS: Mapping[str, ParameterSpec] = {
+    spec.name: spec for spec in (*MODEL_PARAMETERS, *RESIDUAL_PARAMETERS, *CLASSIFIER_PARAMETERS)
+}
+
+
+@frozen
+class DiagnosisSettings:
+    """Settings of the three stages."""
+
+    model: ModelSettings
+    residuals: ResidualSettings
+    classifier: ClassifierSettings
+    weights: str = ""
+
+    @classmethod
+    def of(cls, values: Mapping[str, object], place: str) -> Self:
+        """Settings from dotted parameters; absent ones take their default.
+
+        Raises InputError for an unknown name or a value that does not fit.
+        """
+        for name in values:
+            if name not in PARAMETERS:
+                raise InputError(f"{place}: {name} is unknown: {closest(name, list(PARAMETERS))}")
+        checked = check_all(PARAMETERS.values(), values, place)
+        return cls(
+            ModelSettings.of(checked),
+            ResidualSettings.of(checked),
+            ClassifierSettings.of(checked),
+            str(checked["weights"]),
+        )
+
+
+def parse_assignments(assignments: Iterable[str]) -> dict[str, object]:
+    """`name=value` pairs from a command line, values read as YAML."""
+    values: dict[str, object] = {}
+    for assignment in assignments:
+        name, equals, text = assignment.partition("=")
+        if not equals:
+            raise InputError(f"--set {assignment}: write name=value, e.g. band.power=2.0")
+        try:
+            values[name.strip()] = yaml.safe_load(text)
+        except yaml.YAMLError:
+            raise InputError(f"--set {assignment}: {text!r} is no value") from None
+    return values

@@ -1,0 +1,54 @@
+"""Node `fault_classifier`: the robot's state on /diagnostics."""
+
+from typing import Any
+
+from rclpy.parameter import Parameter
+
+from tomr_fault_diag.classifier.messages import TOPIC, diagnosis_message
+from tomr_fault_diag.classifier.network import Network
+from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
+from tomr_fault_diag.classifier.stage import FaultClassifier
+from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
+from tomr_fault_diag.residuals.messages import frame_of
+from tomr_power_model.messages.inputs import DIAGNOSTICS, Input, guarded
+from tomr_power_model.messages.intake import stamp_of
+from tomr_power_model.messages.outgoing import DiagnosticMessage
+from tomr_power_model.nodes.command_line import node_arguments
+from tomr_power_model.nodes.stage_node import STAGE_QOS, StageNode, run_node
+
+
+class FaultClassifierNode(StageNode):
+    """Publishes the diagnosis once a second and at once on a change."""
+
+    def __init__(self) -> None:
+        super().__init__("fault_classifier", CLASSIFIER_PARAMETERS)
+        self._robot = self.robot_described()
+        self._classifier = FaultClassifier(
+            Network.load(str(self.values["weights"])), ClassifierSettings.of(self.values)
+        )
+        self.offer(TOPIC, DiagnosticMessage)
+        self.listen([Input(RESIDUALS, DIAGNOSTICS, guarded(self._take))], self._advance, STAGE_QOS)
+        self.add_post_set_parameters_callback(self._retune)
+
+    def _take(self, message: Any, receive_ns: int) -> None:
+        frame = frame_of(message, stamp_of(message, receive_ns))
+        diagnosis = self._classifier.classify(frame)
+        if diagnosis is not None:
+            hardware_id = self._classifier.settings.hardware_id
+            self.send(diagnosis_message(self._robot, diagnosis, hardware_id))
+
+    def _retune(self, parameters: list[Parameter]) -> None:
+        for parameter in parameters:
+            if parameter.name in self.values:
+                self.values[parameter.name] = parameter.value
+        self._classifier.settings = ClassifierSettings.of(self.values)
+
+    def _advance(self) -> None:
+        """Nothing is due later: a frame is answered when it comes."""
+
+
+def main() -> int:
+    """Entry point of `fault_classifier`."""
+    description = "Name the state of the robot on /diagnostics from its residuals."
+    given = node_arguments("fault_classifier", description, CLASSIFIER_PARAMETERS)
+    return run_node(FaultClassifierNode, given)

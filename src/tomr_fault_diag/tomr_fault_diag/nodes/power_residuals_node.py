@@ -1,0 +1,69 @@
+"""Node `power_residuals`: measured against predicted power, ten residuals as in Table 1."""
+
+from typing import Any
+
+from rclpy.parameter import Parameter
+
+from tomr_fault_diag.residuals.messages import TOPIC, residual_message
+from tomr_fault_diag.residuals.settings import (
+    RESIDUAL_PARAMETERS,
+    BandSettings,
+    ResidualSettings,
+)
+from tomr_fault_diag.residuals.sources import residual_inputs
+from tomr_fault_diag.residuals.stage import ResidualStage
+from tomr_power_model.messages.inputs import BATTERY, JOINT_STATE, Input, guarded
+from tomr_power_model.messages.intake import stamp_of
+from tomr_power_model.messages.outgoing import DiagnosticMessage
+from tomr_power_model.messages.predictions import (
+    EXPECTED,
+    PredictionAssembler,
+    prediction_topics,
+)
+from tomr_power_model.model.ticks import Arrival
+from tomr_power_model.nodes.command_line import node_arguments
+from tomr_power_model.nodes.stage_node import STAGE_QOS, StageNode, run_node
+from tomr_power_model.robot.parameters import ParameterSpec
+
+HARDWARE_ID = ParameterSpec("hardware_id", "of this robot, in every status", "str", "tomr")
+PARAMETERS = (*RESIDUAL_PARAMETERS, HARDWARE_ID)
+
+
+class PowerResidualsNode(StageNode):
+    """Publishes the residuals of each tick as one DiagnosticArray."""
+
+    def __init__(self) -> None:
+        super().__init__("power_residuals", PARAMETERS)
+        self._robot = self.robot_described()
+        self._stage = ResidualStage(self._robot, ResidualSettings.of(self.values))
+        self._assembler = PredictionAssembler(self._robot)
+        self.offer(TOPIC, DiagnosticMessage)
+        predictions = [self._prediction(topic) for topic in prediction_topics(self._robot)]
+        self.listen(predictions, self._advance, STAGE_QOS)
+        self.listen(residual_inputs(self._robot, self._stage), self._advance)
+        self.add_post_set_parameters_callback(self._retune)
+
+    def _prediction(self, topic: str) -> Input:
+        def take(message: Any, receive_ns: int) -> Arrival | None:
+            stamp = stamp_of(message, receive_ns)
+            prediction = self._assembler.add(topic, stamp, message)
+            return None if prediction is None else self._stage.prediction(prediction)
+
+        return Input(topic, JOINT_STATE if topic == EXPECTED else BATTERY, guarded(take))
+
+    def _retune(self, parameters: list[Parameter]) -> None:
+        for parameter in parameters:
+            if parameter.name in self.values:
+                self.values[parameter.name] = parameter.value
+        self._stage.retune(BandSettings.of(self.values))
+
+    def _advance(self) -> None:
+        for frame in self._stage.due():
+            self.send(residual_message(self._robot, frame, str(self.values["hardware_id"])))
+
+
+def main() -> int:
+    """Entry point of `power_residuals`."""
+    description = "Compare the measured power of each motor with the predicted."
+    given = node_arguments("power_residuals", description, PARAMETERS)
+    return run_node(PowerResidualsNode, given)

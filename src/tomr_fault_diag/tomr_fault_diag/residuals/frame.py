@@ -1,0 +1,67 @@
+"""The ten residuals of one tick, in the order of Wang 2024, Table 1."""
+
+import math
+from typing import Literal
+
+from attrs import frozen
+
+RESIDUALS = 10
+TOTAL = 0
+MOTORS = range(1, 4)
+SPEEDS = range(4, 7)
+ENCODERS = range(7, 10)
+
+Unit = Literal["W", "A", "rad/s"]
+UNITS: dict[str, Unit] = {"W": "W", "A": "A", "rad/s": "rad/s"}
+
+
+def rounded(value: float) -> float:
+    """A number as it travels in a diagnostic message: six significant digits."""
+    return float(f"{value:.6g}")
+
+
+@frozen
+class Residual:
+    """Measured minus modelled, its band, and Wang 2024, Eq. 21 of them."""
+
+    residual: float
+    band: float
+    modelled: float
+    unit: Unit = "W"
+    missing: str = ""  # what is missing or stale, where the residual is unknown
+
+    @property
+    def stale(self) -> bool:
+        return math.isnan(self.residual) or math.isnan(self.band)
+
+    @property
+    def code(self) -> int:
+        """-1, 0 or 1: below, within or above the band; 0 where the residual is unknown."""
+        if self.stale or abs(self.residual) <= self.band:
+            return 0
+        return 1 if self.residual > 0 else -1
+
+
+@frozen
+class ResidualFrame:
+    """Residuals of one tick: total power, motor powers 1-3 (measured - predicted from the
+    command), wheel speeds 1-3 (measured - expected), motor powers 1-3 (measured - derived from
+    the encoders)."""
+
+    stamp_ns: int
+    residuals: tuple[Residual, ...]
+
+    @property
+    def codes(self) -> tuple[int, ...]:
+        """Input of the paper's network, Wang 2024, Eq. 21."""
+        return tuple(residual.code for residual in self.residuals)
+
+
+def residual_names(wheel_topics: tuple[str, str, str]) -> tuple[str, ...]:
+    """Stable status names of the ten residuals."""
+    return (
+        "residuals: total power",
+        *(f"residuals: {wheel} power" for wheel in wheel_topics),
+        *(f"residuals: {wheel} speed" for wheel in wheel_topics),
+        *(f"residuals: {wheel} power against encoders" for wheel in wheel_topics),
+    )

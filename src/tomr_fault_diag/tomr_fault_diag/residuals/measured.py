@@ -1,0 +1,66 @@
+"""Measured power or current of one supply, averaged over the window of a tick."""
+
+import math
+from collections import deque
+
+from attrs import frozen
+
+from tomr_fault_diag.residuals.frame import Unit
+from tomr_power_model.messages.readings import NAN, SupplyReading
+
+
+@frozen
+class Measured:
+    """A mean [W or A] and its unit; NaN where there is no fresh sample."""
+
+    value: float
+    unit: Unit
+
+
+class SupplyWindow:
+    """Keeps the readings of one supply; where it tells no voltage, its current is compared.
+
+    Nothing is filled in: a window without a sample takes the newest one that is not stale.
+    """
+
+    def __init__(self, period_ns: int, stale_ns: int, signed: bool = True) -> None:
+        self._period = period_ns
+        self._stale = stale_ns
+        self._signed = signed
+        self._samples: deque[tuple[int, float, float]] = deque()
+
+    def clear(self) -> None:
+        """Forget all samples."""
+        self._samples.clear()
+
+    def add(self, stamp_ns: int, voltage: float, current: float) -> None:
+        """Take a reading: voltage [V] or NaN, current [A] negative while drawing."""
+        drawn = -current if self._signed else abs(current)
+        self._samples.append((stamp_ns, -voltage * current, drawn))
+
+    def at(self, tick_ns: int) -> Measured:
+        """Mean over (tick - period, tick]: power, or current if the voltage is unknown."""
+        samples = self._samples
+        while len(samples) > 1 and samples[1][0] <= tick_ns - self._period:
+            samples.popleft()
+        start = tick_ns - self._period
+        inside = [s for s in samples if start < s[0] <= tick_ns]
+        if not inside:
+            inside = [s for s in samples if tick_ns - self._stale < s[0] <= tick_ns][-1:]
+        if not inside:
+            return Measured(NAN, "W")
+        powers = [power for _, power, _ in inside if not math.isnan(power)]
+        if powers:
+            return Measured(sum(powers) / len(powers), "W")
+        currents = [current for _, _, current in inside if not math.isnan(current)]
+        return Measured(sum(currents) / len(currents) if currents else NAN, "A")
+
+
+def modelled(reading: SupplyReading, unit: Unit) -> float:
+    """What the model says of a supply in the unit that is measured."""
+    return reading.power if unit == "W" else reading.drawn_current
+
+
+def modelled_sum(motors: tuple[SupplyReading, ...], unit: Unit) -> float:
+    """What the model says of all motors together."""
+    return math.fsum(modelled(reading, unit) for reading in motors)

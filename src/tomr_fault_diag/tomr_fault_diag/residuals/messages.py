@@ -1,0 +1,87 @@
+"""Residuals as a DiagnosticArray and back."""
+
+import math
+from typing import Any
+
+from tomr_fault_diag.residuals.frame import (
+    RESIDUALS,
+    UNITS,
+    Residual,
+    ResidualFrame,
+    residual_names,
+)
+from tomr_power_model.messages.intake import Unusable
+from tomr_power_model.messages.outgoing import DiagnosticMessage, Level, Status
+from tomr_power_model.robot import Robot
+
+TOPIC = "residuals"
+
+
+def residual_message(
+    robot: Robot, frame: ResidualFrame, hardware_id: str = ""
+) -> DiagnosticMessage:
+    """The message of one frame: a sentence to read, numbers to plot."""
+    statuses = tuple(
+        _status(name, residual, hardware_id)
+        for name, residual in zip(residual_names(robot.wheel_topics), frame.residuals, strict=True)
+    )
+    return DiagnosticMessage(TOPIC, frame.stamp_ns, statuses)
+
+
+def _status(name: str, residual: Residual, hardware_id: str) -> Status:
+    return Status(
+        name,
+        _level(residual),
+        sentence(residual),
+        (
+            ("residual", f"{residual.residual:.6g}"),
+            ("band", f"{residual.band:.6g}"),
+            ("code", str(residual.code)),
+            ("modelled", f"{residual.modelled:.6g}"),
+        ),
+        hardware_id,
+    )
+
+
+def _level(residual: Residual) -> Level:
+    if residual.stale:
+        return Level.STALE
+    return Level.WARN if residual.code else Level.OK
+
+
+def sentence(residual: Residual) -> str:
+    """A residual in words."""
+    if residual.stale:
+        return residual.missing or "not known"
+    unit = residual.unit
+    if residual.code == 0:
+        return f"as modelled: {residual.residual:+.3g} {unit}, band {residual.band:.3g} {unit}"
+    side = "above" if residual.code > 0 else "below"
+    return (
+        f"{abs(residual.residual):.3g} {unit} {side} the modelled {residual.modelled:.3g} {unit}, "
+        f"band {residual.band:.3g} {unit}"
+    )
+
+
+def frame_of(message: Any, stamp_ns: int) -> ResidualFrame:
+    """The frame that a message carries; raises Unusable if it carries none."""
+    statuses = message.status
+    if len(statuses) != RESIDUALS:
+        raise Unusable(f"{len(statuses)} statuses, a frame has {RESIDUALS}")
+    return ResidualFrame(stamp_ns, tuple(_residual(status) for status in statuses))
+
+
+def _residual(status: Any) -> Residual:
+    values = {item.key: item.value for item in status.values}
+    try:
+        residual, band = float(values["residual"]), float(values["band"])
+        modelled = float(values["modelled"])
+    except (KeyError, ValueError) as error:
+        raise Unusable(f"{status.name}: no number for {error}") from None
+    if math.isnan(residual):
+        return Residual(residual, band, modelled, missing=str(status.message))
+    # The values are bare numbers, for plots; the sentence ends with the unit.
+    unit = UNITS.get(str(status.message).rpartition(" ")[2])
+    if unit is None:
+        raise Unusable(f"{status.name}: {status.message!r} does not end with a unit")
+    return Residual(residual, band, modelled, unit)

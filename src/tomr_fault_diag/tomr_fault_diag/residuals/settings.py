@@ -1,0 +1,72 @@
+"""Parameters of the residual stage, shared by the node and the offline tools."""
+
+from collections.abc import Mapping
+from typing import Self, cast
+
+from attrs import field, frozen
+
+from tomr_power_model.model.settings import TICK_PARAMETERS, tick_settings
+from tomr_power_model.model.ticks import TickSettings, to_ns
+from tomr_power_model.robot.parameters import ParameterSpec
+
+
+def _live(name: str, description: str, default: float, unit: str = "") -> ParameterSpec:
+    return ParameterSpec(name, description, "float", default, unit, 0.0, 1e3, read_only=False)
+
+
+RESIDUAL_PARAMETERS: tuple[ParameterSpec, ...] = (
+    *TICK_PARAMETERS,
+    ParameterSpec("encoder_window", "span of the fit to the encoders", "float", 0.07, "s", 0.01, 1),
+    _live("band.relative", "of the modelled power or current (Wang 2024, Eqs 19-20: 0.05)", 0.05),
+    _live("band.power", "least band of a motor's power", 1.0, "W"),
+    _live("band.current", "least band of a motor's current", 0.15, "A"),
+    _live("band.transient", "part of the model's change over the last ticks", 0.5),
+    _live("band.total_factor", "least band of the total, in those of a motor", 1.7),
+    _live("band.speed_relative", "of the expected wheel speed", 0.05),
+    _live("band.speed", "least band of a wheel speed", 0.5, "rad/s"),
+)
+
+
+@frozen
+class BandSettings:
+    """How far a residual may stray before it counts as one."""
+
+    relative: float = 0.05
+    power: float = 1.0  # W
+    current: float = 0.15  # A
+    transient: float = 0.5
+    total_factor: float = 1.7
+    speed_relative: float = 0.05
+    speed: float = 0.5  # rad/s
+
+    @classmethod
+    def of(cls, values: Mapping[str, object]) -> Self:
+        """Bands from checked parameters."""
+        start = "band."
+        return cls(
+            **{
+                name.removeprefix(start): cast(float, value)
+                for name, value in values.items()
+                if name.startswith(start)
+            }
+        )
+
+
+@frozen
+class ResidualSettings:
+    """Settings of the residual stage; times in nanoseconds."""
+
+    ticks: TickSettings = field(factory=TickSettings)
+    stale: int = to_ns(0.5)
+    encoder_window: int = to_ns(0.07)
+    bands: BandSettings = field(factory=BandSettings)
+
+    @classmethod
+    def of(cls, values: Mapping[str, object]) -> Self:
+        """Settings from checked parameters."""
+        return cls(
+            ticks=tick_settings(values),
+            stale=to_ns(cast(float, values["stale_after"])),
+            encoder_window=to_ns(cast(float, values["encoder_window"])),
+            bands=BandSettings.of(values),
+        )

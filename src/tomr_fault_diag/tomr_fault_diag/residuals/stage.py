@@ -1,0 +1,201 @@
+"""The residual stage: predictions and measurements in, ten residuals per tick out."""
+
+import math
+from collections import deque
+
+from attrs import evolve
+
+from tomr_fault_diag.residuals.frame import Residual, ResidualFrame, Unit, rounded
+from tomr_fault_diag.residuals.measured import Measured, SupplyWindow, modelled, modelled_sum
+from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
+from tomr_power_model.messages.readings import NAN, UNKNOWN_READING
+from tomr_power_model.model.encoders import UNKNOWN, EncoderSample, EncoderWindow, Triple
+from tomr_power_model.model.prediction import Prediction
+from tomr_power_model.model.ticks import Arrival, TickClock
+from tomr_power_model.robot import WHEELS, Robot
+
+PREDICTIONS = "predictions"
+ENCODERS = "joint_states"
+TOTAL_SUPPLY = "battery_state"
+
+# The model's change over so many ticks widens the band: where power jumps, a lag of a few
+# milliseconds between the streams is a large residual.
+_TRANSIENT_TICKS = 3
+
+_UNKNOWN_READINGS = (UNKNOWN_READING, UNKNOWN_READING, UNKNOWN_READING)
+
+
+def _no_prediction(stamp_ns: int) -> Prediction:
+    return Prediction(
+        stamp_ns, UNKNOWN, UNKNOWN, _UNKNOWN_READINGS, UNKNOWN_READING, _UNKNOWN_READINGS
+    )
+
+
+class ResidualStage:
+    """Streaming core of the residuals; driven by stamps, the same online and offline."""
+
+    def __init__(self, robot: Robot, settings: ResidualSettings | None = None) -> None:
+        self.settings = settings or ResidualSettings()
+        self._robot = robot
+        self._topics = robot.wheel_topics
+        ticks = self.settings.ticks
+        self._clock = TickClock(ticks, expected=(PREDICTIONS,))
+        signed = robot.measurement.signed
+        self._motors = [
+            SupplyWindow(ticks.period, self.settings.stale, signed) for _ in range(WHEELS)
+        ]
+        self._supply = SupplyWindow(ticks.period, self.settings.stale)
+        self._encoders = EncoderWindow(
+            self.settings.encoder_window, ticks.period, self.settings.stale
+        )
+        self._predictions: dict[int, Prediction] = {}
+        self._recent: deque[Prediction] = deque(maxlen=_TRANSIENT_TICKS)
+
+    def retune(self, bands: BandSettings) -> None:
+        """Change the bands while running."""
+        self.settings = evolve(self.settings, bands=bands)
+
+    def prediction(self, prediction: Prediction) -> Arrival:
+        """Take a prediction of the model stage."""
+        arrival = self._arrive(PREDICTIONS, prediction.stamp_ns)
+        if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
+            self._predictions[prediction.stamp_ns] = prediction
+        return arrival
+
+    def encoders(self, stamp_ns: int, position: Triple, velocity: Triple) -> Arrival:
+        """Take wheel angles [rad] and speeds [rad/s], NaN for what a message lacks."""
+        arrival = self._arrive(ENCODERS, stamp_ns)
+        if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
+            self._encoders.add(EncoderSample(stamp_ns, position, velocity))
+        return arrival
+
+    def motor(self, wheel: int, stamp_ns: int, voltage: float, current: float) -> Arrival:
+        """Take a motor's reading: voltage [V] or NaN, current [A] negative while drawing."""
+        arrival = self._arrive(self._topics[wheel], stamp_ns)
+        if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
+            self._motors[wheel].add(stamp_ns, voltage, current)
+        return arrival
+
+    def supply(self, stamp_ns: int, voltage: float, current: float) -> Arrival:
+        """Take the whole robot's reading."""
+        arrival = self._arrive(TOTAL_SUPPLY, stamp_ns)
+        if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
+            self._supply.add(stamp_ns, voltage, current)
+        return arrival
+
+    def due(self) -> list[ResidualFrame]:
+        """Residuals for the ticks that the stamps have reached, in order."""
+        return [self._frame(tick) for tick in self._clock.due()]
+
+    def _arrive(self, stream: str, stamp_ns: int) -> Arrival:
+        arrival = self._clock.arrive(stream, stamp_ns)
+        if arrival is Arrival.RESTARTED:
+            for window in (*self._motors, self._supply):
+                window.clear()
+            self._encoders.clear()
+            self._predictions.clear()
+            self._recent.clear()
+        return arrival
+
+    def _frame(self, tick: int) -> ResidualFrame:
+        for stamp in [stamp for stamp in self._predictions if stamp < tick]:
+            del self._predictions[stamp]
+        known = self._predictions.pop(tick, None)
+        prediction = known or _no_prediction(tick)
+        self._recent.append(prediction)
+        motors = [window.at(tick) for window in self._motors]
+        absent = "" if known else "no prediction: is the power_model node running?"
+        return ResidualFrame(
+            tick,
+            (
+                self._total(tick, motors, absent),
+                *(self._motor(wheel, motors[wheel], absent) for wheel in range(WHEELS)),
+                *self._speeds(tick, prediction, absent),
+                *(self._derived(wheel, motors[wheel], absent) for wheel in range(WHEELS)),
+            ),
+        )
+
+    def _total(self, tick: int, motors: list[Measured], absent: str) -> Residual:
+        source = self._robot.measurement.total
+        unit: Unit = "W"
+        if source == "sum":
+            units = {motor.unit for motor in motors}
+            unit = units.pop() if len(units) == 1 else "W"
+            value = math.fsum(motor.value for motor in motors) if not units else NAN
+            models = [modelled_sum(past.motors, unit) for past in self._recent]
+            missing = "no fresh power of every motor"
+        else:
+            value = self._supply.at(tick).value if source == "battery_state" else NAN
+            models = [past.total.power for past in self._recent]
+            missing = "no fresh battery_state"
+        least = self._least(unit) * self.settings.bands.total_factor
+        return self._residual(value, models, unit, least, missing, absent)
+
+    def _motor(self, wheel: int, measured: Measured, absent: str) -> Residual:
+        models = [modelled(past.motors[wheel], measured.unit) for past in self._recent]
+        missing = f"no fresh {self._topics[wheel]}/power"
+        least = self._least(measured.unit)
+        return self._residual(measured.value, models, measured.unit, least, missing, absent)
+
+    def _derived(self, wheel: int, measured: Measured, absent: str) -> Residual:
+        models = [modelled(past.from_encoders[wheel], measured.unit) for past in self._recent]
+        missing = f"no fresh {self._topics[wheel]}/power"
+        least = self._least(measured.unit)
+        return self._residual(
+            measured.value, models, measured.unit, least, missing, absent, "joint_states"
+        )
+
+    def _speeds(self, tick: int, prediction: Prediction, absent: str) -> list[Residual]:
+        measured = self._encoders.at(tick).speed
+        bands = self.settings.bands
+        speeds = []
+        for wheel in range(WHEELS):
+            models = [past.speed[wheel] for past in self._recent]
+            model, value = models[-1], float(measured[wheel])
+            # Against the set direction: "slower than told" is negative whichever way it turns.
+            sign = -1.0 if model < 0.0 else 1.0
+            spread = bands.transient * _spread(models)
+            band = max(bands.speed, bands.speed_relative * abs(model)) + spread
+            missing = _missing(value, model, "no fresh joint_states", absent)
+            speeds.append(
+                Residual(
+                    rounded(sign * (value - model)), rounded(band), rounded(model), "rad/s", missing
+                )
+            )
+        return speeds
+
+    def _least(self, unit: Unit) -> float:
+        bands = self.settings.bands
+        return bands.power if unit == "W" else bands.current
+
+    def _residual(
+        self,
+        value: float,
+        models: list[float],
+        unit: Unit,
+        least: float,
+        missing: str,
+        absent: str,
+        source: str = "cmd_vel",
+    ) -> Residual:
+        bands, model = self.settings.bands, models[-1]
+        band = max(least, bands.relative * abs(model)) + bands.transient * _spread(models)
+        reason = _missing(value, model, missing, absent, source)
+        return Residual(rounded(value - model), rounded(band), rounded(model), unit, reason)
+
+
+def _spread(models: list[float]) -> float:
+    """How far the model moved lately; 0 where it is not known."""
+    known = [model for model in models if not math.isnan(model)]
+    return max(known) - min(known) if known else 0.0
+
+
+def _missing(
+    value: float, model: float, measured: str, absent: str, source: str = "cmd_vel"
+) -> str:
+    """Why a residual is unknown, empty if it is known."""
+    if math.isnan(value):
+        return measured
+    if math.isnan(model):
+        return absent or f"no fresh {source} for the model"
+    return ""

@@ -1,0 +1,176 @@
+"""The model stage: driven by stamps, honest about what it does not know."""
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+from attrs import evolve
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.model.encoders import EncoderSample, EncoderWindow
+from tomr_power_model.model.prediction import Prediction
+from tomr_power_model.model.predictor import PowerPredictor
+from tomr_power_model.model.settings import ModelSettings
+from tomr_power_model.model.ticks import to_ns
+from tomr_power_model.robot import Robot, shipped_robot
+
+MS = 1_000_000
+BASE = 1_700_000_000_000 * MS
+NAN3 = (math.nan, math.nan, math.nan)
+Twist = tuple[float, float, float]
+Event = tuple[int, str]
+
+
+def _events(until_ms: int, commands: bool = True) -> list[Event]:
+    """Commands at 20 Hz, encoders at 100 Hz, in the order of their stamps [ms]."""
+    events = [(t, "encoders") for t in range(3, until_ms, 10)]
+    if commands:
+        events += [(t, "command") for t in range(0, until_ms, 50)]
+    return sorted(events)
+
+
+def _run(
+    events: Iterable[Event],
+    twist: Twist = (0.3, 0.0, 0.0),
+    robot: Robot | None = None,
+    settings: ModelSettings | None = None,
+    moving: bool = True,
+) -> list[Prediction]:
+    robot = robot or shipped_robot("reference")
+    predictor = PowerPredictor(robot, settings)
+    speed = twist_to_wheels(robot) @ twist
+    found: list[Prediction] = []
+    for at_ms, kind in events:
+        stamp = BASE + at_ms * MS
+        if kind == "command":
+            predictor.command(stamp, twist)
+        else:
+            first, second, third = (float(value) for value in speed * moving * at_ms * 1e-3)
+            predictor.encoders(stamp, (first, second, third), NAN3)
+        found.extend(predictor.due())
+    return found
+
+
+def test_both_paths_agree_once_the_robot_follows() -> None:
+    last = _run(_events(3000))[-1]
+    for commanded, measured in zip(last.motors, last.from_encoders, strict=True):
+        assert commanded.power == pytest.approx(measured.power, rel=1e-2)
+    assert last.motors[0].power == pytest.approx(1.2, rel=1e-3)  # idle wheel: standby only
+    parts = sum(reading.power for reading in last.motors)
+    assert last.total.power == pytest.approx(parts + 12.0, rel=1e-6)
+    assert last.total.current < 0.0
+
+
+@given(st.lists(st.integers(0, 18), min_size=80, max_size=80))
+def test_the_order_of_arrival_does_not_matter(delays_ms: list[int]) -> None:
+    """Messages arrive up to 18 ms late, commands and encoders past each other."""
+    events = _events(400)
+    late = sorted(
+        zip(events, delays_ms, strict=False),
+        key=lambda pair: (pair[0][0] + (pair[1] if pair[0][1] == "command" else 0), pair[0]),
+    )
+    assert _run(event for event, _ in late) == _run(events)
+
+
+def test_without_a_command_only_the_encoders_speak() -> None:
+    last = _run(_events(500, commands=False))[-1]
+    assert all(math.isnan(speed) for speed in last.speed)
+    assert all(math.isnan(reading.power) for reading in (*last.motors, last.total))
+    assert all(math.isfinite(reading.power) for reading in last.from_encoders)
+
+
+def test_without_encoders_only_the_commands_speak() -> None:
+    events = [(t, kind) for t, kind in _events(2000) if kind == "command" or t < 500]
+    last = _run(events)[-1]
+    assert all(math.isnan(reading.power) for reading in last.from_encoders)
+    assert all(math.isfinite(reading.power) for reading in last.motors)
+
+
+def test_the_delay_postpones_the_response() -> None:
+    robot = shipped_robot("reference")
+    delayed = evolve(robot, controller=evolve(robot.controller, delay=0.15))
+    prompt = {p.stamp_ns: p.speed[1] for p in _run(_events(1500), moving=False)}
+    late = {p.stamp_ns: p.speed[1] for p in _run(_events(1500), robot=delayed, moving=False)}
+    for stamp in range(BASE + 200 * MS, BASE + 1450 * MS, 50 * MS):
+        if late[stamp] > 0.0:
+            assert late[stamp] == pytest.approx(prompt[stamp - 150 * MS], abs=1e-6)
+    assert late[BASE + 150 * MS] == 0.0 < late[BASE + 250 * MS]
+
+
+def test_a_command_is_held_or_times_out() -> None:
+    events = [(t, kind) for t, kind in _events(3000) if kind == "encoders" or t < 500]
+    assert _run(events)[-1].speed[1] > 1.0
+    timed = ModelSettings(command_timeout=to_ns(0.5))
+    assert abs(_run(events, settings=timed)[-1].speed[1]) < 0.05
+
+
+def test_a_restart_in_mid_run_takes_up_the_motion() -> None:
+    """A predictor that wakes while the robot drives expects it to go on, not to start."""
+    whole = {p.stamp_ns: p for p in _run(_events(4000))}
+    woken = _run([(t, kind) for t, kind in _events(4000) if t >= 2990])
+    for prediction in woken[4:]:
+        before = whole[prediction.stamp_ns]
+        np.testing.assert_allclose(prediction.speed, before.speed, atol=0.05)
+        assert prediction.motors[1].power == pytest.approx(before.motors[1].power, abs=0.2)
+
+
+def test_a_clock_that_goes_back_starts_afresh() -> None:
+    robot = shipped_robot("reference")
+    predictor = PowerPredictor(robot)
+    for _ in range(2):  # a bag in a loop
+        found = []
+        for at_ms, kind in _events(2000):
+            stamp = BASE + at_ms * MS
+            if kind == "command":
+                predictor.command(stamp, (0.0, 0.0, 0.0))
+            else:
+                predictor.encoders(stamp, (0.0, 0.0, 0.0), NAN3)
+            found.extend(prediction.stamp_ns for prediction in predictor.due())
+        assert found[0] == BASE + 50 * MS
+        assert found[-1] == BASE + 1950 * MS
+
+
+class TestEncoderWindow:
+    """Speed and acceleration from quantised angles or from speeds."""
+
+    def _fit(self, samples: list[EncoderSample]) -> tuple[np.ndarray, np.ndarray]:
+        window = EncoderWindow(to_ns(0.07), to_ns(0.05), to_ns(0.5))
+        for sample in samples:
+            window.add(sample)
+        estimate = window.at(BASE + 100 * MS)
+        return estimate.speed, estimate.acceleration
+
+    @pytest.mark.parametrize("by", ["position", "velocity"])
+    def test_constant_acceleration_is_exact(self, by: str) -> None:
+        samples = []
+        for at_ms in range(3, 101, 10):
+            t = 1e-3 * at_ms
+            position = (2.0 * t + 20.0 * t * t, 0.0, -t)
+            velocity = (2.0 + 40.0 * t, 0.0, -1.0)
+            stamp = BASE + at_ms * MS
+            if by == "position":
+                samples.append(EncoderSample(stamp, position, NAN3))
+            else:
+                samples.append(EncoderSample(stamp, NAN3, velocity))
+        speed, acceleration = self._fit(samples)
+        np.testing.assert_allclose(speed, [2.0 + 40.0 * 0.075, 0.0, -1.0], atol=1e-9)
+        np.testing.assert_allclose(acceleration, [40.0, 0.0, 0.0], atol=1e-7)
+
+    def test_one_wheel_missing_leaves_the_others(self) -> None:
+        samples = [
+            EncoderSample(BASE + at * MS, (1e-3 * at, math.nan, 0.0), NAN3)
+            for at in range(3, 101, 10)
+        ]
+        speed, _ = self._fit(samples)
+        np.testing.assert_allclose(speed, [1.0, math.nan, 0.0], atol=1e-9)
+
+    def test_slow_encoders_use_what_there_is(self) -> None:
+        samples = [EncoderSample(BASE + at * MS, (1e-3 * at,) * 3, NAN3) for at in (0, 33, 66, 99)]
+        np.testing.assert_allclose(self._fit(samples)[0], 1.0, atol=1e-9)
+
+    def test_stale_samples_say_nothing(self) -> None:
+        samples = [EncoderSample(BASE - at * MS, (1.0,) * 3, NAN3) for at in (450, 440, 430)]
+        assert np.isnan(self._fit(samples)[0]).all()

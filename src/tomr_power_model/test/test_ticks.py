@@ -1,0 +1,97 @@
+"""The grid of decisions: what it waits for, what it refuses, when it starts afresh."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tomr_power_model.model.ticks import Arrival, TickClock, TickSettings, to_ns
+
+MS = 1_000_000
+BASE = 1_700_000_000_000 * MS
+SETTINGS = TickSettings()
+
+
+def _clock(*stamps_ms: int) -> TickClock:
+    clock = TickClock(SETTINGS)
+    for stamp in stamps_ms:
+        assert clock.arrive("a", BASE + stamp * MS) is Arrival.TAKEN
+    return clock
+
+
+def _ms(clock: TickClock) -> list[int]:
+    return [(tick - BASE) // MS for tick in clock.due()]
+
+
+def test_ticks_lie_on_the_grid_and_settle() -> None:
+    clock = _clock(10, 60)
+    assert _ms(clock) == []  # 50 ms is reached, but 20 ms for late messages have not passed
+    clock.arrive("a", BASE + 75 * MS)
+    assert _ms(clock) == [50]
+
+
+def test_a_live_stream_is_waited_for() -> None:
+    clock = _clock(10)
+    clock.arrive("b", BASE + 20 * MS)
+    clock.arrive("a", BASE + 130 * MS)
+    assert _ms(clock) == []
+    clock.arrive("b", BASE + 101 * MS)
+    assert _ms(clock) == [50, 100]
+
+
+def test_a_silent_stream_is_not_waited_for() -> None:
+    clock = _clock(10)
+    clock.arrive("b", BASE + 20 * MS)
+    clock.arrive("a", BASE + 290 * MS)
+    assert _ms(clock) == [50, 100, 150, 200, 250]
+
+
+def test_an_expected_stream_is_waited_for_before_its_first_message() -> None:
+    clock = TickClock(SETTINGS, expected=("b",))
+    clock.arrive("a", BASE + 10 * MS)
+    clock.arrive("a", BASE + 290 * MS)
+    assert _ms(clock) == []
+    clock.arrive("b", BASE + 100 * MS)
+    assert _ms(clock) == [50, 100]
+    clock.arrive("a", BASE + 410 * MS)
+    assert _ms(clock) == [150]
+
+
+def test_sparse_streams_are_not_waited_for() -> None:
+    clock = _clock(10)
+    clock.arrive("commands", BASE + 20 * MS, periodic=False)
+    clock.arrive("a", BASE + 80 * MS)
+    assert _ms(clock) == [50]
+
+
+def test_refused_stamps() -> None:
+    clock = _clock(10, 60)
+    assert clock.arrive("a", 0) is Arrival.UNSTAMPED
+    assert clock.arrive("a", -5) is Arrival.UNSTAMPED
+    assert clock.arrive("a", BASE + 60 * MS) is Arrival.REPEATED
+    assert clock.arrive("a", BASE + 40 * MS) is Arrival.REPEATED
+    assert clock.arrive("b", BASE + 40 * MS) is Arrival.TAKEN
+
+
+def test_jumps_start_afresh_either_way() -> None:
+    clock = _clock(10, 60)
+    assert clock.arrive("a", BASE + 5_000 * MS) is Arrival.RESTARTED
+    clock.arrive("a", BASE + 5_080 * MS)
+    assert _ms(clock) == [5_050]
+    assert clock.arrive("a", BASE + 10 * MS) is Arrival.RESTARTED
+    clock.arrive("a", BASE + 90 * MS)
+    assert _ms(clock) == [50]
+
+
+@given(st.permutations(range(24)))
+def test_the_ticks_do_not_depend_on_the_order_across_streams(order: list[int]) -> None:
+    """Three streams of eight samples, interleaved at will: the same ticks in the same order."""
+    taken = dict.fromkeys("abc", 0)
+    clock = TickClock(TickSettings(patience=to_ns(10.0)))
+    for stream in "abc":  # all are live from the start
+        clock.arrive(stream, BASE + 1 * MS)
+    ticks: list[int] = []
+    for number in order:
+        stream = "abc"[number % 3]
+        taken[stream] += 1
+        clock.arrive(stream, BASE + taken[stream] * 20 * MS)
+        ticks.extend(_ms(clock))
+    assert ticks == [50, 100]

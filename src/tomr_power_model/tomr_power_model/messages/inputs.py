@@ -1,0 +1,114 @@
+"""Which topics a stage reads and what it does with each message; nodes and tools share this."""
+
+from collections.abc import Callable
+from typing import Any
+
+from attrs import frozen
+
+from tomr_power_model.messages.intake import (
+    Triple,
+    Unusable,
+    WheelFinder,
+    stamp_of,
+    twist_of,
+    yaw_rate_of,
+)
+from tomr_power_model.model.predictor import PowerPredictor
+from tomr_power_model.model.ticks import Arrival
+from tomr_power_model.robot import Robot
+
+TWIST_STAMPED = "geometry_msgs/msg/TwistStamped"
+TWIST = "geometry_msgs/msg/Twist"
+JOINT_STATE = "sensor_msgs/msg/JointState"
+BATTERY = "sensor_msgs/msg/BatteryState"
+IMU = "sensor_msgs/msg/Imu"
+MULTI_ARRAY = "std_msgs/msg/Float64MultiArray"
+DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+
+
+@frozen
+class Input:
+    """One topic of a stage. `take` gets a message and its receive time [ns] and returns a
+    complaint in words, or None if all is well."""
+
+    topic: str
+    type_name: str
+    take: Callable[[Any, int], str | None]
+    other_types: tuple[str, ...] = ()
+
+
+def guarded(
+    take: Callable[[Any, int], Arrival | str | None],
+) -> Callable[[Any, int], str | None]:
+    """Turn an unusable message or stamp into a complaint: no message may stop a stage."""
+
+    def taken(message: Any, receive_ns: int) -> str | None:
+        try:
+            arrival = take(message, receive_ns)
+        except Unusable as error:
+            return f"{error}; the message is ignored"
+        except (AttributeError, IndexError, TypeError, OverflowError) as error:
+            return f"malformed ({error}); the message is ignored"
+        return complaint(arrival)
+
+    return taken
+
+
+def complaint(arrival: Arrival | str | None) -> str | None:
+    """What to say of a stamp, None if nothing."""
+    if arrival is None or arrival is Arrival.TAKEN:
+        return None
+    if isinstance(arrival, str):
+        return arrival
+    if arrival is Arrival.RESTARTED:
+        return "the stamp jumps against the other topics: started afresh"
+    return f"the stamp {arrival.value}; the message is ignored"
+
+
+def model_inputs(robot: Robot, predictor: PowerPredictor, twist_type: str) -> tuple[Input, ...]:
+    """Inputs of the model stage."""
+
+    def command(message: Any, receive_ns: int) -> Arrival:
+        return predictor.command(stamp_of(message, receive_ns, fallback=True), twist_of(message))
+
+    def imu(message: Any, receive_ns: int) -> Arrival:
+        return predictor.imu(stamp_of(message, receive_ns), yaw_rate_of(message))
+
+    inputs = [
+        Input("cmd_vel", twist_type, guarded(command), (TWIST, TWIST_STAMPED)),
+        Input("joint_states", JOINT_STATE, guarded(encoder_taker(robot, predictor.encoders))),
+    ]
+    if predictor.settings.use_imu:
+        inputs.append(Input("imu/data", IMU, guarded(imu)))
+    return tuple(inputs)
+
+
+def encoder_taker(
+    robot: Robot, take: Callable[[int, Triple, Triple], Arrival]
+) -> Callable[[Any, int], Arrival | str]:
+    """Reads the wheels out of joint_states for a stage's `encoders`; tells of missing wheels."""
+    wheels = WheelFinder(robot.wheel_names)
+
+    def encoders(message: Any, receive_ns: int) -> Arrival | str:
+        found = wheels.read(message)
+        arrival = take(stamp_of(message, receive_ns), found.position, found.velocity)
+        if arrival is Arrival.TAKEN and wheels.missing():
+            return f"no {', '.join(wheels.missing())} among its names"
+        return arrival
+
+    return encoders
+
+
+class Complaints:
+    """Counts complaints and says which are worth a line: the 1st, 10th, 100th, ... of a kind."""
+
+    def __init__(self) -> None:
+        self.counts: dict[tuple[str, str], int] = {}
+
+    def note(self, topic: str, problem: str) -> str | None:
+        """Count a complaint; returns the line to print, if it is time for one."""
+        key = (topic, problem)
+        count = self.counts[key] = self.counts.get(key, 0) + 1
+        if str(count).rstrip("0") != "1":
+            return None
+        return f"{topic}: {problem}" + (f" ({count} times)" if count > 1 else "")

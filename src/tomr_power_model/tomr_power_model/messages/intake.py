@@ -1,0 +1,122 @@
+"""What the suite reads out of a message, alike for rclpy's and for rosbags' message objects.
+
+Every function returns plain numbers or raises `Unusable` with the reason: a node warns and goes on.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from attrs import frozen
+
+from tomr_power_model.recordings.reader import header_stamp_ns
+
+Triple = tuple[float, float, float]
+NAN = float("nan")
+
+
+class Unusable(ValueError):
+    """A message that says nothing usable, and why."""
+
+
+def stamp_of(message: Any, receive_ns: int, fallback: bool = False) -> int:
+    """Stamp of a message [ns]; the receive time for types without one.
+
+    `fallback`: the receive time also where the stamp was left zero, as commands often are.
+    """
+    stamp = header_stamp_ns(message)
+    if stamp is None or (fallback and stamp == 0):
+        return receive_ns
+    return stamp
+
+
+def twist_of(message: Any) -> Triple:
+    """v_x, v_y [m/s], omega_z [rad/s] of a Twist or TwistStamped."""
+    twist = getattr(message, "twist", message)
+    values = (float(twist.linear.x), float(twist.linear.y), float(twist.angular.z))
+    if not all(math.isfinite(value) for value in values):
+        raise Unusable("the twist is not finite")
+    return values
+
+
+def yaw_rate_of(message: Any) -> float:
+    """Yaw rate of an Imu [rad/s]."""
+    rate = float(message.angular_velocity.z)
+    if not math.isfinite(rate):
+        raise Unusable("the yaw rate is not finite")
+    return rate
+
+
+@frozen
+class Wheels:
+    """Angle, speed and effort of the wheels in one JointState, NaN for what is missing."""
+
+    position: Triple
+    velocity: Triple
+    effort: Triple
+
+
+class WheelFinder:
+    """Reads the wheels of a JointState by name; other joints may be there, in any order."""
+
+    def __init__(self, wheel_names: tuple[str, str, str]) -> None:
+        self._wheels = wheel_names
+        self._names: Sequence[str] = ()
+        self._places: tuple[int | None, ...] = ()
+
+    def read(self, message: Any) -> Wheels:
+        """Wheels of a message; raises Unusable if none is there or the lengths disagree."""
+        names = message.name
+        if names != self._names:
+            self._find(list(names))
+        if not any(place is not None for place in self._places):
+            found = ", ".join(names) or "no joint"
+            raise Unusable(f"none of {', '.join(self._wheels)} is there, but {found}")
+        count = len(names)
+        return Wheels(
+            self._pick(message.position, count, "position"),
+            self._pick(message.velocity, count, "velocity"),
+            self._pick(message.effort, count, "effort"),
+        )
+
+    def missing(self) -> tuple[str, ...]:
+        """Wheels that the last message did not have."""
+        pairs = zip(self._wheels, self._places, strict=False)
+        return tuple(name for name, place in pairs if place is None)
+
+    def _find(self, names: list[str]) -> None:
+        self._names = names
+        self._places = tuple(
+            names.index(wheel) if wheel in names else None for wheel in self._wheels
+        )
+
+    def _pick(self, values: Sequence[float], count: int, field: str) -> Triple:
+        if len(values) == 0:
+            return NAN, NAN, NAN
+        if len(values) != count:
+            raise Unusable(f"{count} names but {len(values)} values in {field}")
+        first, second, third = (
+            NAN if place is None else _finite(values[place]) for place in self._places
+        )
+        return first, second, third
+
+
+def _finite(value: float) -> float:
+    number = float(value)
+    return number if math.isfinite(number) else NAN
+
+
+def battery_of(message: Any) -> tuple[float, float]:
+    """Voltage [V], NaN if unknown, and current [A], negative while drawing."""
+    voltage, current = float(message.voltage), float(message.current)
+    if not math.isfinite(current):
+        raise Unusable("the current is not finite")
+    return (voltage if math.isfinite(voltage) else NAN), current
+
+
+def numbers_of(message: Any, least: int) -> tuple[float, ...]:
+    """Numbers of a Float64MultiArray, at least so many."""
+    values = tuple(_finite(value) for value in message.data)
+    if len(values) < least:
+        raise Unusable(f"{len(values)} values, needs {least}")
+    return values

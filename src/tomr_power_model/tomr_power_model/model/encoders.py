@@ -1,0 +1,105 @@
+"""Speed and acceleration of the wheels from encoder samples of the last moments."""
+
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Triple = tuple[float, float, float]
+UNKNOWN: Triple = (float("nan"), float("nan"), float("nan"))
+
+
+@frozen
+class EncoderSample:
+    """One message: angle [rad] and speed [rad/s] of each wheel, NaN where it says nothing."""
+
+    stamp_ns: int
+    position: Triple
+    velocity: Triple
+
+
+@frozen
+class WheelEstimate:
+    """Motion of the wheels in a window, at its middle; shape (3,), NaN where unknown."""
+
+    speed: Array  # rad/s
+    acceleration: Array  # rad/s^2
+
+
+class EncoderWindow:
+    """Keeps the samples of the last moments and fits a motion of constant acceleration to them.
+
+    Least squares over the samples in (t - span, t]: positions by p + v s + a s^2 / 2, or, where a
+    robot gives no positions, velocities by v + a s; evaluated at t - period / 2.
+    """
+
+    def __init__(self, span_ns: int, period_ns: int, stale_ns: int) -> None:
+        self._span = span_ns
+        self._period = period_ns
+        self._stale = stale_ns
+        self._samples: deque[EncoderSample] = deque()
+
+    def clear(self) -> None:
+        """Forget all samples."""
+        self._samples.clear()
+
+    def add(self, sample: EncoderSample) -> None:
+        """Take a sample newer than those before."""
+        self._samples.append(sample)
+
+    def at(self, tick_ns: int) -> WheelEstimate:
+        """Estimate for the window that ends at a tick; NaN if its samples are missing or stale."""
+        samples = self._until(tick_ns)
+        if len(samples) < 2:
+            return WheelEstimate(np.full(3, np.nan), np.full(3, np.nan))
+        middle = tick_ns - self._period // 2
+        seconds = np.array([1e-9 * (sample.stamp_ns - middle) for sample in samples])
+        positions = np.array([sample.position for sample in samples])
+        if len(samples) > 2 and not np.isnan(positions).any():
+            return _from_positions(seconds, positions)
+        return self._mixed(samples, seconds, positions)
+
+    def _until(self, tick_ns: int) -> list[EncoderSample]:
+        """Samples of the window, and the two newest where encoders are slower than it."""
+        oldest = tick_ns - self._span
+        while len(self._samples) > 2 and self._samples[1].stamp_ns <= tick_ns - self._stale:
+            self._samples.popleft()
+        known = [sample for sample in self._samples if sample.stamp_ns <= tick_ns]
+        if not known or known[-1].stamp_ns <= tick_ns - self._stale:
+            return []
+        window = [sample for sample in known if sample.stamp_ns > oldest]
+        return window if len(window) > 2 else known[-3:]
+
+    @staticmethod
+    def _mixed(samples: Sequence[EncoderSample], seconds: Array, positions: Array) -> WheelEstimate:
+        """Wheel by wheel, from what each one has."""
+        velocities = np.array([sample.velocity for sample in samples])
+        speed, acceleration = np.full(3, np.nan), np.full(3, np.nan)
+        for wheel in range(3):
+            seen = ~np.isnan(positions[:, wheel])
+            timed = ~np.isnan(velocities[:, wheel])
+            if np.count_nonzero(seen) > 2:
+                fit = _from_positions(seconds[seen], positions[seen][:, [wheel]])
+                speed[wheel], acceleration[wheel] = fit.speed[0], fit.acceleration[0]
+            elif np.count_nonzero(timed) > 1:
+                line = _fit(seconds[timed], velocities[timed][:, [wheel]], 1)
+                speed[wheel], acceleration[wheel] = line[0, 0], line[1, 0]
+        return WheelEstimate(speed, acceleration)
+
+
+def _from_positions(seconds: Array, positions: Array) -> WheelEstimate:
+    shape = _fit(seconds, positions - positions[0], 2)
+    return WheelEstimate(shape[1], 2.0 * shape[2])
+
+
+def _fit(seconds: Array, values: Array, degree: int) -> Array:
+    """Coefficients of the least-squares polynomial, lowest power first, (degree + 1, n)."""
+    # Times in units of the window keep the normal equations well conditioned.
+    unit = np.abs(seconds).max()
+    exponents = np.arange(degree + 1)
+    powers = (seconds[:, None] / unit) ** exponents
+    scaled = np.linalg.solve(powers.T @ powers, powers.T @ values)
+    return np.asarray(scaled / unit ** exponents[:, None])

@@ -1,0 +1,95 @@
+"""When to decide: a grid of data stamps, reached when all live streams have passed it.
+
+A stage's answer for the tick t_k uses messages with stamps up to t_k and nothing else, so it does
+not depend on the order in which topics happen to arrive. It is given as soon as
+
+- every live periodic stream has a stamp at or past t_k, and some stream is `settle` past it,
+  which leaves sparse streams (commands) that long to arrive; or
+- some stream is `patience` past it: a stream that silent is not live and not waited for.
+"""
+
+import math
+from collections.abc import Collection, Iterator
+from enum import Enum
+
+from attrs import frozen
+
+NANOSECONDS = 1_000_000_000
+
+
+def to_ns(seconds: float) -> int:
+    """Seconds as whole nanoseconds."""
+    return round(seconds * NANOSECONDS)
+
+
+@frozen
+class TickSettings:
+    """Timing of a stage, in nanoseconds of data time."""
+
+    period: int = to_ns(0.05)
+    settle: int = to_ns(0.02)
+    patience: int = to_ns(0.25)
+    gap: int = to_ns(1.0)  # a longer silence or a jump starts the stage afresh
+
+
+class Arrival(Enum):
+    """What became of a message's stamp."""
+
+    TAKEN = "taken"
+    UNSTAMPED = "has no stamp"
+    REPEATED = "repeats or precedes an earlier stamp"
+    RESTARTED = "jumps"
+
+
+class TickClock:
+    """Follows the stamps of several streams and says which ticks are due."""
+
+    def __init__(self, settings: TickSettings, expected: Collection[str] = ()) -> None:
+        """`expected` streams are waited for up to `patience` even before their first message."""
+        self.settings = settings
+        self._expected = expected
+        self._newest: dict[str, int] = {}
+        self._periodic: set[str] = set()
+        self._watermark = 0
+        self._next = 0  # stamp of the next tick, 0: not started
+
+    def arrive(self, stream: str, stamp_ns: int, periodic: bool = True) -> Arrival:
+        """Take note of a message. After RESTARTED the caller forgets what it has gathered."""
+        if stamp_ns <= 0:
+            return Arrival.UNSTAMPED
+        if self._next and abs(stamp_ns - self._watermark) > self.settings.gap:
+            self._start(stream, stamp_ns, periodic)
+            return Arrival.RESTARTED
+        if stamp_ns <= self._newest.get(stream, 0):
+            return Arrival.REPEATED
+        if not self._next:
+            self._start(stream, stamp_ns, periodic)
+            return Arrival.TAKEN
+        self._newest[stream] = stamp_ns
+        if periodic:
+            self._periodic.add(stream)
+        self._watermark = max(self._watermark, stamp_ns)
+        return Arrival.TAKEN
+
+    def _start(self, stream: str, stamp_ns: int, periodic: bool) -> None:
+        self._newest = {stream: stamp_ns}
+        self._periodic = {stream} if periodic else set()
+        self._watermark = stamp_ns
+        period = self.settings.period
+        self._next = (stamp_ns // period + 1) * period
+
+    def due(self) -> Iterator[int]:
+        """Stamps of the ticks that can be decided now, in order."""
+        while self._next and self._watermark >= self._next + self.settings.settle:
+            tick = self._next
+            if self._slowest_live() < tick and self._watermark < tick + self.settings.patience:
+                return
+            self._next = tick + self.settings.period
+            yield tick
+
+    def _slowest_live(self) -> float:
+        """The newest stamp of the live periodic stream that lags most."""
+        oldest_live = self._watermark - self.settings.patience
+        live = [self._newest[name] for name in self._periodic if self._newest[name] >= oldest_live]
+        awaited = [self._newest.get(name, 0) for name in self._expected]
+        return min((*live, *awaited), default=math.inf)

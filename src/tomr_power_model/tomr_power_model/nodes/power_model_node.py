@@ -1,0 +1,40 @@
+"""Node `power_model`: the predicted power of each motor."""
+
+from tomr_power_model.messages.inputs import model_inputs
+from tomr_power_model.messages.outgoing import JointMessage, SupplyMessage
+from tomr_power_model.messages.predictions import (
+    EXPECTED,
+    prediction_messages,
+    prediction_topics,
+)
+from tomr_power_model.model.predictor import PowerPredictor
+from tomr_power_model.model.settings import MODEL_PARAMETERS, ModelSettings
+from tomr_power_model.nodes.command_line import node_arguments
+from tomr_power_model.nodes.stage_node import CMD_VEL_TYPE, TWIST_TYPES, StageNode, run_node
+
+PARAMETERS = (*MODEL_PARAMETERS, CMD_VEL_TYPE)
+
+
+class PowerModelNode(StageNode):
+    """Publishes expected wheel motion and power at the decision rate, stamped by the data."""
+
+    def __init__(self) -> None:
+        super().__init__("power_model", PARAMETERS)
+        self._robot = self.robot_described()
+        self._predictor = PowerPredictor(self._robot, ModelSettings.of(self.values))
+        for topic in prediction_topics(self._robot):
+            self.offer(topic, JointMessage if topic == EXPECTED else SupplyMessage)
+        twist_type = TWIST_TYPES[str(self.values["cmd_vel_type"])]
+        self.listen(model_inputs(self._robot, self._predictor, twist_type), self._advance)
+
+    def _advance(self) -> None:
+        for prediction in self._predictor.due():
+            for message in prediction_messages(self._robot, prediction):
+                self.send(message)
+
+
+def main() -> int:
+    """Entry point of `power_model`."""
+    description = "Predict the power of each motor from cmd_vel and joint_states."
+    given = node_arguments("power_model", description, PARAMETERS)
+    return run_node(PowerModelNode, given)

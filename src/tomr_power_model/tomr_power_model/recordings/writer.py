@@ -1,0 +1,92 @@
+"""Writing a rosbag2 recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import Literal, Self
+
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+
+from tomr_power_model.errors import InputError
+from tomr_power_model.messages.bag import jazzy_typestore
+from tomr_power_model.recordings.topics import absolute_topic
+
+ROSBAG2_VERSION: Literal[9] = 9  # what Jazzy writes
+STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
+
+
+class RecordingWriter:
+    """A new rosbag2 folder, as a context manager.
+
+    mcap chunks are compressed with zstd. When the body of the `with` statement fails or is
+    interrupted, what was written so far is kept as a readable recording whose metadata carries
+    the entry `incomplete`.
+    """
+
+    def __init__(self, path: Path | str, storage: str = "mcap") -> None:
+        """Prepare a recording at `path`, a folder that must not exist yet.
+
+        Raises:
+            InputError: the path exists, or the storage is unknown.
+        """
+        self.path = Path(path)
+        if storage not in STORAGES:
+            raise InputError(f"storage {storage!r} is unknown; choose mcap or sqlite3")
+        if self.path.exists():
+            raise InputError(
+                f"{self.path} exists already and is not overwritten; "
+                "remove it or choose another name"
+            )
+        self._store = jazzy_typestore()
+        self._connections: dict[tuple[str, str], Connection] = {}
+        self._writer = Writer(self.path, version=ROSBAG2_VERSION, storage_plugin=STORAGES[storage])
+        if storage == "mcap":
+            self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+
+    def write(self, topic: str, type_name: str, message: object, stamp_ns: int) -> None:
+        """Append a message of the Jazzy type `type_name`, received at `stamp_ns` [ns]."""
+        self.write_raw(topic, type_name, self._store.serialize_cdr(message, type_name), stamp_ns)
+
+    def write_raw(
+        self, topic: str, type_name: str, data: bytes | memoryview, stamp_ns: int
+    ) -> None:
+        """Append a message already serialised as CDR, received at `stamp_ns` [ns]."""
+        if not 0 <= stamp_ns < 2**63:
+            raise InputError(
+                f"{self.path}: a message on {topic} has the stamp {stamp_ns} ns, "
+                "which a recording cannot hold; stamps are nanoseconds from 0 to 2^63"
+            )
+        connection = self._connections.get((topic, type_name))
+        if connection is None:
+            connection = self._connect(topic, type_name)
+        self._writer.write(connection, stamp_ns, data)
+
+    def __enter__(self) -> Self:
+        try:
+            self._writer.open()
+        except OSError as error:
+            raise InputError(
+                f"{self.path} cannot be created: {error.strerror}; choose another folder"
+            ) from error
+        return self
+
+    def __exit__(
+        self,
+        error_type: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if error_type is not None:
+            self._writer.set_custom_data("incomplete", error_type.__name__)
+        self._writer.close()
+
+    def _connect(self, topic: str, type_name: str) -> Connection:
+        name = absolute_topic(topic)
+        connection = self._connections.get((name, type_name))
+        if connection is None:
+            connection = self._writer.add_connection(name, type_name, typestore=self._store)
+        self._connections[name, type_name] = connection
+        self._connections[topic, type_name] = connection
+        return connection

@@ -1,0 +1,279 @@
+"""The robot as its owner describes it: frozen records made from flat dotted parameters."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import cast
+
+from attrs import frozen
+
+from tomr_power_model.errors import InputError
+from tomr_power_model.robot.parameters import ParameterSpec, Value, check_all
+from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
+from tomr_power_model.robot.vocabulary import EFFECTS
+
+WHEELS = 3
+GRAVITY = 9.80665  # m/s^2
+
+Parameters = Mapping[str, float]
+PerWheel = tuple[Parameters | None, Parameters | None, Parameters | None]
+
+
+@frozen
+class Motor:
+    """DC motor and ideal gear: v = R i + k_e omega_shaft [V], torque_wheel = k_e G i [N m]."""
+
+    resistance: float  # ohm at 25 C
+    torque_constant: float  # N m/A = V s/rad at the shaft
+    gear_ratio: float  # motor turns per wheel turn
+    rotor_inertia: float  # kg m^2
+
+    @property
+    def wheel_constant(self) -> float:
+        """Torque at the wheel per ampere, and back-EMF per wheel speed [N m/A = V s/rad]."""
+        return self.torque_constant * self.gear_ratio
+
+
+@frozen
+class Controller:
+    """Wheel speed loop of the drivers."""
+
+    rate: float  # Hz
+    proportional: float  # V s/rad
+    integral: float  # V/rad
+    acceleration_limit: float  # m/s^2, 0: none
+    delay: float  # s
+
+
+@frozen
+class Supply:
+    """Battery and what else it feeds."""
+
+    nominal_voltage: float  # V
+    auxiliary_power: float  # W
+
+
+@frozen
+class Sensors:
+    """Rates, quanta and noise of the sensors; a simulator makes them, a band knows them."""
+
+    encoder_rate: float  # Hz
+    encoder_resolution: float  # rad at the wheel
+    velocity_resolution: float  # rad/s at the wheel
+    power_rate: float  # Hz
+    voltage_resolution: float  # V
+    current_resolution: float  # A
+    voltage_noise: float  # V
+    current_noise: float  # A
+    imu_rate: float  # Hz
+    gyro_noise: float  # rad/s
+    accelerometer_noise: float  # m/s^2
+    odometry_rate: float  # Hz
+
+
+@frozen
+class Measurement:
+    """How this robot publishes its power."""
+
+    source: str
+    quantity: str
+    signed: bool
+    total: str
+
+
+@frozen
+class Robot:
+    """All that is known of a robot before it moves. Units as in robot.yaml (SI)."""
+
+    wheel_names: tuple[str, str, str]
+    wheel_offset: float
+    robot_radius: float
+    wheel_radius: float
+    wheel_inertia: float
+    mass: float
+    inertia_z: float
+    mass_center: tuple[float, float, float]
+    motors: tuple[Motor, Motor, Motor]
+    controller: Controller
+    supply: Supply
+    sensors: Sensors
+    measurement: Measurement
+    physics: Mapping[str, PerWheel]
+
+    @property
+    def wheel_topics(self) -> tuple[str, str, str]:
+        """Topic prefix of each wheel: its joint name without `_joint`."""
+        first, second, third = (name.removesuffix("_joint") for name in self.wheel_names)
+        return first, second, third
+
+    def effect(self, effect_id: str, wheel: int = 0) -> Parameters | None:
+        """Parameters of an effect at a wheel, None where it is left out."""
+        per_wheel = self.physics.get(effect_id)
+        return None if per_wheel is None else per_wheel[wheel]
+
+    def everywhere(self, effect_id: str, key: str, absent: float = 0.0) -> tuple[float, ...]:
+        """One parameter of an effect at the three wheels, `absent` where it is left out."""
+        settings = (self.effect(effect_id, wheel) for wheel in range(WHEELS))
+        return tuple(absent if setting is None else setting[key] for setting in settings)
+
+
+def robot_from_parameters(values: Mapping[str, object], place: str) -> Robot:
+    """Make a Robot from flat dotted parameters, e.g. {"robot.mass": 15.0, ...}.
+
+    `place` names the file or node in errors. Raises InputError for anything missing, unknown,
+    non-finite or out of range.
+    """
+    checked = check_all(ROBOT_PARAMETERS, values, place)
+    names = cast(tuple[str, str, str], checked["robot.wheel_names"])
+    if len(set(names)) != WHEELS or not all(names):
+        raise InputError(f"{place}: robot.wheel_names = {list(names)}: give three different names")
+    _reject_unknown(values, names, place)
+    number = _Group(checked)
+    return Robot(
+        wheel_names=names,
+        wheel_offset=number("robot.wheel_offset"),
+        robot_radius=number("robot.robot_radius"),
+        wheel_radius=number("robot.wheel_radius"),
+        wheel_inertia=number("robot.wheel_inertia"),
+        mass=number("robot.mass"),
+        inertia_z=number("robot.inertia_z"),
+        mass_center=cast(tuple[float, float, float], checked["robot.mass_center"]),
+        motors=_motors(checked, values, names, place),
+        controller=Controller(**number.group("controller")),
+        supply=Supply(**number.group("supply")),
+        sensors=Sensors(**number.group("sensors")),
+        measurement=Measurement(
+            source=str(checked["measurement.source"]),
+            quantity=str(checked["measurement.quantity"]),
+            signed=bool(checked["measurement.signed"]),
+            total=str(checked["measurement.total"]),
+        ),
+        physics=MappingProxyType(_physics(values, names, place)),
+    )
+
+
+class _Group:
+    """Reads numbers out of the checked table."""
+
+    def __init__(self, checked: Mapping[str, Value]) -> None:
+        self._checked = checked
+
+    def __call__(self, name: str) -> float:
+        return cast(float, self._checked[name])
+
+    def group(self, prefix: str) -> dict[str, float]:
+        start = prefix + "."
+        return {
+            name.removeprefix(start): cast(float, value)
+            for name, value in self._checked.items()
+            if name.startswith(start)
+        }
+
+
+def _motors(
+    checked: Mapping[str, Value], values: Mapping[str, object], names: tuple[str, ...], place: str
+) -> tuple[Motor, Motor, Motor]:
+    motors = []
+    for name in names:
+        numbers: dict[str, float] = {}
+        for spec in MOTOR_PARAMETERS:
+            key = spec.name.removeprefix("motor.")
+            override = f"motor.{name}.{key}"
+            raw = checked[spec.name]
+            if override in values:
+                raw = spec.check(values[override], f"{place}: {override}")
+            numbers[key] = cast(float, raw)
+        motors.append(Motor(**numbers))
+    return motors[0], motors[1], motors[2]
+
+
+def _split_physics(key: str, names: tuple[str, ...]) -> tuple[str, str | None, str] | None:
+    """Split physics.<effect>[.<wheel>].<parameter> into its parts, None if it is no such key."""
+    for effect_id in EFFECTS:
+        prefix = f"physics.{effect_id}."
+        if key.startswith(prefix):
+            rest = key.removeprefix(prefix)
+            for name in names:
+                if rest.startswith(name + "."):
+                    return effect_id, name, rest.removeprefix(name + ".")
+            return effect_id, None, rest
+    return None
+
+
+def _physics(
+    values: Mapping[str, object], names: tuple[str, ...], place: str
+) -> dict[str, PerWheel]:
+    shared: dict[str, dict[str, float]] = {}
+    own: dict[str, dict[str, dict[str, float]]] = {}
+    for key, value in values.items():
+        parts = _split_physics(key, names)
+        if parts is None:
+            continue
+        effect_id, name, parameter = parts
+        number = _effect_parameter(effect_id, parameter, key, value, place)
+        if name is None:
+            shared.setdefault(effect_id, {})[parameter] = number
+        else:
+            own.setdefault(effect_id, {}).setdefault(name, {})[parameter] = number
+    physics: dict[str, PerWheel] = {}
+    for effect_id in EFFECTS:
+        if effect_id not in shared and effect_id not in own:
+            continue
+        wheels = [
+            _complete(effect_id, shared.get(effect_id), own.get(effect_id, {}).get(name), place)
+            for name in names
+        ]
+        physics[effect_id] = (wheels[0], wheels[1], wheels[2])
+    return physics
+
+
+def _effect_parameter(effect_id: str, parameter: str, key: str, value: object, place: str) -> float:
+    known = EFFECTS[effect_id].parameters
+    if parameter not in known:
+        raise InputError(f"{place}: {key} is unknown: {effect_id} takes {', '.join(known)}")
+    described = known[parameter]
+    spec = ParameterSpec(
+        key,
+        effect_id,
+        unit=described.unit,
+        minimum=described.minimum,
+        maximum=described.maximum,
+        above=described.above,
+    )
+    return cast(float, spec.check(value, place))
+
+
+def _complete(
+    effect_id: str,
+    shared: dict[str, float] | None,
+    own: dict[str, float] | None,
+    place: str,
+) -> Parameters | None:
+    if shared is None and own is None:
+        return None
+    merged = {**(shared or {}), **(own or {})}
+    missing = [key for key in EFFECTS[effect_id].parameters if key not in merged]
+    if missing:
+        raise InputError(f"{place}: physics.{effect_id}.{missing[0]} is missing: add it")
+    return MappingProxyType(merged)
+
+
+def _reject_unknown(values: Mapping[str, object], names: tuple[str, ...], place: str) -> None:
+    fixed = {spec.name for spec in ROBOT_PARAMETERS}
+    overrides = {
+        f"motor.{name}.{spec.name.removeprefix('motor.')}"
+        for name in names
+        for spec in MOTOR_PARAMETERS
+    }
+    for key in values:
+        if key in fixed or key in overrides or _split_physics(key, names):
+            continue
+        near = closest(key, [*fixed, *(f"physics.{effect}" for effect in EFFECTS)])
+        raise InputError(f"{place}: {key} is unknown: {near}")
+
+
+def closest(word: str, known: list[str]) -> str:
+    """A hint for a mistyped word."""
+    import difflib
+
+    found = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    return f"did you mean {found[0]}?" if found else "remove it"

@@ -1,0 +1,100 @@
+"""Read robot.yaml: an ordinary ROS 2 parameter file."""
+
+from collections.abc import Iterable, Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from tomr_power_model.errors import InputError
+from tomr_power_model.robot.description import Robot, robot_from_parameters
+
+EVERY_NODE = "/**"
+
+
+def load_robot(source: Path | str) -> Robot:
+    """Read a robot description from a file, or a shipped one by name (`reference`).
+
+    It stands in the `/**` section; sections of single nodes are theirs and not looked at.
+    Raises InputError with one line that names the file, the key and the remedy.
+    """
+    section = _sections(source).get(EVERY_NODE)
+    if not section:
+        raise InputError(f"{source}: no `/**: ros__parameters:` section: see robots/reference.yaml")
+    return robot_from_parameters(section, str(source))
+
+
+def read_node_sections(source: Path | str, nodes: Iterable[str]) -> dict[str, object]:
+    """Flat parameters that a description gives to some nodes in their own sections, merged."""
+    sections = _sections(source)
+    merged: dict[str, object] = {}
+    for node in nodes:
+        merged.update(sections.get(node) or sections.get(f"/{node}") or {})
+    return merged
+
+
+def shipped_robots() -> list[str]:
+    """Names of the robots that come with the package."""
+    folder = files("tomr_power_model").joinpath("robots")
+    return sorted(
+        entry.name.removesuffix(".yaml")
+        for entry in folder.iterdir()
+        if entry.name.endswith(".yaml")
+    )
+
+
+def shipped_robot(name: str) -> Robot:
+    """A robot that comes with the package, by name."""
+    if name not in shipped_robots():
+        raise InputError(f"robot {name!r} is not shipped: give one of {shipped_robots()}")
+    return load_robot(name)
+
+
+def _sections(source: Path | str) -> dict[str, dict[str, object]]:
+    """Flat dotted parameters of each section of a ROS 2 parameter file."""
+    document = _document(_text(source), str(source))
+    if not isinstance(document, Mapping):
+        return {}
+    found: dict[str, dict[str, object]] = {}
+    for node, section in document.items():
+        parameters = section.get("ros__parameters") if isinstance(section, Mapping) else None
+        if not isinstance(parameters, Mapping):
+            raise InputError(f"{source}: section {node!r} has no ros__parameters: add or remove it")
+        found[str(node)] = _flat(parameters)
+    return found
+
+
+def _text(source: Path | str) -> str:
+    if str(source) in shipped_robots():
+        resource = files("tomr_power_model").joinpath("robots").joinpath(f"{source}.yaml")
+        return resource.read_text(encoding="utf-8")
+    try:
+        return Path(source).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(
+            f"{source}: cannot be read ({reason}): give a robot.yaml or one of {shipped_robots()}"
+        ) from None
+
+
+def _document(text: str, place: str) -> Any:
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f" line {mark.line + 1}" if mark is not None else ""
+        problem = getattr(error, "problem", None) or "not YAML"
+        raise InputError(f"{place}:{line} {problem}: mend the YAML") from None
+
+
+def _flat(tree: Mapping[object, object], prefix: str = "") -> dict[str, object]:
+    """Nested mappings as dotted keys: {"robot": {"mass": 1}} -> {"robot.mass": 1}."""
+    flat: dict[str, object] = {}
+    for key, value in tree.items():
+        name = f"{prefix}{key}"
+        if isinstance(value, Mapping):
+            flat.update(_flat(value, name + "."))
+        else:
+            flat[name] = value
+    return flat

@@ -1,0 +1,58 @@
+"""Simulate a robot, and diagnose it too unless told otherwise."""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
+from launch.conditions import IfCondition
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Start the simulator, which also gives the time, and the nodes of the diagnosis."""
+    robot = LaunchConfiguration("robot")
+    namespace = LaunchConfiguration("namespace")
+    factor = ParameterValue(LaunchConfiguration("real_time_factor"), value_type=float)
+    diagnosis = PathJoinSubstitution(
+        [FindPackageShare("tomr_fault_diag"), "launch", "diagnosis.launch.py"]
+    )
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument(
+                "robot",
+                default_value=PathJoinSubstitution(
+                    [FindPackageShare("tomr_power_model"), "robots", "reference.yaml"]
+                ),
+                description="robot.yaml: the robot to simulate",
+            ),
+            DeclareLaunchArgument(
+                "namespace", default_value="", description="namespace of the robot's topics"
+            ),
+            DeclareLaunchArgument(
+                "diagnosis", default_value="true", description="false: only the simulator"
+            ),
+            DeclareLaunchArgument(
+                "real_time_factor",
+                default_value="1.0",
+                description="seconds of the robot per second",
+            ),
+            Node(
+                package="tomr_sim_bridge",
+                executable="sim_bridge",
+                namespace=namespace,
+                parameters=[robot, {"real_time_factor": factor}],
+                output="screen",
+            ),
+            IncludeLaunchDescription(
+                PythonLaunchDescriptionSource(diagnosis),
+                launch_arguments={
+                    "robot": robot,
+                    "namespace": namespace,
+                    "use_sim_time": "true",
+                }.items(),
+                condition=IfCondition(LaunchConfiguration("diagnosis")),
+            ),
+        ]
+    )

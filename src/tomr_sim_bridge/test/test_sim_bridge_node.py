@@ -1,0 +1,206 @@
+"""sim_bridge as a process of its own: topics, clock, commands, faults while running, its end."""
+
+import math
+import signal
+import time
+from collections.abc import Callable, Iterator
+from importlib.resources import files
+from itertools import pairwise
+from typing import Any
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Twist, TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import BatteryState, Imu, JointState
+
+BEST_EFFORT = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+TYPES = {
+    "joint_states": JointState,
+    "wheel_1/power": BatteryState,
+    "wheel_2/power": BatteryState,
+    "wheel_3/power": BatteryState,
+    "battery_state": BatteryState,
+    "imu/data": Imu,
+    "odom": Odometry,
+    "ground_truth/odom": Odometry,
+    "ground_truth/faults": DiagnosticArray,
+    "/clock": Clock,
+}
+ROBOT = str(files("tomr_power_model").joinpath("robots").joinpath("reference.yaml"))
+
+
+def command_of(*parameters: str, robot: str = ROBOT) -> list[str]:
+    pairs = [part for parameter in parameters for part in ("-p", parameter)]
+    return ["sim_bridge", "--ros-args", "--params-file", robot, *pairs]
+
+
+class Operator:
+    """In this process: hears all topics, commands, sets parameters."""
+
+    def __init__(self, context: Context) -> None:
+        self.node = Node("operator", context=context)
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self.node)
+        self.heard: dict[str, list[Any]] = {topic: [] for topic in TYPES}
+        for topic, kind in TYPES.items():
+            self.node.create_subscription(kind, topic, self.heard[topic].append, BEST_EFFORT)
+        self._parameters = AsyncParameterClient(self.node, "sim_bridge")
+
+    def spin(self) -> None:
+        """Take what has come in, some hundred messages a second."""
+        end = time.monotonic() + 0.02
+        while time.monotonic() < end:
+            self._executor.spin_once(timeout_sec=0.005)
+
+    def last(self, topic: str) -> Any:
+        self.spin()
+        return self.heard[topic][-1] if self.heard[topic] else None
+
+    def set(self, name: str, value: object) -> tuple[bool, str]:
+        future = self._parameters.set_parameters([Parameter(name, value=value)])
+        while not future.done():
+            self.spin()
+        result = future.result().results[0]
+        return result.successful, result.reason
+
+    def commanding(self, outlet: Any, message: Any, topic: str = "joint_states") -> Any:
+        """Command once more, as a real operator does, and return the last message of a topic.
+
+        sim_bridge may not yet know of a publisher that already knows of it.
+        """
+        outlet.publish(message)
+        return self.last(topic)
+
+    def truth(self, fault_id: str) -> dict[str, float]:
+        message = self.last("ground_truth/faults")
+        status = next((s for s in message.status if s.name == fault_id), None) if message else None
+        return {pair.key: float(pair.value) for pair in status.values} if status else {}
+
+    def close(self) -> None:
+        self._executor.shutdown()
+        self.node.destroy_node()
+
+
+@pytest.fixture
+def operator() -> Iterator[Operator]:
+    context = Context()
+    rclpy.init(context=context)
+    found = Operator(context)
+    yield found
+    found.close()
+    context.shutdown()
+
+
+def test_robot_on_topics(operator: Operator, spawn: Callable, wait_until: Callable) -> None:
+    bridge = spawn(command_of("start_time:=100.0"))
+    wait_until(lambda: operator.spin() or all(operator.heard.values()), "a message on every topic")
+    assert 100 <= operator.heard["joint_states"][0].header.stamp.sec < 115
+    assert operator.heard["joint_states"][0].name == [f"wheel_{n}_joint" for n in (1, 2, 3)]
+    assert operator.heard["wheel_2/power"][-1].current == pytest.approx(-0.05, abs=0.03)
+
+    outlet = operator.node.create_publisher(TwistStamped, "cmd_vel", 10)
+    message = TwistStamped()
+    message.twist.linear.y = 0.3
+    wait_until(
+        lambda: operator.commanding(outlet, message).velocity[0] < -5.8, "wheel 1 at -6 rad/s"
+    )
+    message.twist.linear.y = math.nan
+    outlet.publish(message)
+    bridge.wait_for_output("is not finite: ignored, the last command is kept")
+
+    assert operator.set("faults.encoder_lost.wheel", 2) == (True, "")
+    assert operator.set("faults.encoder_lost.severity", 1.0) == (True, "")
+    wait_until(lambda: operator.truth("encoder_lost").get("active") == 1.0, "the fault in force")
+    assert operator.truth("encoder_lost")["wheel"] == 2.0
+    wait_until(lambda: operator.last("joint_states").velocity[1] == 0.0, "wheel 2 reads standstill")
+    assert operator.last("joint_states").velocity[0] < -5.0  # the NaN stopped nothing
+    ok, reason = operator.set("faults.encoder_lost.severity", 1.5)
+    assert not ok
+    assert "1.5" in reason
+    ok, reason = operator.set("robot.mass", 3.0)
+    assert not ok
+    assert operator.set("faults.encoder_lost.severity", 0.0) == (True, "")
+    wait_until(lambda: operator.truth("encoder_lost").get("active") == 0.0, "the fault is over")
+
+    clock = [c.clock.sec * 10**9 + c.clock.nanosec for c in operator.heard["/clock"]]
+    assert clock == sorted(clock)
+    bridge.signal(signal.SIGINT, group=True)
+    assert bridge.wait(10.0) == 0
+    assert "Traceback" not in bridge.output
+
+
+def test_real_time_that_cannot_be_held_slows_the_clock(
+    operator: Operator, spawn: Callable, wait_until: Callable
+) -> None:
+    bridge = spawn(command_of("real_time_factor:=100.0", "start_time:=1.0"))
+    bridge.wait_for_output("100 times real time cannot be held")
+    wait_until(lambda: operator.spin() or len(operator.heard["joint_states"]) > 50, "samples")
+    stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in
+              operator.heard["joint_states"]]  # fmt: skip
+    assert {later - earlier for earlier, later in pairwise(stamps)} == {10_000_000}
+    assert stamps == sorted(stamps)
+    assert bridge.stop() == 0
+    assert bridge.output.count("cannot be held") == 1  # throttled
+
+
+def test_twist_without_stamp(operator: Operator, spawn: Callable, wait_until: Callable) -> None:
+    spawn(command_of("cmd_vel_type:=twist"))
+    outlet = operator.node.create_publisher(Twist, "cmd_vel", 10)
+    message = Twist()
+    message.angular.z = 1.0
+    wait_until(
+        lambda: (heard := operator.commanding(outlet, message)) and heard.velocity[0] < -3.8,
+        "wheels at -4 rad/s",
+    )
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        (["robot.mass:=-1.0"], "robot.mass = -1 kg: out of range"),
+        (["seed:=1.5"], "seed"),
+        (["faults.encoder_lost.wheel:=7"], "faults.encoder_lost.wheel = 7: out of range"),
+    ],
+)
+def test_bad_parameters_end_it_with_one_line(
+    parameters: list[str], message: str, spawn: Callable
+) -> None:
+    bridge = spawn(command_of(*parameters))
+    assert bridge.wait() == 2
+    errors = [line for line in bridge.output.splitlines() if line.startswith("error: ")]
+    assert len(errors) == 1
+    assert message in errors[0]
+    assert "Traceback" not in bridge.output
+
+
+def test_robot_that_flies_apart_ends_it_with_one_line(
+    operator: Operator, spawn: Callable, wait_until: Callable
+) -> None:
+    bridge = spawn(command_of("motor.resistance:=0.0001"))
+    outlet = operator.node.create_publisher(TwistStamped, "cmd_vel", 10)
+    message = TwistStamped()
+    message.twist.linear.y = 0.3
+
+    def ended() -> bool:
+        operator.commanding(outlet, message)
+        return bridge.popen.poll() is not None
+
+    wait_until(ended, "the end of sim_bridge")
+    assert bridge.wait() == 2
+    assert bridge.output.startswith("error: the simulated robot has become unstable")
+    assert bridge.output.count("\n") == 1
+
+
+def test_without_a_robot_it_says_what_to_do(spawn: Callable) -> None:
+    bridge = spawn(["sim_bridge"])
+    assert bridge.wait() == 2
+    assert "start it with --params-file robot.yaml" in bridge.output

@@ -1,0 +1,78 @@
+"""The faults in force, all switched off at first."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from attrs import frozen
+
+from tomr_sim_bridge.faults.base import (
+    Fault,
+    FaultActions,
+    Vector,
+    check_settings,
+    fault_ids,
+    fault_kind,
+)
+
+
+@frozen
+class FaultState:
+    """One line of the truth about a fault."""
+
+    fault_id: str
+    active: bool  # switched on and bearing on a wheel now
+    wheel: int | None  # index 0..2
+    severity: float
+
+
+class FaultBoard:
+    """Settings of every fault, changeable while the plant runs."""
+
+    def __init__(self) -> None:
+        self._faults = {name: self._make(name, {}) for name in fault_ids()}
+        self._bearing = dict.fromkeys(self._faults, False)
+
+    def set(self, fault_id: str, values: Mapping[str, object], place: str = "fault") -> None:
+        """Set a fault; settings not named return to their defaults.
+
+        Raises InputError for an unknown fault or setting, or a value out of range.
+        """
+        self._faults[fault_id] = self._make(fault_id, values, place)
+        self._bearing[fault_id] = False
+
+    def clear(self, fault_id: str) -> None:
+        """Switch a fault off."""
+        self.set(fault_id, {})
+
+    def actions(self, contact: Vector, friction: Vector) -> FaultActions | None:
+        """What the faults do to the plant now, None while all are off.
+
+        Args:
+            contact: wheel contacts in the world [m], shape (3, 2).
+            friction: traction coefficients of the healthy floor, shape (3,).
+        """
+        on = [(name, fault) for name, fault in self._faults.items() if fault.severity > 0]
+        if not on:
+            return None
+        wheels = len(contact)
+        actions = FaultActions(
+            contact=contact,
+            drive=np.ones(wheels),
+            connected=np.ones(wheels, dtype=bool),
+            encoder=np.ones(wheels),
+            friction=friction.copy(),
+        )
+        for name, fault in on:
+            self._bearing[name] = fault.apply(actions)
+        return actions
+
+    def states(self) -> list[FaultState]:
+        """The truth about every fault."""
+        return [
+            FaultState(name, self._bearing[name], fault.wheel, fault.severity)
+            for name, fault in self._faults.items()
+        ]
+
+    @staticmethod
+    def _make(fault_id: str, values: Mapping[str, object], place: str = "fault") -> Fault:
+        return fault_kind(fault_id, place)(check_settings(fault_id, values, place))

@@ -1,0 +1,1 @@
+"""Foreign data sets turned into recordings of the contract's form."""

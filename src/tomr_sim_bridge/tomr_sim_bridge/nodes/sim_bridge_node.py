@@ -1,0 +1,230 @@
+"""Node `sim_bridge`: the simulated robot on the topics of a real one, with /clock."""
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.utilities import remove_ros_args
+from rosgraph_msgs.msg import Clock as ClockMessage
+
+from tomr_power_model.cli import run_main
+from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
+from tomr_power_model.nodes.stage_node import (
+    CMD_VEL_TYPE,
+    SENSOR_QOS,
+    STAGE_QOS,
+    TWIST_TYPES,
+    message_class,
+    run_node,
+)
+from tomr_power_model.robot.parameters import ParameterSpec, Value
+from tomr_sim_bridge.faults import all_parameters, split_name
+from tomr_sim_bridge.plant.samples import NANOSECONDS, Plain, Sample, build
+from tomr_sim_bridge.plant.simulation import Simulation
+
+DESCRIPTION = """\
+The simulated robot on the topics of a real one: joint_states, <wheel>/power, battery_state,
+imu/data, odom, ground_truth/odom, ground_truth/faults and /clock. Listens to cmd_vel.
+
+Parameters, given after --ros-args as -p name:=value:
+{parameters}
+and the robot's description, from a robot.yaml.
+
+examples:
+  sim_bridge --ros-args --params-file robot.yaml
+  sim_bridge --ros-args --params-file robot.yaml -p faults.encoder_lost.severity:=1.0
+  ros2 param set /sim_bridge faults.floor_slippery.severity 0.9
+
+exit codes: 0 after SIGINT or SIGTERM; 2 bad input.
+"""
+SLICE_NS = 10_000_000  # of the plant between two looks at this computer's clock
+LONGEST_RUN_NS = 50_000_000  # of this computer between two looks at commands and parameters
+LARGEST_LAG_NS = 500_000_000  # that is caught up with; beyond it the clock is slowed
+WARN_PERIOD = 10.0  # s between two warnings of a kind
+
+_S = ParameterSpec
+PARAMETERS = (
+    CMD_VEL_TYPE,
+    _S(
+        "real_time_factor",
+        "seconds of the robot per second",
+        default=1.0,
+        minimum=0.01,
+        maximum=100.0,
+        read_only=False,
+    ),
+    _S(
+        "update_rate",
+        "of the plant and /clock",
+        unit="Hz",
+        default=100.0,
+        minimum=10.0,
+        maximum=1e3,
+    ),
+    _S(
+        "start_time",
+        "stamp of the start; 0: the time of this computer",
+        unit="s",
+        default=0.0,
+        minimum=0.0,
+        maximum=4e9,
+    ),
+    _S("seed", "of sensor noise", kind="int", default=0, minimum=0, maximum=2**31 - 1),
+    _S("payload", "on top of the description", unit="kg", default=0.0, minimum=0.0, maximum=1e4),
+    _S(
+        "floor_friction",
+        "traction coefficient; 0: that of the description",
+        default=0.0,
+        minimum=0.0,
+        maximum=10.0,
+    ),
+    _S("stamp_jitter", "of the sampling times", unit="s", default=0.0, minimum=0.0, maximum=1.0),
+)
+FAULT_PARAMETERS = {name: attrs.evolve(spec, name=name) for name, spec in all_parameters().items()}
+
+
+def ros_message(type_name: str, **fields: Any) -> Any:
+    """Make a ROS message of a type such as sensor_msgs/msg/JointState."""
+    return message_class(type_name)(**fields)
+
+
+class SimBridge(Node):
+    """Runs the plant in real time, or at a multiple of it, and publishes what it measures."""
+
+    def __init__(self) -> None:
+        super().__init__("sim_bridge", automatically_declare_parameters_from_overrides=True)
+        values = declare_specs(self, (*PARAMETERS, *FAULT_PARAMETERS.values()))
+        robot = declare_robot(self)
+        start = round(_number(values, "start_time") * NANOSECONDS) or time.time_ns()
+        self._simulation = Simulation(
+            robot,
+            int(_number(values, "seed")),
+            start_ns=start,
+            floor_friction=_number(values, "floor_friction") or None,
+            payload=_number(values, "payload"),
+            stamp_jitter=_number(values, "stamp_jitter"),
+        )
+        self._factor = _number(values, "real_time_factor")
+        for fault_id in {split_name(name)[0] for name in FAULT_PARAMETERS}:
+            self._set_fault(fault_id)
+        self.add_post_set_parameters_callback(self._parameters_set)
+        self._topics: dict[str, Any] = {}
+        self._clock_outlet = self.create_publisher(ClockMessage, "/clock", STAGE_QOS)
+        kind = TWIST_TYPES[str(values["cmd_vel_type"])]
+        self.create_subscription(message_class(kind), "cmd_vel", self._command, SENSOR_QOS)
+        self._anchor()
+        # A timer on the node's own clock would wait for the /clock that it makes.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(1.0 / _number(values, "update_rate"), self._advance, clock=steady)
+
+    def _anchor(self) -> None:
+        """Hold the plant's time against this computer's from now on."""
+        self._wall_ns, self._plant_ns = time.monotonic_ns(), self._simulation.stamp_ns
+
+    def _advance(self) -> None:
+        now = time.monotonic_ns()
+        target = self._plant_ns + round((now - self._wall_ns) * self._factor)
+        simulation = self._simulation
+        while True:
+            reached = min(target, simulation.stamp_ns + SLICE_NS)
+            for sample in simulation.step_to(reached):
+                self._publish(sample)
+            if reached == target or time.monotonic_ns() - now > LONGEST_RUN_NS:
+                break
+        self._clock_outlet.publish(ClockMessage(clock=_time(simulation.stamp_ns)))
+        lag = (target - simulation.stamp_ns) / self._factor
+        if lag > LARGEST_LAG_NS:
+            self.get_logger().warning(
+                f"{self._factor:g} times real time cannot be held ({lag / NANOSECONDS:.1f} s "
+                "behind): the clock is slowed; lower real_time_factor",
+                throttle_duration_sec=WARN_PERIOD,
+            )
+            self._anchor()
+
+    def _publish(self, sample: Sample) -> None:
+        outlet = self._topics.get(sample.topic)
+        if outlet is None:
+            truth = sample.topic.startswith("ground_truth/")
+            outlet = self.create_publisher(
+                message_class(sample.message.type_name),
+                sample.topic,
+                STAGE_QOS if truth else SENSOR_QOS,
+            )
+            self._topics[sample.topic] = outlet
+        outlet.publish(build(sample.message, ros_message))
+
+    def _command(self, message: Any) -> None:
+        twist = getattr(message, "twist", message)
+        wanted = (float(twist.linear.x), float(twist.linear.y), float(twist.angular.z))
+        if not all(math.isfinite(value) for value in wanted):
+            self.get_logger().warning(
+                f"cmd_vel: {wanted} is not finite: ignored, the last command is kept",
+                throttle_duration_sec=WARN_PERIOD,
+            )
+            return
+        self._simulation.command(*wanted)
+
+    def _parameters_set(self, parameters: list[Parameter]) -> None:
+        """Take over what the parameter callbacks let through."""
+        changed = {split_name(p.name)[0] for p in parameters if p.name in FAULT_PARAMETERS}
+        for fault_id in changed:
+            self._set_fault(fault_id)
+        for parameter in parameters:
+            if parameter.name == "real_time_factor":
+                self._factor = float(parameter.value)
+                self._anchor()
+
+    def _set_fault(self, fault_id: str) -> None:
+        settings = {
+            split_name(name)[1]: self.get_parameter(name).value
+            for name in FAULT_PARAMETERS
+            if split_name(name)[0] == fault_id
+        }
+        self._simulation.faults.set(fault_id, settings)
+
+
+def _number(values: dict[str, Value], name: str) -> float:
+    value = values[name]
+    if isinstance(value, str | tuple):
+        raise TypeError(f"{name} is no number")
+    return float(value)
+
+
+def _time(stamp_ns: int) -> Any:
+    seconds, rest = divmod(stamp_ns, NANOSECONDS)
+    return build(
+        Plain("builtin_interfaces/msg/Time", {"sec": seconds, "nanosec": rest}), ros_message
+    )
+
+
+def _description() -> str:
+    lines = []
+    for spec in (*PARAMETERS, *FAULT_PARAMETERS.values()):
+        unit = f" [{spec.unit}]" if spec.unit else ""
+        bounds = f"; {spec.bounds}" if spec.bounds else ""
+        lines.append(
+            f"  {spec.name} = {spec.default}{unit}: {spec.description}{bounds}"
+            + ("" if spec.read_only else " (may change while running)")
+        )
+    return DESCRIPTION.format(parameters="\n".join(lines))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of `sim_bridge`."""
+    given = list(sys.argv if arguments is None else ["sim_bridge", *arguments])
+    parser = argparse.ArgumentParser(
+        prog="sim_bridge",
+        description=_description(),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.parse_args(remove_ros_args(given)[1:])
+    # Not only the start may fail: a plant that becomes unstable ends the node as well.
+    return run_main(lambda _: run_node(SimBridge, given))

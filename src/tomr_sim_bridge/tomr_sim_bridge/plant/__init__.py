@@ -1,0 +1,1 @@
+"""The simulated robot: MuJoCo body, drivers, supply, sensors; no physics shared with the model."""

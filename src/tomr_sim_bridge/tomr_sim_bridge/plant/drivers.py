@@ -1,0 +1,71 @@
+"""Wheel speed loops of the motor drivers.
+
+A command is held until the next. The linear command vector moves towards it by at most
+acceleration_limit * dt, the yaw rate by acceleration_limit / robot_radius * dt; wheel set speeds
+follow by the nominal kinematics; the speed is that of the quantised encoder over one period; and
+v = kp e + ki sum(e) dt without feed-forward, integration stopped while saturated.
+"""
+
+import math
+from collections import deque
+
+import numpy as np
+
+from tomr_power_model.robot import WHEELS, Robot
+from tomr_sim_bridge.plant.wheels import Vector, rolling_rows
+
+NANOSECONDS = 1_000_000_000
+
+
+class WheelDrivers:
+    """Three speed loops, ticked at the controller's rate."""
+
+    def __init__(self, robot: Robot, period: float) -> None:
+        """`period` is the control period [s]."""
+        controller = robot.controller
+        self._period = period
+        self._proportional = controller.proportional
+        self._integral = controller.integral
+        self._limit = controller.acceleration_limit
+        self._yaw_limit = controller.acceleration_limit / robot.robot_radius
+        self._delay_ns = round(controller.delay * NANOSECONDS)
+        self._full = robot.supply.nominal_voltage
+        self._rows = rolling_rows(robot) / robot.wheel_radius
+        self._pending: deque[tuple[int, Vector]] = deque()
+        self._wanted = np.zeros(3)
+        self._twist = np.zeros(3)
+        self._angle = np.zeros(WHEELS)
+        self._sum = np.zeros(WHEELS)
+
+    def command(self, stamp_ns: int, twist: Vector) -> None:
+        """Take a body twist (v_x, v_y [m/s], omega_z [rad/s]) given at a time."""
+        self._pending.append((stamp_ns + self._delay_ns, twist))
+
+    def tick(self, now_ns: int, angle: Vector) -> Vector:
+        """Duty of the three bridges, -1..1.
+
+        Args:
+            now_ns: time of this tick [ns].
+            angle: encoder angles [rad], quantised, shape (3,).
+        """
+        while self._pending and self._pending[0][0] <= now_ns:
+            self._wanted = self._pending.popleft()[1]
+        self._ramp()
+        error = self._rows @ self._twist - (angle - self._angle) / self._period
+        self._angle = angle
+        total = self._sum + error * self._period
+        voltage = self._proportional * error + self._integral * total
+        saturated = np.abs(voltage) >= self._full
+        self._sum = np.where(saturated, self._sum, total)
+        return np.clip(voltage / self._full, -1.0, 1.0)
+
+    def _ramp(self) -> None:
+        if self._limit == 0.0:
+            self._twist = self._wanted
+            return
+        step_x, step_y, step_yaw = self._wanted - self._twist
+        length = math.hypot(step_x, step_y)
+        share = min(1.0, self._limit * self._period / length) if length > 0 else 1.0
+        most = self._yaw_limit * self._period
+        turn = min(max(step_yaw, -most), most)
+        self._twist = self._twist + np.array([share * step_x, share * step_y, turn])

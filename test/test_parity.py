@@ -1,0 +1,125 @@
+"""One recording through the three nodes over DDS and through `tomr_diagnose`: the same messages."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from tomr_fault_diag.diagnosis.offline import diagnose
+from tomr_fault_diag.diagnosis.pipeline import Pipeline
+from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
+from tomr_power_model.messages.bag import jazzy_typestore
+from tomr_power_model.messages.outgoing import TYPES, DiagnosticMessage, JointMessage, SupplyMessage
+from tomr_power_model.messages.predictions import EXPECTED, prediction_topics
+from tomr_power_model.messages.to_bag import to_bag
+from tomr_power_model.nodes.stage_node import STAGE_QOS, message_class
+from tomr_power_model.recordings import open_recording
+from tomr_power_model.robot import shipped_robot
+
+BAG = Path(__file__).parents[1] / "bags" / "circle_encoder_lost"
+ROBOT = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")
+RATE = 2.0  # times real time
+# A busy machine may hold up one process for longer than a robot would be waited for.
+PATIENCE = 5.0  # s
+
+Key = tuple[str, int]
+
+
+def _types() -> dict[str, str]:
+    topics = {
+        topic: TYPES[JointMessage if topic == EXPECTED else SupplyMessage]
+        for topic in prediction_topics(shipped_robot("reference"))
+    }
+    return {**topics, **dict.fromkeys(("residuals", "/diagnostics"), TYPES[DiagnosticMessage])}
+
+
+def _offline() -> dict[Key, Any]:
+    pipeline = Pipeline(
+        shipped_robot("reference"), DiagnosisSettings.of({"patience": PATIENCE}, "test")
+    )
+    store = jazzy_typestore()
+    found: dict[Key, Any] = {}
+    with open_recording(BAG) as recording:
+        for _, step in diagnose(recording, pipeline):
+            for message in pipeline.messages(step):
+                name = TYPES[type(message)]
+                data = bytes(store.serialize_cdr(to_bag(message), name))
+                found[message.topic, message.stamp_ns] = store.deserialize_cdr(data, name)
+    return found
+
+
+@contextmanager
+def _listener() -> Iterator[tuple[Node, SingleThreadedExecutor]]:
+    rclpy.init()
+    node, executor = Node("listener"), SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        yield node, executor
+    finally:
+        node.destroy_node()
+        rclpy.shutdown()
+
+
+def _plain(value: Any) -> Any:
+    """A message as nested tuples; NaN equal to NaN."""
+    if isinstance(value, np.ndarray):
+        return tuple(_plain(item) for item in value.tolist())
+    if isinstance(value, list):
+        return tuple(_plain(item) for item in value)
+    if isinstance(value, float) and value != value:
+        return "nan"
+    if hasattr(value, "__dataclass_fields__"):
+        return tuple((name, _plain(getattr(value, name))) for name in value.__dataclass_fields__)
+    return value
+
+
+def test_nodes_and_offline_tool_publish_the_same(
+    spawn: Callable[..., Any], wait_until: Callable[..., Any]
+) -> None:
+    if not BAG.exists():
+        pytest.fail(f"{BAG} is missing: make bags")
+    types, store = _types(), jazzy_typestore()
+    online: dict[Key, Any] = {}
+    with _listener() as (node, executor):
+        for topic, name in types.items():
+
+            def keep(data: bytes, topic: str = topic, name: str = name) -> None:
+                message = store.deserialize_cdr(data, name)
+                stamp = message.header.stamp
+                online[topic, stamp.sec * 1_000_000_000 + stamp.nanosec] = message
+
+            node.create_subscription(message_class(name), topic, keep, STAGE_QOS, raw=True)
+        parameters = ["--ros-args", "--params-file", str(ROBOT), "-p", f"patience:={PATIENCE}"]
+        for command in ("power_model", "power_residuals", "fault_classifier"):
+            spawn([command, *parameters])
+
+        def connected() -> bool:
+            executor.spin_once(0.01)
+            published = all(node.count_publishers(topic) == 1 for topic in types)
+            heard = all(node.count_subscribers(t) == 2 for t in types if t != "/diagnostics")
+            return published and heard
+
+        wait_until(connected, "three nodes that found each other")
+        replay = spawn(["bag_replay", "--ros-args", "-p", f"bag:={BAG}", "-p", f"rate:={RATE}"])
+        while replay.popen.poll() is None:
+            executor.spin_once(0.05)
+        assert replay.popen.returncode == 0
+        offline = _offline()
+
+        def complete() -> bool:
+            executor.spin_once(0.05)
+            return len(online) >= len(offline)
+
+        wait_until(complete, f"{len(offline)} messages, as the offline tool gives")
+    assert set(online) == set(offline)
+    different = [key for key, message in online.items() if _plain(message) != _plain(offline[key])]
+    assert not different, (_plain(online[different[0]]), _plain(offline[different[0]]))
+    states = {m.status[0].message for (topic, _), m in online.items() if topic == "/diagnostics"}
+    assert {"normal", "motor system fault 3 (wheel_3_joint)"} <= states

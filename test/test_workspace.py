@@ -1,0 +1,230 @@
+"""The packages as installed: commands, package.xml, data files, and who may import whom."""
+
+import ast
+import contextlib
+import functools
+import os
+import re
+import runpy
+import subprocess
+import sys
+import sysconfig
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import pytest
+import setuptools
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = sorted(path.parent for path in ROOT.glob("src/*/package.xml"))
+# What the shell of a newcomer has: nothing of ROS, nothing sourced.
+BARE_ENVIRONMENT = {"PATH": "/usr/bin:/bin", "HOME": os.environ.get("HOME", "/")}
+# Imported module -> (key in package.xml, name in requirements.txt); ROS modules are named alike.
+LIBRARIES = {
+    "attr": ("python3-attrs", "attrs"),
+    "attrs": ("python3-attrs", "attrs"),
+    "hypothesis": ("python3-hypothesis", "hypothesis"),
+    "matplotlib": ("python3-matplotlib", "matplotlib"),
+    "mujoco": ("python3-mujoco-pip", "mujoco"),
+    "numpy": ("python3-numpy", "numpy"),
+    "pytest": ("python3-pytest", "pytest"),
+    "rich": ("python3-rich", "rich"),
+    "rosbags": ("python3-rosbags-pip", "rosbags"),
+    "scipy": ("python3-scipy", "scipy"),
+    "tqdm": ("python3-tqdm", "tqdm"),
+    "yaml": ("python3-yaml", "PyYAML"),
+}
+# Training simulates drives and needs torch; to diagnose needs neither, so neither is declared.
+TRAINING = {"torch", "tomr_sim_bridge"}
+
+
+@functools.cache
+def setup_arguments(package: Path) -> dict[str, Any]:
+    """What the package's setup.py tells setuptools."""
+    told: dict[str, Any] = {}
+    with contextlib.chdir(package), patch("setuptools.setup", lambda **given: told.update(given)):
+        runpy.run_path("setup.py")
+    return told
+
+
+def commands(package: Path) -> list[str]:
+    scripts = setup_arguments(package)["entry_points"]["console_scripts"]
+    return [script.partition("=")[0].strip() for script in scripts]
+
+
+def imports(path: Path) -> Iterator[str]:
+    """Full names of the modules that a file imports, wherever in it."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (name.name for name in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            yield node.module
+            yield from (f"{node.module}.{name.name}" for name in node.names)
+
+
+def trains(file: Path) -> bool:
+    return "training" in file.parts or file.name in ("train.py", "test_training.py")
+
+
+def each_package(*subset: str) -> pytest.MarkDecorator:
+    chosen = [path for path in PACKAGES if not subset or path.name in subset]
+    return pytest.mark.parametrize("package", chosen, ids=lambda path: path.name)
+
+
+def each_command() -> pytest.MarkDecorator:
+    chosen = [(package, name) for package in PACKAGES for name in commands(package)]
+    return pytest.mark.parametrize(("package", "command"), chosen, ids=[name for _, name in chosen])
+
+
+@each_command()
+def test_command_explains_itself_without_sourcing_anything(package: Path, command: str) -> None:
+    program = Path(sysconfig.get_path("scripts"), command)
+    run = subprocess.run(
+        [program, "--help"], env=BARE_ENVIRONMENT, capture_output=True, text=True, timeout=60
+    )
+    assert run.returncode == 0, run.stderr
+    assert "usage" in run.stdout.lower()
+    assert run.stderr == ""
+
+
+@each_command()
+def test_colcon_installs_command_where_ros2_run_looks(package: Path, command: str) -> None:
+    program = ROOT / "install" / package.name / "lib" / package.name / command
+    assert os.access(program, os.X_OK), f"{program} is missing: run `make setup`"
+
+
+def test_command_runs_after_sourcing_the_workspace() -> None:
+    program = "install/tomr_power_model/lib/tomr_power_model/power_model"
+    run = subprocess.run(
+        ["bash", "-c", f". install/setup.bash && exec {program} --help"],
+        cwd=ROOT,
+        env=BARE_ENVIRONMENT,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert run.returncode == 0, run.stderr
+    assert "usage" in run.stdout.lower()
+
+
+@each_package()
+def test_install_has_what_ros2_looks_for(package: Path) -> None:
+    share = ROOT / "install" / package.name / "share"
+    assert (share / "ament_index/resource_index/packages" / package.name).exists()
+    expected = {"package.xml"}
+    for folder in ("launch/*.launch.py", "*/robots/*.yaml", "*/missions/*.yaml"):
+        expected |= {f"{file.parent.name}/{file.name}" for file in package.glob(folder)}
+    installed = {
+        str(file.relative_to(share / package.name))
+        for file in share.rglob("*.*")
+        if file.is_relative_to(share / package.name)
+    }
+    assert expected <= installed
+
+
+@each_package()
+def test_package_xml_agrees_with_setup(package: Path) -> None:
+    root = ET.parse(package / "package.xml").getroot()
+    told = setup_arguments(package)
+    for tag, key in (
+        ("name", "name"),
+        ("version", "version"),
+        ("description", "description"),
+        ("license", "license"),
+        ("maintainer", "maintainer"),
+    ):
+        assert root.findtext(tag) == told[key]
+    address = root.find("maintainer").attrib["email"]  # type: ignore[union-attr]
+    assert address == told["maintainer_email"]
+    # colcon builds plain Python, without a word, where it takes the address for invalid.
+    assert re.fullmatch(r"[-\w.]+@[-\w]+(\.[-\w]+)+", address)
+    assert root.findtext("export/build_type") == "ament_python"
+
+
+@each_package()
+def test_every_file_of_the_package_is_installed(package: Path) -> None:
+    with contextlib.chdir(package):
+        told = {**setup_arguments(package), "script_name": "setup.py"}
+        command = setuptools.Distribution(told).get_command_obj("build_py")
+        command.ensure_finalized()
+        installed = {str(Path(file)) for _, _, file in command.find_all_modules()}
+        for _, folder, _, files in command.data_files:
+            installed |= {str(Path(folder, file)) for file in files}
+    present = {
+        str(file.relative_to(package))
+        for file in (package / package.name).rglob("*")
+        if file.is_file()
+        and not re.search(r"/(__pycache__|\.\w+)/", str(file.relative_to(package)))
+    }
+    forgotten = present - installed
+    assert not forgotten, "no __init__.py beside it, or not in package_data of setup.py"
+
+
+@each_package()
+def test_imports_are_declared(package: Path) -> None:
+    declared = {
+        element.text
+        for element in ET.parse(package / "package.xml").getroot()
+        if element.tag in ("exec_depend", "test_depend", "depend")
+    }
+    pinned = set(re.findall(r"^([\w-]+)", (ROOT / "requirements.txt").read_text(), re.MULTILINE))
+    pinned |= {"hypothesis", "pytest"}
+    for file in (*(package / package.name).rglob("*.py"), *package.glob("*/*.py")):
+        known = {package.name, *sys.stdlib_module_names, *(TRAINING if trains(file) else ())}
+        for name in {full.partition(".")[0] for full in imports(file)} - known:
+            key, requirement = LIBRARIES.get(name, (name, None))
+            assert key in declared, f"{file} imports {name}: package.xml does not declare {key}"
+            if requirement is not None:
+                assert requirement in pinned, f"{file} imports {name}: not in requirements.txt"
+
+
+@each_package()
+def test_only_nodes_import_rclpy(package: Path) -> None:
+    allowed = {"nodes", "cli", "demo"}
+    for file in (package / package.name).rglob("*.py"):
+        inside = file.relative_to(package / package.name).parts
+        if inside[0] not in allowed and not file.name.endswith("_node.py"):
+            assert not [name for name in imports(file) if name.split(".")[0] == "rclpy"], file
+
+
+@each_package("tomr_power_model", "tomr_fault_diag")
+def test_no_package_imports_one_built_on_it(package: Path) -> None:
+    later = {"tomr_sim_bridge", "tomr_fault_diag"} - {package.name}
+    for file in (package / package.name).rglob("*.py"):
+        roots = {name.partition(".")[0] for name in imports(file)}
+        assert not roots & (later - (TRAINING if trains(file) else set())), file
+
+
+@each_package("tomr_sim_bridge")
+def test_simulator_shares_no_physics_with_the_model(package: Path) -> None:
+    shared = {"physics", "geometry", "response", "model"}
+    for file in (package / package.name).rglob("*.py"):
+        for name in imports(file):
+            top, _, rest = name.partition(".")
+            if top == "tomr_power_model":
+                assert rest.partition(".")[0] not in shared, f"{file} imports {name}"
+
+
+def test_launch_files_start_commands_that_exist() -> None:
+    known = {(package.name, name) for package in PACKAGES for name in commands(package)}
+    started = set()
+    for file in ROOT.glob("src/*/launch/*.launch.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Call):
+                given = {key.arg: key.value for key in node.keywords}
+                named = [given.get("package"), given.get("executable")]
+                if all(isinstance(value, ast.Constant) for value in named):
+                    started.add(tuple(value.value for value in named))
+    nodes = {"power_model", "power_residuals", "fault_classifier", "sim_bridge"}
+    assert {command for _, command in started} == nodes
+    assert started <= known
+
+
+def test_shipped_robots_and_missions_are_read_alike_from_source_and_share() -> None:
+    for package in PACKAGES:
+        for file in package.glob(f"{package.name}/[rm]*/*.yaml"):
+            share = ROOT / "install" / package.name / "share" / package.name
+            assert (share / file.parent.name / file.name).read_bytes() == file.read_bytes()
