@@ -86,8 +86,8 @@ def test_rollers_make_a_round_wheel() -> None:
     tilt = np.linspace(0.0, math.pi / ROLLERS, 200)
     reach = (0.05 - radial) * np.cos(tilt)
     reach += np.hypot(radial * np.cos(tilt), tangential * np.sin(tilt))
-    assert np.abs(reach / 0.05 - 1.0).max() < 1e-3
-    assert tangential == pytest.approx(0.0231, abs=1e-4)
+    assert np.abs(reach / 0.05 - 1.0).max() < 3e-4
+    assert tangential == pytest.approx(0.0320, abs=1e-4)
 
 
 # Worked by hand: R = 0.2 m, r = 0.05 m, wheels at 0, 120, 240 degrees.
@@ -142,7 +142,7 @@ def test_energy_is_accounted_for(make_robot: MakeRobot) -> None:
         simulation.step_to((count + 1) * 1_500_000_000)
         ledger = simulation.ledger
         spent = ledger.copper + ledger.axles + simulation.engine.kinetic_energy
-        assert ledger.motors == pytest.approx(spent, rel=0.04)
+        assert ledger.motors == pytest.approx(spent, rel=0.025)
     assert ledger.drivers == pytest.approx(ledger.motors + 3 * 1.2 * 6.0)  # standby of 6 s
 
 

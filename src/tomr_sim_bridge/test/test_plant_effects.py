@@ -77,8 +77,10 @@ def test_roller_drag_costs_force_times_sliding(make_robot: MakeRobot, drive: Cal
         .mean()
         for changes in (drag, {})
     )
-    force_times_speed = 0.03 * LOAD * ACROSS.sum()  # 1.02 W, and copper loss on top
-    assert with_drag - without == pytest.approx(force_times_speed, rel=0.12)
+    force_times_speed = 0.03 * LOAD * ACROSS.sum()  # 1.019 W
+    # 2.55 N in all, shared 2 : 1 : 1 by the wheels: 0.085 and 0.0425 N m more on 0.092 and 0.076
+    copper = RESISTANCE / CONSTANT**2 * (0.177**2 - 0.092**2 + 2 * (0.1185**2 - 0.076**2))
+    assert with_drag - without == pytest.approx(force_times_speed + copper, rel=0.08)
 
 
 def test_slope_costs_the_climb(make_robot: MakeRobot, drive: Callable) -> None:

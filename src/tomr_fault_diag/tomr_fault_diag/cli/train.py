@@ -28,8 +28,8 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--out", type=Path, required=True, help="weights to write (.npz)")
-    parser.add_argument("--drives", type=int, default=240, help="to train on (default 240)")
-    parser.add_argument("--validation", type=int, default=60, help="to validate on (default 60)")
+    parser.add_argument("--drives", type=int, default=280, help="to train on (default 280)")
+    parser.add_argument("--validation", type=int, default=70, help="to validate on (default 70)")
     parser.add_argument("--first-seed", type=int, default=1000, help="of the drives")
     parser.add_argument("--epochs", type=int, default=100)
     return parser

@@ -93,6 +93,9 @@ def _another_robot(reference: Robot, random: np.random.Generator) -> Robot:
             integral=scaled(reference.controller.integral),
             acceleration_limit=float(random.uniform(1.0, 2.5)),
         ),
+        sensors=evolve(
+            reference.sensors, encoder_resolution=float(random.choice([1.5e-4, 4e-4, 8e-4]))
+        ),
         physics=physics,
     )
 

@@ -98,6 +98,8 @@ def _blocks(drive: Drive) -> tuple[list[_Block], list[_Block]]:
         for stretch in drive.board.stretches
     ]
     marks = [(drive.seconds(named.stamp_ns), named.state) for named in drive.board.named]
+    if marks:  # repeated once a second: what the first one says may have held since long before
+        marks[0] = (max(0.0, drive.seconds(drive.board.named[0].since_ns)), marks[0][1])
     named: list[_Block] = []
     for (begin, state), (end, _) in pairwise([*marks, (drive.end, "")]):
         start = named.pop().begin if named and named[-1].state == state else begin
@@ -188,6 +190,7 @@ def _power(axis: Axes, power: Power, limits: tuple[float, float]) -> None:
             va="top",
             fontsize=_SMALL,
             color=_MUTED,
+            bbox={"facecolor": "white", "alpha": 0.85, "lw": 0, "pad": 1.5},
         )
     axis.set_ylabel(f"{power.name.replace('_', ' ')}\npower [W]", fontsize=9, color=_INK)
 

@@ -68,13 +68,9 @@ class Play:
             self._view.starting(missing[1])
             if time.monotonic() > end:
                 raise DemoFailure(self._not_ready(*missing))
+            self._check_alone()
             self._turn()
-        for topic in ("/joint_states", "/cmd_vel", DIAGNOSTICS):
-            if self._director.count_publishers(topic) > 1:
-                raise InputError(
-                    f"something else publishes {topic} too: choose another domain, "
-                    "e.g. ROS_DOMAIN_ID=31"
-                )
+        self._check_alone()
 
     def perform(self, acts: Sequence[Act], recording: RecordingWriter) -> None:
         """Play the acts and record; the score is in `board`."""
@@ -121,6 +117,14 @@ class Play:
             state = "nothing" if self._named is None else self._named.state
             return "fault_classifier", f"the robot at rest is not yet called normal, but {state}"
         return None
+
+    def _check_alone(self) -> None:
+        for topic in self._topics:
+            if self._director.count_publishers(topic) > 1:
+                raise InputError(
+                    f"another process publishes {topic} in this domain: choose a domain of its "
+                    "own for the demo, e.g. ROS_DOMAIN_ID=31"
+                )
 
     def _not_ready(self, process: str, missing: str) -> str:
         return (

@@ -30,6 +30,7 @@ class Named:
     state: str
     probability: float | None = None  # of that state
     evidence: tuple[str, ...] = ()
+    since_ns: int = 0  # from when on the state holds
 
 
 def named_in(message: Any, stamp_ns: int) -> Named | None:
@@ -40,8 +41,22 @@ def named_in(message: Any, stamp_ns: int) -> Named | None:
             state = values["state"]
             share = values.get(f"p {state}")
             evidence = tuple(text for key, text in values.items() if key.startswith("evidence "))
-            return Named(stamp_ns, state, None if share is None else float(share), evidence)
+            return Named(
+                stamp_ns,
+                state,
+                None if share is None else float(share),
+                evidence,
+                _stamp_of(values.get("since", ""), stamp_ns),
+            )
     return None
+
+
+def _stamp_of(text: str, otherwise: int) -> int:
+    """A time such as "12.000000500" [s], exactly, as a stamp [ns]."""
+    seconds, point, rest = text.partition(".")
+    if not (seconds.isdecimal() and point and rest.isdecimal() and len(rest) == 9):
+        return otherwise
+    return int(seconds) * NANOSECONDS + int(rest)
 
 
 @define

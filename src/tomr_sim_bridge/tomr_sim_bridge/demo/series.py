@@ -11,6 +11,7 @@ from tomr_fault_diag.residuals.frame import RESIDUALS, ResidualFrame, residual_n
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUAL_TOPIC
 from tomr_fault_diag.residuals.messages import frame_of
 from tomr_power_model.errors import InputError
+from tomr_power_model.messages.intake import Unusable
 from tomr_power_model.recordings import Recording, header_stamp_ns, resolve_topic
 from tomr_sim_bridge.demo.score import DIAGNOSTICS, NANOSECONDS, TRUTH, Scoreboard
 
@@ -133,7 +134,12 @@ def _read(recording: Recording, takers: dict[str, Callable[[Any, int], None]]) -
         if topic is not None:
             found[topic] = take
     for topic, _, message, receive_ns in recording.messages(found):
-        found[topic](message, header_stamp_ns(message) or receive_ns)
+        try:
+            found[topic](message, header_stamp_ns(message) or receive_ns)
+        except Unusable as error:
+            raise InputError(
+                f"{recording.name}: {topic}: {error}; record it again with this version"
+            ) from None
 
 
 def _shares(frames: list[ResidualFrame]) -> Array:

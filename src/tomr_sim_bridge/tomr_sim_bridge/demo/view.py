@@ -90,7 +90,7 @@ def _row(scene: Scene, stretch: Stretch) -> list[Text]:
     state = state_text(shown)
     if stretch.strays:
         state.append(f" (also {', '.join(stretch.strays)})", style="yellow")
-    delay = stretch.delay_ns
+    delay = None if shown is stretch.before else stretch.delay_ns
     told = shown.evidence if shown is not None and stretch.fault_id else ()
     evidence = "; ".join(line.partition(", band")[0] for line in told)
     return [

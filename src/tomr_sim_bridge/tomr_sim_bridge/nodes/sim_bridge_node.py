@@ -1,8 +1,6 @@
 """Node `sim_bridge`: the simulated robot on the topics of a real one, with /clock."""
 
-import argparse
 import math
-import sys
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -12,10 +10,10 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.utilities import remove_ros_args
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from tomr_power_model.cli import run_main
+from tomr_power_model.nodes.command_line import node_arguments
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
 from tomr_power_model.nodes.stage_node import (
     CMD_VEL_TYPE,
@@ -33,18 +31,14 @@ from tomr_sim_bridge.plant.simulation import Simulation
 DESCRIPTION = """\
 The simulated robot on the topics of a real one: joint_states, <wheel>/power, battery_state,
 imu/data, odom, ground_truth/odom, ground_truth/faults and /clock. Listens to cmd_vel.
-
-Parameters, given after --ros-args as -p name:=value:
-{parameters}
-and the robot's description, from a robot.yaml.
-
+Takes the parameters below and the robot's description, from a robot.yaml."""
+EPILOG = """\
 examples:
   sim_bridge --ros-args --params-file robot.yaml
   sim_bridge --ros-args --params-file robot.yaml -p faults.encoder_lost.severity:=1.0
   ros2 param set /sim_bridge faults.floor_slippery.severity 0.9
 
-exit codes: 0 after SIGINT or SIGTERM; 2 bad input.
-"""
+exit codes: 0 after SIGINT or SIGTERM; 2 bad input."""
 SLICE_NS = 10_000_000  # of the plant between two looks at this computer's clock
 LONGEST_RUN_NS = 50_000_000  # of this computer between two looks at commands and parameters
 LARGEST_LAG_NS = 500_000_000  # that is caught up with; beyond it the clock is slowed
@@ -205,26 +199,9 @@ def _time(stamp_ns: int) -> Any:
     )
 
 
-def _description() -> str:
-    lines = []
-    for spec in (*PARAMETERS, *FAULT_PARAMETERS.values()):
-        unit = f" [{spec.unit}]" if spec.unit else ""
-        bounds = f"; {spec.bounds}" if spec.bounds else ""
-        lines.append(
-            f"  {spec.name} = {spec.default}{unit}: {spec.description}{bounds}"
-            + ("" if spec.read_only else " (may change while running)")
-        )
-    return DESCRIPTION.format(parameters="\n".join(lines))
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `sim_bridge`."""
-    given = list(sys.argv if arguments is None else ["sim_bridge", *arguments])
-    parser = argparse.ArgumentParser(
-        prog="sim_bridge",
-        description=_description(),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.parse_args(remove_ros_args(given)[1:])
+    specs = (*PARAMETERS, *FAULT_PARAMETERS.values())
+    given = node_arguments("sim_bridge", DESCRIPTION, specs, EPILOG, arguments)
     # Not only the start may fail: a plant that becomes unstable ends the node as well.
     return run_main(lambda _: run_node(SimBridge, given))
