@@ -59,8 +59,9 @@ def test_idle_robot_draws_standby_and_auxiliary_power(
 
 
 def test_encoders_count(make_robot: MakeRobot, drive: Callable) -> None:
-    run = drive(Simulation(make_robot()), 1.0, FORWARD)
-    counts = run.joints("position") / (2.0 * math.pi / 8192)
+    robot = make_robot()
+    run = drive(Simulation(robot), 1.0, FORWARD)
+    counts = run.joints("position") / robot.sensors.encoder_resolution
     assert np.abs(counts - np.round(counts)).max() < 1e-6
     stamps = run.stamps("joint_states") * 1e-9
     speed = np.diff(run.joints("position"), axis=0) / np.diff(stamps)[:, None]

@@ -47,7 +47,7 @@ def guarded(
             arrival = take(message, receive_ns)
         except Unusable as error:
             return f"{error}; the message is ignored"
-        except (AttributeError, IndexError, TypeError, OverflowError) as error:
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             return f"malformed ({error}); the message is ignored"
         return complaint(arrival)
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tomr_power_model.messages.intake import Triple
+from tomr_power_model.messages.intake import Triple, Unusable
 from tomr_power_model.messages.outgoing import JointMessage, Outgoing, SupplyMessage
 from tomr_power_model.messages.readings import SupplyReading
 from tomr_power_model.model.prediction import Prediction
@@ -71,5 +71,7 @@ def _reading(message: Any) -> SupplyReading:
 
 
 def _triple(values: Any) -> Triple:
+    if len(values) != WHEELS:
+        raise Unusable(f"{len(values)} wheels, a prediction has {WHEELS}")
     first, second, third = (float(value) for value in values)
     return first, second, third

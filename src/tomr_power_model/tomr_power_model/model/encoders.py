@@ -101,5 +101,8 @@ def _fit(seconds: Array, values: Array, degree: int) -> Array:
     unit = np.abs(seconds).max()
     exponents = np.arange(degree + 1)
     powers = (seconds[:, None] / unit) ** exponents
-    scaled = np.linalg.solve(powers.T @ powers, powers.T @ values)
+    try:
+        scaled = np.linalg.solve(powers.T @ powers, powers.T @ values)
+    except np.linalg.LinAlgError:  # stamps too close together to tell a speed
+        scaled = np.full((degree + 1, values.shape[1]), np.nan)
     return np.asarray(scaled / unit ** exponents[:, None])
