@@ -23,6 +23,7 @@ from tomr_power_model.nodes.stage_node import (
     message_class,
     run_node,
 )
+from tomr_power_model.recordings import header_stamp_ns
 from tomr_power_model.robot.parameters import ParameterSpec, Value
 from tomr_sim_bridge.faults import all_parameters, split_name
 from tomr_sim_bridge.plant.samples import NANOSECONDS, Plain, Sample, build
@@ -41,7 +42,9 @@ examples:
 exit codes: 0 after SIGINT or SIGTERM; 2 bad input."""
 SLICE_NS = 10_000_000  # of the plant between two looks at this computer's clock
 LONGEST_RUN_NS = 50_000_000  # of this computer between two looks at commands and parameters
-LARGEST_LAG_NS = 500_000_000  # that is caught up with; beyond it the clock is slowed
+LONGEST_LEAP_NS = 50_000_000  # of the plant at once at real time; what is more slows the clock
+NOTICEABLE_NS = 500_000_000  # that the clock was slowed by
+FOREIGN_NS = 1_000_000_000  # between a command's stamp and a clock that is not its own
 WARN_PERIOD = 10.0  # s between two warnings of a kind
 
 _S = ParameterSpec
@@ -107,6 +110,7 @@ class SimBridge(Node):
             stamp_jitter=_number(values, "stamp_jitter"),
         )
         self._factor = _number(values, "real_time_factor")
+        self._slowed_ns = 0
         for fault_id in {split_name(name)[0] for name in FAULT_PARAMETERS}:
             self._set_fault(fault_id)
         self.add_post_set_parameters_callback(self._parameters_set)
@@ -125,8 +129,8 @@ class SimBridge(Node):
 
     def _advance(self) -> None:
         now = time.monotonic_ns()
-        target = self._plant_ns + round((now - self._wall_ns) * self._factor)
         simulation = self._simulation
+        target = self._reachable(now)
         while True:
             reached = min(target, simulation.stamp_ns + SLICE_NS)
             for sample in simulation.step_to(reached):
@@ -134,14 +138,23 @@ class SimBridge(Node):
             if reached == target or time.monotonic_ns() - now > LONGEST_RUN_NS:
                 break
         self._clock_outlet.publish(ClockMessage(clock=_time(simulation.stamp_ns)))
-        lag = (target - simulation.stamp_ns) / self._factor
-        if lag > LARGEST_LAG_NS:
+
+    def _reachable(self, now: int) -> int:
+        """Where the plant is to be, but no long way on: it would pass commands still under way."""
+        target = self._plant_ns + round((now - self._wall_ns) * self._factor)
+        most = self._simulation.stamp_ns + round(LONGEST_LEAP_NS * max(1.0, self._factor))
+        if target <= most:
+            return target
+        self._wall_ns, self._plant_ns = now, most
+        self._slowed_ns += round((target - most) / self._factor)
+        if self._slowed_ns > NOTICEABLE_NS:
             self.get_logger().warning(
-                f"{self._factor:g} times real time cannot be held ({lag / NANOSECONDS:.1f} s "
-                "behind): the clock is slowed; lower real_time_factor",
+                f"{self._factor:g} times real time cannot be held: the clock is slowed; "
+                "lower real_time_factor",
                 throttle_duration_sec=WARN_PERIOD,
             )
-            self._anchor()
+            self._slowed_ns = 0
+        return most
 
     def _publish(self, sample: Sample) -> None:
         outlet = self._topics.get(sample.topic)
@@ -164,7 +177,11 @@ class SimBridge(Node):
                 throttle_duration_sec=WARN_PERIOD,
             )
             return
-        self._simulation.command(*wanted)
+        # In force from its stamp on, plus controller.delay, however long it was on its way.
+        now = self._simulation.stamp_ns
+        stamp = header_stamp_ns(message) or now
+        is_foreign = abs(stamp - now) > FOREIGN_NS
+        self._simulation.command(*wanted, stamp_ns=now if is_foreign else stamp)
 
     def _parameters_set(self, parameters: list[Parameter]) -> None:
         """Take over what the parameter callbacks let through."""
