@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.states import NORMAL, STATES, UNKNOWN, State
-from tomr_fault_diag.residuals.frame import MOTORS, TOTAL, ResidualFrame
+from tomr_fault_diag.residuals.frame import INPUT_ORDERS, MOTORS, TOTAL, ResidualFrame
 
 Array = NDArray[np.float64]
 
@@ -37,6 +37,7 @@ class FaultClassifier:
     def __init__(self, network: Network, settings: ClassifierSettings | None = None) -> None:
         self.settings = settings or ClassifierSettings()
         self._network = network
+        self._order = list(INPUT_ORDERS[self.settings.input_order])
         self.clear()
 
     def clear(self) -> None:
@@ -79,7 +80,8 @@ class FaultClassifier:
             self._smoothed = None
             self._enter(UNKNOWN, frame.stamp_ns)
             return
-        now = self._network.probabilities(np.array(frame.codes, dtype=np.float64))
+        codes = np.array(frame.codes, dtype=np.float64)
+        now = self._network.probabilities(codes[self._order])
         if self._smoothed is None or not elapsed:
             self._smoothed = now
         else:

@@ -1,6 +1,7 @@
 """The ten residuals of one tick, in the order of Wang 2024, Table 1."""
 
 import math
+from collections.abc import Mapping
 from typing import Literal
 
 from attrs import frozen
@@ -10,6 +11,13 @@ TOTAL = 0
 MOTORS = range(1, 4)
 SPEEDS = range(4, 7)
 ENCODERS = range(7, 10)
+
+# The residual that each input of the network is: as the rows of Table 1 mean it and the frame has
+# it, and as the text of section 4 lists it. docs/wang2024.md says which holds.
+INPUT_ORDERS: Mapping[str, tuple[int, ...]] = {
+    "speeds_first": (TOTAL, *MOTORS, *SPEEDS, *ENCODERS),
+    "powers_first": (TOTAL, *MOTORS, *ENCODERS, *SPEEDS),
+}
 
 Unit = Literal["W", "A", "rad/s"]
 UNITS: dict[str, Unit] = {"W": "W", "A": "A", "rad/s": "rad/s"}

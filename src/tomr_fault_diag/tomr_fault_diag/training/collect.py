@@ -13,7 +13,7 @@ from tqdm import tqdm
 from tomr_fault_diag.residuals.frame import RESIDUALS, ResidualFrame
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
-from tomr_fault_diag.training.drives import random_drive
+from tomr_fault_diag.training.drives import Drive, random_drive
 from tomr_fault_diag.training.labels import TOPIC, Truth, label_of, truth_of
 from tomr_power_model.messages.bag import bag_message
 from tomr_power_model.messages.inputs import TWIST_STAMPED, model_inputs
@@ -56,7 +56,19 @@ def collect(seeds: Iterable[int], title: str) -> Examples:
 
 def examples_of(seed: int) -> Examples:
     """Drive once; returns the ticks whose state can be told."""
-    chosen = random_drive(shipped_robot("reference"), seed)
+    return _labelled(watch(random_drive(shipped_robot("reference"), seed)))
+
+
+@frozen
+class Watched:
+    """A drive tick by tick: the residuals, and the truth at the time (None: not told yet)."""
+
+    frames: tuple[ResidualFrame, ...]
+    truths: tuple[Truth | None, ...]
+
+
+def watch(chosen: Drive) -> Watched:
+    """Run a drive through the simulator and the first two stages."""
     predictor = PowerPredictor(chosen.believed)
     stage = ResidualStage(chosen.believed)
     takers: dict[str, list[Callable[[Any, int], str | None]]] = {}
@@ -65,29 +77,30 @@ def examples_of(seed: int) -> Examples:
         *residual_inputs(chosen.believed, stage),
     ):
         takers.setdefault(item.topic, []).append(item.take)
-    simulation = start_mission(chosen.mission, chosen.plant, seed, _START_NS)
+    simulation = start_mission(chosen.mission, chosen.plant, chosen.seed, _START_NS)
     frames: list[ResidualFrame] = []
     truths: list[Truth] = []
-    for samples in drive(chosen.mission, simulation, seed):
+    for samples in drive(chosen.mission, simulation, chosen.seed):
         for sample in samples:
             if sample.topic == TOPIC:
                 truths.append(truth_of(build(sample.message, bag_message), sample.stamp_ns))
-            for take in takers.get(sample.topic, ()):
-                take(build(sample.message, bag_message), sample.stamp_ns)
+            if sample.topic in takers:
+                message = build(sample.message, bag_message)
+                for take in takers[sample.topic]:
+                    take(message, sample.stamp_ns)
             for prediction in predictor.due():
                 stage.prediction(prediction)
             frames.extend(stage.due())
-    return _labelled(frames, truths)
+    stamps = np.array([truth.stamp_ns for truth in truths])
+    places = np.searchsorted(stamps, [frame.stamp_ns for frame in frames], side="right") - 1
+    return Watched(tuple(frames), tuple(truths[place] if place >= 0 else None for place in places))
 
 
-def _labelled(frames: list[ResidualFrame], truths: list[Truth]) -> Examples:
+def _labelled(watched: Watched) -> Examples:
     codes: list[tuple[int, ...]] = []
     labels: list[int] = []
-    stamps = np.array([truth.stamp_ns for truth in truths])
     healthy_since = 0
-    for frame in frames:
-        place = int(np.searchsorted(stamps, frame.stamp_ns, side="right")) - 1
-        truth = truths[place] if place >= 0 else None
+    for frame, truth in zip(watched.frames, watched.truths, strict=True):
         if truth is not None and truth.fault is not None:
             healthy_since = frame.stamp_ns
         label = label_of(frame, truth, healthy_since)

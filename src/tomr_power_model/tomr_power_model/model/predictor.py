@@ -14,6 +14,7 @@ from tomr_power_model.model.encoders import (
     WheelEstimate,
 )
 from tomr_power_model.model.expected import ExpectedMotion
+from tomr_power_model.model.power_models import POWER_MODELS
 from tomr_power_model.model.prediction import Prediction, Readings
 from tomr_power_model.model.settings import ModelSettings
 from tomr_power_model.model.ticks import Arrival, TickClock
@@ -36,9 +37,12 @@ class PowerPredictor:
     def __init__(self, robot: Robot, settings: ModelSettings | None = None) -> None:
         self.settings = settings or ModelSettings()
         self._robot = robot
-        self._model = PhysicalModel.of(robot)
+        make = POWER_MODELS[self.settings.power_model].make
+        self._model = make(robot, self.settings.model_values)
+        # Which motion a command leads to is a matter of dynamics, whatever predicts the power.
+        self._dynamics = PhysicalModel.of(robot)
         self._clock = TickClock(self.settings.ticks)
-        self._expected = ExpectedMotion(robot, self._model, self.settings)
+        self._expected = ExpectedMotion(robot, self._dynamics, self.settings)
         self._encoders = EncoderWindow(
             self.settings.encoder_window, self.settings.ticks.period, self.settings.stale
         )
@@ -103,7 +107,7 @@ class PowerPredictor:
     def _bus_voltage(self, power: float) -> float:
         """Supply voltage under a load [V], sagging to first order."""
         nominal = self._robot.supply.nominal_voltage
-        drop = sum(effect.voltage_drop() for effect in self._model.effects)
+        drop = sum(effect.voltage_drop() for effect in self._dynamics.effects)
         return nominal - drop * power / nominal
 
     def _readings(self, drives: DrivePower | None) -> Readings:
@@ -136,7 +140,9 @@ class PowerPredictor:
             voltage = self._robot.supply.nominal_voltage
             power = float((drives.voltage[0] * drives.current[0]).sum())
             return SupplyReading.rounded(voltage, power / voltage)
-        power = float(drives.power[0].sum()) + self._robot.supply.auxiliary_power
+        other = drives.other
+        auxiliary = self._robot.supply.auxiliary_power if other is None else float(other[0])
+        power = float(drives.power[0].sum()) + auxiliary
         voltage = self._bus_voltage(power)
         return SupplyReading.rounded(voltage, power / voltage)
 
@@ -162,7 +168,8 @@ def _mean(drives: DrivePower, rows: slice) -> DrivePower:
     power_at_motor = mean(drives.voltage * drives.current)
     with np.errstate(divide="ignore", invalid="ignore"):
         voltage = np.where(current == 0.0, 0.0, power_at_motor / current)
-    return DrivePower(mean(drives.torque), current, voltage, mean(drives.power))
+    other = None if drives.other is None else mean(drives.other)
+    return DrivePower(mean(drives.torque), current, voltage, mean(drives.power), other)
 
 
 def _triple(values: Sequence[float] | Array) -> Triple:

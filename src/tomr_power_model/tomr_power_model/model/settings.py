@@ -5,6 +5,7 @@ from typing import Self, cast
 
 from attrs import field, frozen
 
+from tomr_power_model.model.power_models import POWER_MODELS, own_parameters
 from tomr_power_model.model.ticks import TickSettings, to_ns
 from tomr_power_model.robot.parameters import ParameterSpec
 
@@ -29,6 +30,14 @@ MODEL_PARAMETERS: tuple[ParameterSpec, ...] = (
         60.0,
     ),
     _S("use_imu", "take the yaw rate from imu/data", "bool", False),
+    _S(
+        "power_model",
+        "what predicts power from motion",
+        "str",
+        "physical",
+        choices=tuple(POWER_MODELS),
+    ),
+    *own_parameters(),
 )
 
 
@@ -55,6 +64,8 @@ class ModelSettings:
     encoder_window: int = to_ns(0.07)
     command_timeout: int = 0
     use_imu: bool = False
+    power_model: str = "physical"
+    model_values: Mapping[str, object] = field(factory=dict)  # of the models' own parameters
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:
@@ -65,4 +76,6 @@ class ModelSettings:
             encoder_window=to_ns(cast(float, values["encoder_window"])),
             command_timeout=to_ns(cast(float, values["command_timeout"])),
             use_imu=bool(values["use_imu"]),
+            power_model=str(values["power_model"]),
+            model_values={spec.name: values[spec.name] for spec in own_parameters()},
         )

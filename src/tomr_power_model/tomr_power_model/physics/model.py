@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 _STICKING_SPEED = 0.1
 # As above for the sliding of a contact along its axle [m/s].
 STICKING_SLIDE = 0.005
+_NO_SLIDE = 1e-12  # keeps the direction of no sliding defined
 
 
 @frozen
@@ -30,12 +31,14 @@ class WheelMotion:
 
 @frozen
 class DrivePower:
-    """What the drives deliver and draw; all arrays of shape (n, 3)."""
+    """What the drives deliver and draw; arrays of shape (n, 3)."""
 
     torque: Array  # of the motor, at the wheel [N m]
     current: Array  # motor current [A]
     voltage: Array  # at the motor terminals [V]
     power: Array  # drawn from the supply, negative when it returns [W]
+    # Of computer and sensors [W], (n,); None: supply.auxiliary_power of the description.
+    other: Array | None = None
 
 
 class PowerModel(Protocol):
@@ -97,7 +100,7 @@ class PhysicalModel:
             seen = ~np.isnan(motion.yaw_rate)
             twist[seen, 2] = motion.yaw_rate[seen]
         force = motion.acceleration @ (body.mass_matrix @ body.to_twist).T
-        force = force + body.turning_force(twist) + self._drag(twist)
+        force = force + body.turning_force(twist) + self._drag(twist, motion.speed)
         carried = force @ body.from_force.T + motion.acceleration * body.wheel_inertia
         return carried + self.friction(motion.speed, carried)
 
@@ -119,14 +122,20 @@ class PhysicalModel:
         normal = self.body.normal
         return np.asarray(sum((e.axle_drag(normal) for e in self.effects), np.zeros(3)))
 
-    def _drag(self, twist: Array) -> Array:
+    def rolling_slip(self) -> Array:
+        """Sliding of each contact in its rolling direction per wheel speed [m], shape (3,)."""
+        return self.wheel_radius * sum((e.axle_slip() for e in self.effects), np.zeros(3))
+
+    def _drag(self, twist: Array, speed: Array) -> Array:
         """Body force against the contacts' sliding along their axles [N, N, N m], (n, 3)."""
         body = self.body
         limit = self.axle_limit()
         force = np.zeros_like(twist)
         if np.any(limit):
             along = twist[..., :2] @ body.axles.T
-            force[..., :2] = (limit * np.tanh(along / STICKING_SLIDE)) @ body.axles
+            sliding = np.maximum(np.hypot(along, self.rolling_slip() * speed), _NO_SLIDE)
+            share = np.tanh(sliding / STICKING_SLIDE) * along / sliding
+            force[..., :2] = (limit * share) @ body.axles
         return force
 
     def _drawn(self, power: Array, current: Array) -> Array:

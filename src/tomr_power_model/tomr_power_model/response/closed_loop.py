@@ -80,6 +80,7 @@ class ClosedLoop:
     dry: Triple  # limits of dry friction where they do not change [N m]
     varying: bool  # whether they do
     axle_drag: tuple[float, ...]  # limits [N], empty if there is none
+    rolling_slip: tuple[float, ...]  # of the contacts, per wheel speed [m]
     axles: tuple[tuple[float, float], ...]
     model: PhysicalModel = field(repr=False)
 
@@ -111,6 +112,7 @@ class ClosedLoop:
             dry=_triple(model.resistance_at(np.zeros(3), np.zeros(3))[0]),
             varying=any(effect.varies for effect in model.effects),
             axle_drag=tuple(drag) if any(drag) else (),
+            rolling_slip=tuple(model.rolling_slip().tolist()) if any(drag) else (),
             axles=tuple((float(x), float(y)) for x, y in model.body.axles) if any(drag) else (),
             model=model,
         )
@@ -177,10 +179,14 @@ class ClosedLoop:
                 mass * wz * (vx - wz * y),
                 mass * wz * (x * vx + y * vy),
             ]
-        for limit, (ax, ay) in zip(self.axle_drag, self.axles, strict=True):
-            drag = limit * math.tanh((ax * vx + ay * vy) / STICKING_SLIDE)
-            force[0] += drag * ax
-            force[1] += drag * ay
+        for i, limit in enumerate(self.axle_drag):
+            ax, ay = self.axles[i]
+            along = ax * vx + ay * vy
+            sliding = math.hypot(along, self.rolling_slip[i] * speed[i])
+            if sliding > 0.0:
+                drag = limit * math.tanh(sliding / STICKING_SLIDE) * along / sliding
+                force[0] += drag * ax
+                force[1] += drag * ay
         body = _triple(force)
         rows = self.from_force
         return _dot(rows[0], body), _dot(rows[1], body), _dot(rows[2], body)

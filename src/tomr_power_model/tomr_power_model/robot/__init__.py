@@ -13,7 +13,9 @@ from tomr_power_model.robot.description import (
 )
 from tomr_power_model.robot.files import (
     load_robot,
+    read_description,
     read_node_sections,
+    read_sections,
     shipped_robot,
     shipped_robots,
 )
@@ -28,7 +30,9 @@ __all__ = [
     "Sensors",
     "Supply",
     "load_robot",
+    "read_description",
     "read_node_sections",
+    "read_sections",
     "robot_from_parameters",
     "shipped_robot",
     "shipped_robots",

@@ -113,7 +113,9 @@ class Robot:
     def everywhere(self, effect_id: str, key: str, absent: float = 0.0) -> tuple[float, ...]:
         """One parameter of an effect at the three wheels, `absent` where it is left out."""
         settings = (self.effect(effect_id, wheel) for wheel in range(WHEELS))
-        return tuple(absent if setting is None else setting[key] for setting in settings)
+        return tuple(
+            absent if setting is None else setting.get(key, absent) for setting in settings
+        )
 
 
 def robot_from_parameters(values: Mapping[str, object], place: str) -> Robot:
@@ -250,8 +252,10 @@ def _complete(
 ) -> Parameters | None:
     if shared is None and own is None:
         return None
-    merged = {**(shared or {}), **(own or {})}
-    missing = [key for key in EFFECTS[effect_id].parameters if key not in merged]
+    known = EFFECTS[effect_id].parameters
+    defaults = {key: item.default for key, item in known.items() if item.default is not None}
+    merged = {**defaults, **(shared or {}), **(own or {})}
+    missing = [key for key in known if key not in merged]
     if missing:
         raise InputError(f"{place}: physics.{effect_id}.{missing[0]} is missing: add it")
     return MappingProxyType(merged)

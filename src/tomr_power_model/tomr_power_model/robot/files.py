@@ -11,6 +11,9 @@ from tomr_power_model.errors import InputError
 from tomr_power_model.robot.description import Robot, robot_from_parameters
 
 EVERY_NODE = "/**"
+# Section in which tomr_calibrate keeps which robot its values were fitted to.
+CALIBRATION = "tomr_calibrate"
+IDENTITY = "identity."
 
 
 def load_robot(source: Path | str) -> Robot:
@@ -19,15 +22,39 @@ def load_robot(source: Path | str) -> Robot:
     It stands in the `/**` section; sections of single nodes are theirs and not looked at.
     Raises InputError with one line that names the file, the key and the remedy.
     """
-    section = _sections(source).get(EVERY_NODE)
+    return robot_from_parameters(read_description(source), str(source))
+
+
+def read_description(source: Path | str) -> dict[str, object]:
+    """Flat parameters of the `/**` section, e.g. {"robot.mass": 15.0}, not checked.
+
+    Raises InputError as `load_robot` does where the file cannot be read, has no such section, or
+    holds values fitted to another robot.
+    """
+    sections = read_sections(source)
+    section = sections.get(EVERY_NODE)
     if not section:
         raise InputError(f"{source}: no `/**: ros__parameters:` section: see robots/reference.yaml")
-    return robot_from_parameters(section, str(source))
+    check_identity(sections.get(CALIBRATION, {}), section, str(source))
+    return dict(section)
+
+
+def check_identity(
+    calibration: Mapping[str, object], described: Mapping[str, object], place: str
+) -> None:
+    """Raise InputError if values were fitted to another robot than the one described."""
+    for name, fitted in calibration.items():
+        key = name.removeprefix(IDENTITY)
+        if key != name and described.get(key) != fitted:
+            raise InputError(
+                f"{place}: its values were fitted to a robot with {key} = {fitted}, not "
+                f"{described.get(key)}: take that robot's own file, or fit again"
+            )
 
 
 def read_node_sections(source: Path | str, nodes: Iterable[str]) -> dict[str, object]:
     """Flat parameters that a description gives to some nodes in their own sections, merged."""
-    sections = _sections(source)
+    sections = read_sections(source)
     merged: dict[str, object] = {}
     for node in nodes:
         merged.update(sections.get(node) or sections.get(f"/{node}") or {})
@@ -51,8 +78,8 @@ def shipped_robot(name: str) -> Robot:
     return load_robot(name)
 
 
-def _sections(source: Path | str) -> dict[str, dict[str, object]]:
-    """Flat dotted parameters of each section of a ROS 2 parameter file."""
+def read_sections(source: Path | str) -> dict[str, dict[str, object]]:
+    """Flat dotted parameters of each section of a ROS 2 parameter file, not checked."""
     document = _document(_text(source), str(source))
     if not isinstance(document, Mapping):
         return {}

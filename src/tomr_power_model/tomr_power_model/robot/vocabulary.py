@@ -22,6 +22,7 @@ class EffectParameter:
     minimum: float = 0.0
     maximum: float = math.inf
     above: float = -math.inf
+    default: float | None = None  # None: must be given
 
 
 @frozen
@@ -51,7 +52,10 @@ EFFECTS: Mapping[str, Effect] = MappingProxyType(
         "drivetrain.torque_ripple": _effect(
             "wheel", torque=_ANY("N m"), order=_ANY("1/rev", above=0.0), phase=_ANY("rad", _FREE)
         ),
-        "contact.roller_drag": _effect("wheel", coefficient=_ANY("")),
+        # Beyond the contract: `slip`, see `physics.effects.friction.RollerDrag`.
+        "contact.roller_drag": _effect(
+            "wheel", coefficient=_ANY(""), slip=_ANY("", maximum=10.0, default=0.0)
+        ),
         "contact.rolling_resistance": _effect("wheel", coefficient=_ANY("")),
         "contact.slip": _effect("wheel", friction=_ANY("", above=0.0)),
         "body.payload_mass": _effect("body", mass=_ANY("kg", _FREE)),

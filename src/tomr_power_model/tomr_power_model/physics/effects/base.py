@@ -56,6 +56,10 @@ class Effect:
         """Force against the contact's sliding along the axle [N], >= 0, shape (n, 3)."""
         return 0.0
 
+    def axle_slip(self) -> Array | float:
+        """Sliding of the contact in the direction of rolling, per rolling speed [-]."""
+        return 0.0
+
     def driver_power(self, current: Array) -> Array | float:
         """Power lost in the driver on top of the motor's [W], from motor current [A]."""
         return 0.0

@@ -97,12 +97,25 @@ class RollingResistance(Effect):
 @effect("contact.roller_drag")
 @frozen
 class RollerDrag(Effect):
-    """A force coefficient * N_i against the sliding of wheel i's contact along its axle."""
+    """A force coefficient * N_i against the sliding of wheel i's contact.
+
+    With slip 0 the contact slides along its axle only: the contract's effect. A wheel that turns
+    faster than it travels slides in its rolling direction too; `slip` is (r omega - v) / v with
+    the travel v. Dry friction points against the whole sliding, so that along the axle acts
+
+        coefficient N_i u / sqrt(u^2 + (slip r omega)^2)
+
+    with u the sliding along the axle [m/s] as the wheels tell it; the rest is part of traction.
+    """
 
     coefficient: Array
+    slip: Array
 
     def axle_drag(self, normal: Array) -> Array:
         return np.asarray(self.coefficient * normal)
+
+    def axle_slip(self) -> Array:
+        return self.slip
 
 
 @effect("electrical.iron_loss")
