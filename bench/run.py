@@ -44,9 +44,9 @@ class Plan:
     cpu_s: float = 20.0
     cpu_rounds: int = 3
     warmup_s: float = 3.0
-    latency_s: float = 40.0
+    latency_s: float = 30.0
     offline_s: float = 600.0
-    offline_rounds: int = 3
+    offline_rounds: int = 2
 
 
 QUICK = Plan(4.0, 1, 1.0, 5.0, 60.0, 1)

@@ -1,6 +1,7 @@
 """The classifier stage: residual frames in, diagnoses out at 1 Hz and at once on a change."""
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from attrs import frozen
@@ -36,8 +37,11 @@ class FaultClassifier:
 
     def __init__(self, network: Network, settings: ClassifierSettings | None = None) -> None:
         self.settings = settings or ClassifierSettings()
-        self._network = network
-        self._order = list(INPUT_ORDERS[self.settings.input_order])
+        order = list(INPUT_ORDERS[self.settings.input_order])
+        # Few of the 3^10 inputs occur, and most of them again and again.
+        self._answer = lru_cache(maxsize=4096)(
+            lambda codes: network.probabilities(np.array(codes, dtype=np.float64)[order])
+        )
         self.clear()
 
     def clear(self) -> None:
@@ -80,8 +84,7 @@ class FaultClassifier:
             self._smoothed = None
             self._enter(UNKNOWN, frame.stamp_ns)
             return
-        codes = np.array(frame.codes, dtype=np.float64)
-        now = self._network.probabilities(codes[self._order])
+        now = self._answer(frame.codes)
         if self._smoothed is None or not elapsed:
             self._smoothed = now
         else:

@@ -84,7 +84,9 @@ def _run(recording: Recording, pipeline: Pipeline, arguments: argparse.Namespace
         for receive_ns, step in diagnose(recording, pipeline, arguments.namespace):
             if not step.frames and not step.predictions:
                 continue
-            bar.update(max(0, (receive_ns - recording.start_ns) // NANOSECONDS - bar.n))
+            done = (receive_ns - recording.start_ns) // NANOSECONDS
+            if done > bar.n:
+                bar.update(done - bar.n)
             for diagnosis in step.diagnoses:
                 summariser.diagnosis(diagnosis, evidence_of(pipeline.robot, diagnosis))
             for frame in step.frames:

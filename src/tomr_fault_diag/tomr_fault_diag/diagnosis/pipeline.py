@@ -18,6 +18,7 @@ from tomr_fault_diag.residuals.messages import residual_message
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.messages.inputs import TWIST_STAMPED, Complaints, Input, model_inputs
+from tomr_power_model.messages.intake import WheelFinder
 from tomr_power_model.messages.outgoing import Outgoing
 from tomr_power_model.messages.predictions import prediction_messages
 from tomr_power_model.model.prediction import Prediction
@@ -49,9 +50,10 @@ class Pipeline:
         self._predictor = PowerPredictor(robot, settings.model)
         self._residuals = ResidualStage(robot, settings.residuals)
         self._classifier = FaultClassifier(Network.load(settings.weights), settings.classifier)
+        wheels = WheelFinder(robot.wheel_names)
         self.inputs: tuple[Input, ...] = (
-            *model_inputs(robot, self._predictor, TWIST_STAMPED),
-            *residual_inputs(robot, self._residuals),
+            *model_inputs(robot, self._predictor, TWIST_STAMPED, wheels),
+            *residual_inputs(robot, self._residuals, wheels),
         )
         self._takers: dict[str, list[Take]] = {}
         for item in self.inputs:
@@ -59,9 +61,12 @@ class Pipeline:
 
     def take(self, topic: str, message: Any, receive_ns: int) -> Step:
         """Take a message of one of the inputs' topics (relative names, as in the contract)."""
-        problems = {take(message, receive_ns) for take in self._takers[topic]}
-        for problem in problems - {None}:
-            self.complaints.note(topic, str(problem))
+        heard = None
+        for take in self._takers[topic]:
+            problem = take(message, receive_ns)
+            if problem is not None and problem != heard:  # two stages may say the same
+                self.complaints.note(topic, problem)
+            heard = problem
         predictions = self._predictor.due()
         for prediction in predictions:
             self._residuals.prediction(prediction)

@@ -45,7 +45,8 @@ class Summariser:
     def frame(self, frame: ResidualFrame) -> None:
         """Count a tick; its diagnosis, if there is one, comes before it."""
         for index, residual in enumerate(frame.residuals):
-            self._stale[index] += residual.stale
+            if residual.stale:
+                self._stale[index] += 1
         if self._spells:
             last = self._spells[-1]
             self._counts[last.state] += 1

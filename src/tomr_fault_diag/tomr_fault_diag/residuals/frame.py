@@ -1,6 +1,5 @@
 """The ten residuals of one tick, in the order of Wang 2024, Table 1."""
 
-import math
 from collections.abc import Mapping
 from typing import Literal
 
@@ -40,14 +39,13 @@ class Residual:
 
     @property
     def stale(self) -> bool:
-        return math.isnan(self.residual) or math.isnan(self.band)
+        return self.residual != self.residual or self.band != self.band  # NaN
 
     @property
     def code(self) -> int:
         """-1, 0 or 1: below, within or above the band; 0 where the residual is unknown."""
-        if self.stale or abs(self.residual) <= self.band:
-            return 0
-        return 1 if self.residual > 0 else -1
+        # No comparison holds with NaN, thus an unknown residual is 0.
+        return int(self.residual > self.band) - int(-self.residual > self.band)
 
 
 @frozen

@@ -49,7 +49,7 @@ class SupplyWindow:
             inside = [s for s in samples if tick_ns - self._stale < s[0] <= tick_ns][-1:]
         if not inside:
             return Measured(NAN, "W")
-        powers = [power for _, power, _ in inside if not math.isnan(power)]
+        powers = [s[1] for s in inside if s[1] == s[1]]  # not NaN
         if powers:
             return Measured(sum(powers) / len(powers), "W")
         currents = [current for _, _, current in inside if not math.isnan(current)]

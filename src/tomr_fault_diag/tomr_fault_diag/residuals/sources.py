@@ -95,7 +95,9 @@ def total_only(robot: Robot, stage: ResidualStage) -> tuple[Input, ...]:
     return ()
 
 
-def residual_inputs(robot: Robot, stage: ResidualStage) -> tuple[Input, ...]:
+def residual_inputs(
+    robot: Robot, stage: ResidualStage, wheels: WheelFinder | None = None
+) -> tuple[Input, ...]:
     """Measured inputs of the residual stage, besides the predictions."""
 
     def supply(message: Any, receive_ns: int) -> Arrival:
@@ -103,7 +105,7 @@ def residual_inputs(robot: Robot, stage: ResidualStage) -> tuple[Input, ...]:
 
     inputs = list(SOURCES[robot.measurement.source](robot, stage))
     if not any(item.topic == "joint_states" for item in inputs):
-        taker = encoder_taker(robot, stage.encoders)
+        taker = encoder_taker(robot, stage.encoders, wheels)
         inputs.append(Input("joint_states", JOINT_STATE, guarded(taker)))
     if robot.measurement.total == "battery_state":
         inputs.append(Input("battery_state", BATTERY, guarded(supply)))

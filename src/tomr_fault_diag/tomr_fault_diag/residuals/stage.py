@@ -2,11 +2,12 @@
 
 import math
 from collections import deque
+from typing import Self
 
-from attrs import evolve
+from attrs import evolve, frozen
 
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame, Unit, rounded
-from tomr_fault_diag.residuals.measured import Measured, SupplyWindow, modelled, modelled_sum
+from tomr_fault_diag.residuals.measured import Measured, SupplyWindow
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_power_model.messages.readings import NAN, UNKNOWN_READING
 from tomr_power_model.model.encoders import UNKNOWN, EncoderSample, EncoderWindow, Triple
@@ -23,6 +24,24 @@ TOTAL_SUPPLY = "battery_state"
 _TRANSIENT_TICKS = 3
 
 _UNKNOWN_READINGS = (UNKNOWN_READING, UNKNOWN_READING, UNKNOWN_READING)
+
+
+@frozen
+class _Modelled:
+    """What is compared of a prediction: of motors 1-3, of the total, of motors from encoders."""
+
+    speed: Triple  # rad/s
+    power: tuple[float, ...]  # W
+    drawn: tuple[float, ...]  # A
+
+    @classmethod
+    def of(cls, prediction: Prediction) -> Self:
+        readings = (*prediction.motors, prediction.total, *prediction.from_encoders)
+        power = tuple([reading.power for reading in readings])
+        return cls(prediction.speed, power, tuple([r.drawn_current for r in readings]))
+
+    def of_unit(self, unit: Unit) -> tuple[float, ...]:
+        return self.power if unit == "W" else self.drawn
 
 
 def _no_prediction(stamp_ns: int) -> Prediction:
@@ -49,7 +68,7 @@ class ResidualStage:
             self.settings.encoder_window, ticks.period, self.settings.stale
         )
         self._predictions: dict[int, Prediction] = {}
-        self._recent: deque[Prediction] = deque(maxlen=_TRANSIENT_TICKS)
+        self._recent: deque[_Modelled] = deque(maxlen=_TRANSIENT_TICKS)
 
     def retune(self, bands: BandSettings) -> None:
         """Change the bands while running."""
@@ -102,7 +121,7 @@ class ResidualStage:
             del self._predictions[stamp]
         known = self._predictions.pop(tick, None)
         prediction = known or _no_prediction(tick)
-        self._recent.append(prediction)
+        self._recent.append(_Modelled.of(prediction))
         motors = [window.at(tick) for window in self._motors]
         absent = "" if known else "no prediction: is the power_model node running?"
         return ResidualFrame(
@@ -110,7 +129,7 @@ class ResidualStage:
             (
                 self._total(tick, motors, absent),
                 *(self._motor(wheel, motors[wheel], absent) for wheel in range(WHEELS)),
-                *self._speeds(tick, prediction, absent),
+                *self._speeds(tick, absent),
                 *(self._derived(wheel, motors[wheel], absent) for wheel in range(WHEELS)),
             ),
         )
@@ -122,36 +141,36 @@ class ResidualStage:
             units = {motor.unit for motor in motors}
             unit = units.pop() if len(units) == 1 else "W"
             value = math.fsum(motor.value for motor in motors) if not units else NAN
-            models = [modelled_sum(past.motors, unit) for past in self._recent]
+            models = [math.fsum(past.of_unit(unit)[:WHEELS]) for past in self._recent]
             missing = "no fresh power of every motor"
         else:
             value = self._supply.at(tick).value if source == "battery_state" else NAN
-            models = [past.total.power for past in self._recent]
+            models = [past.power[WHEELS] for past in self._recent]
             missing = "no fresh battery_state"
         least = self._least(unit) * self.settings.bands.total_factor
         return self._residual(value, models, unit, least, missing, absent)
 
     def _motor(self, wheel: int, measured: Measured, absent: str) -> Residual:
-        models = [modelled(past.motors[wheel], measured.unit) for past in self._recent]
+        models = [past.of_unit(measured.unit)[wheel] for past in self._recent]
         missing = f"no fresh {self._topics[wheel]}/power"
         least = self._least(measured.unit)
         return self._residual(measured.value, models, measured.unit, least, missing, absent)
 
     def _derived(self, wheel: int, measured: Measured, absent: str) -> Residual:
-        models = [modelled(past.from_encoders[wheel], measured.unit) for past in self._recent]
+        models = [past.of_unit(measured.unit)[WHEELS + 1 + wheel] for past in self._recent]
         missing = f"no fresh {self._topics[wheel]}/power"
         least = self._least(measured.unit)
         return self._residual(
             measured.value, models, measured.unit, least, missing, absent, "joint_states"
         )
 
-    def _speeds(self, tick: int, prediction: Prediction, absent: str) -> list[Residual]:
-        measured = self._encoders.at(tick).speed
+    def _speeds(self, tick: int, absent: str) -> list[Residual]:
+        measured = self._encoders.at(tick).speed.tolist()
         bands = self.settings.bands
         speeds = []
-        for wheel in range(WHEELS):
+        for wheel, value in enumerate(measured):
             models = [past.speed[wheel] for past in self._recent]
-            model, value = models[-1], float(measured[wheel])
+            model = models[-1]
             # Against the set direction: "slower than told" is negative whichever way it turns.
             sign = -1.0 if model < 0.0 else 1.0
             spread = bands.transient * _spread(models)
@@ -186,8 +205,9 @@ class ResidualStage:
 
 def _spread(models: list[float]) -> float:
     """How far the model moved lately; 0 where it is not known."""
-    known = [model for model in models if not math.isnan(model)]
-    return max(known) - min(known) if known else 0.0
+    if math.isnan(sum(models)):
+        models = [model for model in models if not math.isnan(model)]
+    return max(models) - min(models) if models else 0.0
 
 
 def _missing(

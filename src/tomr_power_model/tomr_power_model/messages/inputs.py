@@ -65,8 +65,10 @@ def complaint(arrival: Arrival | str | None) -> str | None:
     return f"the stamp {arrival.value}; the message is ignored"
 
 
-def model_inputs(robot: Robot, predictor: PowerPredictor, twist_type: str) -> tuple[Input, ...]:
-    """Inputs of the model stage."""
+def model_inputs(
+    robot: Robot, predictor: PowerPredictor, twist_type: str, wheels: WheelFinder | None = None
+) -> tuple[Input, ...]:
+    """Inputs of the model stage; `wheels` may be shared with another stage."""
 
     def command(message: Any, receive_ns: int) -> Arrival:
         return predictor.command(stamp_of(message, receive_ns, fallback=True), twist_of(message))
@@ -74,9 +76,10 @@ def model_inputs(robot: Robot, predictor: PowerPredictor, twist_type: str) -> tu
     def imu(message: Any, receive_ns: int) -> Arrival:
         return predictor.imu(stamp_of(message, receive_ns), yaw_rate_of(message))
 
+    encoders = encoder_taker(robot, predictor.encoders, wheels)
     inputs = [
         Input("cmd_vel", twist_type, guarded(command), (TWIST, TWIST_STAMPED)),
-        Input("joint_states", JOINT_STATE, guarded(encoder_taker(robot, predictor.encoders))),
+        Input("joint_states", JOINT_STATE, guarded(encoders)),
     ]
     if predictor.settings.use_imu:
         inputs.append(Input("imu/data", IMU, guarded(imu)))
@@ -84,10 +87,12 @@ def model_inputs(robot: Robot, predictor: PowerPredictor, twist_type: str) -> tu
 
 
 def encoder_taker(
-    robot: Robot, take: Callable[[int, Triple, Triple], Arrival]
+    robot: Robot,
+    take: Callable[[int, Triple, Triple], Arrival],
+    shared: WheelFinder | None = None,
 ) -> Callable[[Any, int], Arrival | str]:
     """Reads the wheels out of joint_states for a stage's `encoders`; tells of missing wheels."""
-    wheels = WheelFinder(robot.wheel_names)
+    wheels = shared or WheelFinder(robot.wheel_names)
 
     def encoders(message: Any, receive_ns: int) -> Arrival | str:
         found = wheels.read(message)

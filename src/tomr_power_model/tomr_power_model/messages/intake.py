@@ -13,6 +13,7 @@ from tomr_power_model.recordings.reader import header_stamp_ns
 
 Triple = tuple[float, float, float]
 NAN = float("nan")
+_UNKNOWN = (NAN, NAN, NAN)
 
 
 class Unusable(ValueError):
@@ -63,42 +64,54 @@ class WheelFinder:
         self._wheels = wheel_names
         self._names: Sequence[str] = ()
         self._places: tuple[int | None, ...] = ()
+        self._missing: tuple[str, ...] = wheel_names
+        self._last: Any = None
+        self._found = Wheels(_UNKNOWN, _UNKNOWN, _UNKNOWN)
 
     def read(self, message: Any) -> Wheels:
         """Wheels of a message; raises Unusable if none is there or the lengths disagree."""
+        if message is self._last:  # two stages read the same
+            return self._found
         names = message.name
         if names != self._names:
             self._find(list(names))
-        if not any(place is not None for place in self._places):
+        if len(self._missing) == len(self._wheels):
             found = ", ".join(names) or "no joint"
             raise Unusable(f"none of {', '.join(self._wheels)} is there, but {found}")
         count = len(names)
-        return Wheels(
+        self._found = Wheels(
             self._pick(message.position, count, "position"),
             self._pick(message.velocity, count, "velocity"),
             self._pick(message.effort, count, "effort"),
         )
+        self._last = message
+        return self._found
 
     def missing(self) -> tuple[str, ...]:
         """Wheels that the last message did not have."""
-        pairs = zip(self._wheels, self._places, strict=False)
-        return tuple(name for name, place in pairs if place is None)
+        return self._missing
 
     def _find(self, names: list[str]) -> None:
         self._names = names
         self._places = tuple(
             names.index(wheel) if wheel in names else None for wheel in self._wheels
         )
+        self._missing = tuple(wheel for wheel in self._wheels if wheel not in names)
 
     def _pick(self, values: Sequence[float], count: int, field: str) -> Triple:
         if len(values) == 0:
-            return NAN, NAN, NAN
+            return _UNKNOWN
         if len(values) != count:
             raise Unusable(f"{count} names but {len(values)} values in {field}")
-        first, second, third = (
-            NAN if place is None else _finite(values[place]) for place in self._places
-        )
-        return first, second, third
+        # Items of an array one by one are slow, and this is done for every message.
+        plain = values.tolist() if hasattr(values, "tolist") else values
+        a, b, c = self._places
+        first = NAN if a is None else plain[a]
+        second = NAN if b is None else plain[b]
+        third = NAN if c is None else plain[c]
+        if math.isfinite(first + second + third):
+            return first, second, third
+        return _finite(first), _finite(second), _finite(third)
 
 
 def _finite(value: float) -> float:

@@ -2,6 +2,8 @@
 
 from collections import deque
 from collections.abc import Sequence
+from functools import lru_cache
+from itertools import compress
 
 import numpy as np
 from attrs import frozen
@@ -56,25 +58,32 @@ class EncoderWindow:
         if len(samples) < 2:
             return WheelEstimate(np.full(3, np.nan), np.full(3, np.nan))
         middle = tick_ns - self._period // 2
-        seconds = np.array([1e-9 * (sample.stamp_ns - middle) for sample in samples])
+        times = tuple(sample.stamp_ns - middle for sample in samples)
         positions = np.array([sample.position for sample in samples])
         if len(samples) > 2 and not np.isnan(positions).any():
-            return _from_positions(seconds, positions)
-        return self._mixed(samples, seconds, positions)
+            return _from_positions(times, positions)
+        return self._mixed(samples, times, positions)
 
     def _until(self, tick_ns: int) -> list[EncoderSample]:
         """Samples of the window, and the two newest where encoders are slower than it."""
         oldest = tick_ns - self._span
         while len(self._samples) > 2 and self._samples[1].stamp_ns <= tick_ns - self._stale:
             self._samples.popleft()
-        known = [sample for sample in self._samples if sample.stamp_ns <= tick_ns]
-        if not known or known[-1].stamp_ns <= tick_ns - self._stale:
+        window: list[EncoderSample] = []
+        for sample in reversed(self._samples):
+            if len(window) > 2 and sample.stamp_ns <= oldest:
+                break
+            if sample.stamp_ns <= tick_ns:
+                window.append(sample)
+        if not window or window[0].stamp_ns <= tick_ns - self._stale:
             return []
-        window = [sample for sample in known if sample.stamp_ns > oldest]
-        return window if len(window) > 2 else known[-3:]
+        window.reverse()
+        return window
 
     @staticmethod
-    def _mixed(samples: Sequence[EncoderSample], seconds: Array, positions: Array) -> WheelEstimate:
+    def _mixed(
+        samples: Sequence[EncoderSample], times: tuple[int, ...], positions: Array
+    ) -> WheelEstimate:
         """Wheel by wheel, from what each one has."""
         velocities = np.array([sample.velocity for sample in samples])
         speed, acceleration = np.full(3, np.nan), np.full(3, np.nan)
@@ -82,27 +91,37 @@ class EncoderWindow:
             seen = ~np.isnan(positions[:, wheel])
             timed = ~np.isnan(velocities[:, wheel])
             if np.count_nonzero(seen) > 2:
-                fit = _from_positions(seconds[seen], positions[seen][:, [wheel]])
+                fit = _from_positions(_chosen(times, seen), positions[seen][:, [wheel]])
                 speed[wheel], acceleration[wheel] = fit.speed[0], fit.acceleration[0]
             elif np.count_nonzero(timed) > 1:
-                line = _fit(seconds[timed], velocities[timed][:, [wheel]], 1)
+                line = _weights(_chosen(times, timed), 1) @ velocities[timed][:, [wheel]]
                 speed[wheel], acceleration[wheel] = line[0, 0], line[1, 0]
         return WheelEstimate(speed, acceleration)
 
 
-def _from_positions(seconds: Array, positions: Array) -> WheelEstimate:
-    shape = _fit(seconds, positions - positions[0], 2)
+def _chosen(times: tuple[int, ...], which: NDArray[np.bool_]) -> tuple[int, ...]:
+    return tuple(compress(times, which))
+
+
+def _from_positions(times: tuple[int, ...], positions: Array) -> WheelEstimate:
+    shape = _weights(times, 2) @ (positions - positions[0])
     return WheelEstimate(shape[1], 2.0 * shape[2])
 
 
-def _fit(seconds: Array, values: Array, degree: int) -> Array:
-    """Coefficients of the least-squares polynomial, lowest power first, (degree + 1, n)."""
+@lru_cache(maxsize=64)
+def _weights(times: tuple[int, ...], degree: int) -> Array:
+    """What takes values at some times [ns] to the coefficients of the least-squares polynomial.
+
+    Lowest power first, in seconds; (degree + 1, n). Stamps that do not jitter fall on the same
+    few patterns again and again.
+    """
+    seconds = 1e-9 * np.array(times)
     # Times in units of the window keep the normal equations well conditioned.
     unit = np.abs(seconds).max()
     exponents = np.arange(degree + 1)
     powers = (seconds[:, None] / unit) ** exponents
     try:
-        scaled = np.linalg.solve(powers.T @ powers, powers.T @ values)
+        scaled = np.linalg.solve(powers.T @ powers, powers.T)
     except np.linalg.LinAlgError:  # stamps too close together to tell a speed
-        scaled = np.full((degree + 1, values.shape[1]), np.nan)
+        scaled = np.full((degree + 1, len(times)), np.nan)
     return np.asarray(scaled / unit ** exponents[:, None])

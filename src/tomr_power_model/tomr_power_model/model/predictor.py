@@ -1,8 +1,11 @@
 """The model stage: commands and encoders in, one prediction per tick out."""
 
+import math
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
+from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.messages.readings import UNKNOWN_READING, SupplyReading
@@ -19,13 +22,15 @@ from tomr_power_model.model.prediction import Prediction, Readings
 from tomr_power_model.model.settings import ModelSettings
 from tomr_power_model.model.ticks import Arrival, TickClock
 from tomr_power_model.physics.model import DrivePower, PhysicalModel, WheelMotion
-from tomr_power_model.robot import WHEELS, Robot
+from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
 
 COMMANDS = "cmd_vel"
 ENCODERS = "joint_states"
 IMU = "imu/data"
+
+_UNKNOWN: Readings = (UNKNOWN_READING, UNKNOWN_READING, UNKNOWN_READING)
 
 
 class PowerPredictor:
@@ -47,6 +52,8 @@ class PowerPredictor:
             self.settings.encoder_window, self.settings.ticks.period, self.settings.stale
         )
         self._gyro: tuple[int, float] | None = None
+        self._reads_motor = robot.measurement.quantity == "motor_current"
+        self._drop = sum(effect.voltage_drop() for effect in self._dynamics.effects)
 
     def command(self, stamp_ns: int, twist: Triple) -> Arrival:
         """Take a commanded twist (v_x, v_y [m/s], omega_z [rad/s]) in base_link."""
@@ -85,13 +92,16 @@ class PowerPredictor:
         estimate = self._encoders.at(tick)
         motion = self._expected.over(tick, estimate.speed)
         drives = self._model.power(_stacked(motion, estimate, self._yaw_rate(tick)))
-        commanded = _mean(drives, slice(0, -1)) if motion is not None else None
-        measured = _mean(drives, slice(-1, None))
-        speed = UNKNOWN if motion is None else _triple(motion.speed.mean(axis=0))
+        measured = _Means.last(drives)
+        if motion is None:
+            return Prediction(
+                tick, UNKNOWN, UNKNOWN, _UNKNOWN, UNKNOWN_READING, self._readings(measured)
+            )
+        commanded = _Means.of_all_but_last(drives)
         return Prediction(
             stamp_ns=tick,
-            speed=speed,
-            torque=UNKNOWN if commanded is None else _triple(commanded.torque[0]),
+            speed=_triple(motion.speed.mean(axis=0).tolist()),
+            torque=_triple(commanded.torque),
             motors=self._readings(commanded),
             total=self._total(commanded),
             from_encoders=self._readings(measured),
@@ -107,44 +117,73 @@ class PowerPredictor:
     def _bus_voltage(self, power: float) -> float:
         """Supply voltage under a load [V], sagging to first order."""
         nominal = self._robot.supply.nominal_voltage
-        drop = sum(effect.voltage_drop() for effect in self._dynamics.effects)
-        return nominal - drop * power / nominal
+        return nominal - self._drop * power / nominal
 
-    def _readings(self, drives: DrivePower | None) -> Readings:
-        if drives is None:
-            return UNKNOWN_READING, UNKNOWN_READING, UNKNOWN_READING
-        read = self._at_motor if self._reads_motor else self._at_supply
-        first, second, third = (read(drives, wheel) for wheel in range(WHEELS))
+    def _readings(self, means: "_Means") -> Readings:
+        if self._reads_motor:
+            first, second, third = map(self._at_motor, means.at_motor, means.current)
+        else:
+            voltage = self._bus_voltage(means.total)
+            first, second, third = (
+                SupplyReading.rounded(voltage, power / voltage) for power in means.power
+            )
         return first, second, third
 
-    @property
-    def _reads_motor(self) -> bool:
-        return self._robot.measurement.quantity == "motor_current"
-
-    def _at_supply(self, drives: DrivePower, wheel: int) -> SupplyReading:
-        voltage = self._bus_voltage(float(drives.power[0].sum()))
-        return SupplyReading.rounded(voltage, float(drives.power[0, wheel]) / voltage)
-
-    def _at_motor(self, drives: DrivePower, wheel: int) -> SupplyReading:
+    def _at_motor(self, power: float, current: float) -> SupplyReading:
         """Motor current, and the terminal voltage that makes voltage * current the power."""
-        current = float(drives.current[0, wheel])
-        power = float(drives.voltage[0, wheel] * drives.current[0, wheel])
         if not self._robot.measurement.signed:
             current = abs(current)
         return SupplyReading.rounded(power / current if current else 0.0, current)
 
-    def _total(self, drives: DrivePower | None) -> SupplyReading:
-        if drives is None:
-            return UNKNOWN_READING
+    def _total(self, means: "_Means") -> SupplyReading:
         if self._reads_motor:
             voltage = self._robot.supply.nominal_voltage
-            power = float((drives.voltage[0] * drives.current[0]).sum())
-            return SupplyReading.rounded(voltage, power / voltage)
-        other = drives.other
-        auxiliary = self._robot.supply.auxiliary_power if other is None else float(other[0])
-        power = float(drives.power[0].sum()) + auxiliary
+            return SupplyReading.rounded(voltage, _sum(means.at_motor) / voltage)
+        auxiliary = self._robot.supply.auxiliary_power if means.other is None else means.other
+        power = means.total + auxiliary
         voltage = self._bus_voltage(power)
         return SupplyReading.rounded(voltage, power / voltage)
+
+
+@frozen
+class _Means:
+    """Means over some rows of DrivePower, one number per wheel; NaN where the motion is."""
+
+    torque: list[float]  # N m
+    current: list[float]  # A
+    at_motor: list[float]  # voltage * current [W]
+    power: list[float]  # W
+    other: float | None
+
+    @classmethod
+    def of_all_but_last(cls, drives: DrivePower) -> Self:
+        values = (drives.torque, drives.current, drives.voltage * drives.current, drives.power)
+        means = np.add.reduce(np.array(values)[:, :-1], axis=1) / (len(drives.power) - 1)
+        other = None if drives.other is None else float(drives.other[:-1].mean())
+        torque, current, at_motor, power = means.tolist()
+        return cls(torque, current, at_motor, power, other)
+
+    @classmethod
+    def last(cls, drives: DrivePower) -> Self:
+        current = drives.current[-1]
+        at_motor = drives.voltage[-1] * current
+        other = None if drives.other is None else float(drives.other[-1])
+        return cls(
+            drives.torque[-1].tolist(),
+            current.tolist(),
+            at_motor.tolist(),
+            drives.power[-1].tolist(),
+            other,
+        )
+
+    @property
+    def total(self) -> float:
+        return _sum(self.power)
+
+
+def _sum(values: list[float]) -> float:
+    """Plain sum: that of Python 3.12 rounds differently from 3.11's."""
+    return values[0] + values[1] + values[2]
 
 
 def _stacked(motion: WheelMotion | None, estimate: WheelEstimate, yaw_rate: float) -> WheelMotion:
@@ -153,23 +192,11 @@ def _stacked(motion: WheelMotion | None, estimate: WheelEstimate, yaw_rate: floa
     if motion is not None:
         speed = np.concatenate([motion.speed, speed])
         acceleration = np.concatenate([motion.acceleration, acceleration])
+    if math.isnan(yaw_rate):
+        return WheelMotion(speed, acceleration)
     gyro = np.full(len(speed), np.nan)
     gyro[-1] = yaw_rate
     return WheelMotion(speed, acceleration, gyro)
-
-
-def _mean(drives: DrivePower, rows: slice) -> DrivePower:
-    """Mean over some rows, shape (1, 3); NaN in a wheel's motion makes its power NaN."""
-
-    def mean(values: Array) -> Array:
-        return np.asarray(values[rows].mean(axis=0, keepdims=True))
-
-    current = mean(drives.current)
-    power_at_motor = mean(drives.voltage * drives.current)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        voltage = np.where(current == 0.0, 0.0, power_at_motor / current)
-    other = None if drives.other is None else mean(drives.other)
-    return DrivePower(mean(drives.torque), current, voltage, mean(drives.power), other)
 
 
 def _triple(values: Sequence[float] | Array) -> Triple:

@@ -9,7 +9,7 @@ not depend on the order in which topics happen to arrive. It is given as soon as
 """
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Sequence
 from enum import Enum
 
 from attrs import frozen
@@ -48,6 +48,8 @@ class TickClock:
         """`expected` streams are waited for up to `patience` even before their first message."""
         self.settings = settings
         self._expected = expected
+        self._gap = settings.gap
+        self._settle = settings.settle
         self._newest: dict[str, int] = {}
         self._periodic: set[str] = set()
         self._watermark = 0
@@ -57,18 +59,20 @@ class TickClock:
         """Take note of a message. After RESTARTED the caller forgets what it has gathered."""
         if stamp_ns <= 0:
             return Arrival.UNSTAMPED
-        if self._next and abs(stamp_ns - self._watermark) > self.settings.gap:
+        if not self._next:
+            self._start(stream, stamp_ns, periodic)
+            return Arrival.TAKEN
+        ahead = stamp_ns - self._watermark
+        if abs(ahead) > self._gap:
             self._start(stream, stamp_ns, periodic)
             return Arrival.RESTARTED
         if stamp_ns <= self._newest.get(stream, 0):
             return Arrival.REPEATED
-        if not self._next:
-            self._start(stream, stamp_ns, periodic)
-            return Arrival.TAKEN
         self._newest[stream] = stamp_ns
         if periodic:
             self._periodic.add(stream)
-        self._watermark = max(self._watermark, stamp_ns)
+        if ahead > 0:
+            self._watermark = stamp_ns
         return Arrival.TAKEN
 
     def _start(self, stream: str, stamp_ns: int, periodic: bool) -> None:
@@ -78,14 +82,19 @@ class TickClock:
         period = self.settings.period
         self._next = (stamp_ns // period + 1) * period
 
-    def due(self) -> Iterator[int]:
+    def due(self) -> Sequence[int]:
         """Stamps of the ticks that can be decided now, in order."""
-        while self._next and self._watermark >= self._next + self.settings.settle:
+        # Asked after every message, and mostly nothing is due.
+        if self._watermark < self._next + self._settle or not self._next:
+            return ()
+        ticks = []
+        while self._watermark >= self._next + self.settings.settle:
             tick = self._next
             if self._slowest_live() < tick and self._watermark < tick + self.settings.patience:
-                return
+                break
             self._next = tick + self.settings.period
-            yield tick
+            ticks.append(tick)
+        return ticks
 
     def _slowest_live(self) -> float:
         """The newest stamp of the live periodic stream that lags most."""

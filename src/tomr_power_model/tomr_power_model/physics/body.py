@@ -29,6 +29,7 @@ class Body:
     axles: Array  # unit vectors along the axles, (3, 2)
     mass: float
     mass_center: tuple[float, float]
+    turning: Array  # c(nu) = omega_z turning^T nu, (3, 3)
 
     @classmethod
     def of(cls, robot: Robot) -> Self:
@@ -53,6 +54,7 @@ class Body:
             axles=np.stack([np.cos(theta), np.sin(theta)], axis=1),
             mass=m,
             mass_center=(x, y),
+            turning=m * np.array([[0.0, 1.0, x], [-1.0, 0.0, y], [-x, -y, 0.0]]),
         )
 
     @property
@@ -63,13 +65,7 @@ class Body:
 
     def turning_force(self, twist: Array) -> Array:
         """c(nu): the omega x v terms in the body frame [N, N, N m]; twist and result (n, 3)."""
-        vx, vy, wz = twist[..., 0], twist[..., 1], twist[..., 2]
-        x, y = self.mass_center
-        force = np.empty_like(twist)
-        force[..., 0] = -self.mass * wz * (vy + wz * x)
-        force[..., 1] = self.mass * wz * (vx - wz * y)
-        force[..., 2] = self.mass * wz * (x * vx + y * vy)
-        return force
+        return np.asarray(twist[..., 2:] * (twist @ self.turning))
 
 
 def wheel_loads(robot: Robot) -> Array:

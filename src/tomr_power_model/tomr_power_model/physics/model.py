@@ -1,5 +1,6 @@
 """Electrical power of the three motors from the motion of the wheels."""
 
+from functools import cached_property
 from typing import Protocol, Self
 
 import numpy as np
@@ -99,8 +100,9 @@ class PhysicalModel:
         if motion.yaw_rate is not None:
             seen = ~np.isnan(motion.yaw_rate)
             twist[seen, 2] = motion.yaw_rate[seen]
-        force = motion.acceleration @ (body.mass_matrix @ body.to_twist).T
-        force = force + body.turning_force(twist) + self._drag(twist, motion.speed)
+        force = motion.acceleration @ self._inertia + body.turning_force(twist)
+        if self._drags:
+            force += self._drag(twist, motion.speed)
         carried = force @ body.from_force.T + motion.acceleration * body.wheel_inertia
         return carried + self.friction(motion.speed, carried)
 
@@ -109,12 +111,31 @@ class PhysicalModel:
         dry, moving = self.resistance_at(speed, carried)
         return np.asarray(dry * np.tanh(speed / _STICKING_SPEED) + moving + self.viscous * speed)
 
+    @cached_property
+    def _inertia(self) -> Array:
+        """(M K^-1)^T: wheel accelerations, as rows, to body force."""
+        return np.asarray((self.body.mass_matrix @ self.body.to_twist).T)
+
+    @cached_property
+    def _drags(self) -> bool:
+        return bool(np.any(self.axle_limit()))
+
+    @cached_property
+    def _acting(self) -> dict[str, tuple[Effect, ...]]:
+        """The effects by the hook that they override: the others would add zeros."""
+        hooks = ("dry_torque", "moving_torque", "driver_power", "supplied")
+        return {
+            hook: tuple(e for e in self.effects if getattr(type(e), hook) != getattr(Effect, hook))
+            for hook in hooks
+        }
+
     def resistance_at(self, speed: Array, carried: Array) -> tuple[Array, Array]:
         """Limit of dry friction, and the torque that is neither dry nor viscous [N m]."""
         state = WheelState(speed, self.body.normal, carried, self.wheel_radius, self.gear_ratio)
         still = np.zeros_like(speed)
-        dry = sum((effect.dry_torque(state) for effect in self.effects), still)
-        moving = sum((effect.moving_torque(state) for effect in self.effects), still)
+        acting = self._acting
+        dry = sum((effect.dry_torque(state) for effect in acting["dry_torque"]), still)
+        moving = sum((effect.moving_torque(state) for effect in acting["moving_torque"]), still)
         return np.asarray(dry), np.asarray(moving)
 
     def axle_limit(self) -> Array:
@@ -131,15 +152,15 @@ class PhysicalModel:
         body = self.body
         limit = self.axle_limit()
         force = np.zeros_like(twist)
-        if np.any(limit):
-            along = twist[..., :2] @ body.axles.T
-            sliding = np.maximum(np.hypot(along, self.rolling_slip() * speed), _NO_SLIDE)
-            share = np.tanh(sliding / STICKING_SLIDE) * along / sliding
-            force[..., :2] = (limit * share) @ body.axles
+        along = twist[..., :2] @ body.axles.T
+        sliding = np.maximum(np.hypot(along, self.rolling_slip() * speed), _NO_SLIDE)
+        share = np.tanh(sliding / STICKING_SLIDE) * along / sliding
+        force[..., :2] = (limit * share) @ body.axles
         return force
 
     def _drawn(self, power: Array, current: Array) -> Array:
-        for effect in self.effects:
+        for effect in self._acting["supplied"]:
             power = effect.supplied(power)
-        lost = sum((effect.driver_power(current) for effect in self.effects), np.float64(0.0))
-        return np.asarray(power + lost)
+        for effect in self._acting["driver_power"]:
+            power = power + effect.driver_power(current)
+        return power

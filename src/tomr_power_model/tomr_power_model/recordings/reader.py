@@ -127,9 +127,9 @@ def open_recording(path: Path | str) -> Iterator[Recording]:
 
 def header_stamp_ns(message: Any) -> int | None:
     """Return the stamp of a message's header [ns]: 0 where it is unset, None without a header."""
-    header = getattr(message, "header", None)
-    stamp = getattr(header, "stamp", None)
-    if stamp is None:
+    try:
+        stamp = message.header.stamp
+    except AttributeError:
         return None
     return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
 

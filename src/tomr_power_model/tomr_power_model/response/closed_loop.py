@@ -57,8 +57,16 @@ def _dot(row: Triple, vector: Triple) -> float:
     return row[0] * vector[0] + row[1] * vector[1] + row[2] * vector[2]
 
 
+def _times(rows: Rows, vector: Triple) -> Triple:
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    x, y, z = vector
+    return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+
+
 def _clip(value: float, limit: float) -> float:
-    return max(-limit, min(limit, value))
+    if value > limit:
+        return limit
+    return -limit if value < -limit else value
 
 
 @frozen
@@ -136,18 +144,20 @@ class ClosedLoop:
         """One step under a commanded twist (v_x, v_y [m/s], omega_z [rad/s])."""
         twist = self._ramped(state.twist, command)
         volts, integral = self._driver(state, twist)
-        resisting = self._body_torque(state.speed)
+        before = state.speed
+        torque = self._body_torque(before)
         dry = self.dry
         if self.varying:
             dry, moving = self._resistance(state)
-            resisting = _triple([resisting[i] + moving[i] for i in range(3)])
-        load = _triple([self.drive[i] * volts[i] - resisting[i] for i in range(3)])
-        free = _triple(
-            [_dot(self.decay[i], state.speed) + _dot(self.gain[i], load) for i in range(3)]
-        )
+            torque = torque[0] + moving[0], torque[1] + moving[1], torque[2] + moving[2]
+        (a, b, c), (d, e, f), (x, y, z) = self.drive, volts, torque
+        load = a * d - x, b * e - y, c * f - z
+        (a, b, c), (x, y, z) = _times(self.decay, before), _times(self.gain, load)
+        free = a + x, b + y, c + z
         friction = self._stick_or_slide(free, state.friction, dry)
-        speed = _triple([free[i] - _dot(self.gain[i], friction) for i in range(3)])
-        mean = _triple([0.5 * (speed[i] + state.speed[i]) for i in range(3)])
+        (a, b, c), (x, y, z) = free, _times(self.gain, friction)
+        speed = x, y, z = a - x, b - y, c - z
+        mean = 0.5 * (x + before[0]), 0.5 * (y + before[1]), 0.5 * (z + before[2])
         return LoopState(twist, speed, mean, integral, friction)
 
     def _ramped(self, twist: Triple, command: Triple) -> Triple:
@@ -158,38 +168,37 @@ class ClosedLoop:
         return twist[0] + part * dx, twist[1] + part * dy, twist[2] + yaw
 
     def _driver(self, state: LoopState, twist: Triple) -> tuple[Triple, Triple]:
-        volts = [0.0, 0.0, 0.0]
-        integral = [0.0, 0.0, 0.0]
-        for i in range(3):
-            error = _dot(self.kinematics[i], twist) - state.measured[i]
-            total = state.integral[i] + error * self.step_s
-            wanted = self.proportional * error + self.integral * total
-            volts[i] = _clip(wanted, self.voltage)
-            integral[i] = total if volts[i] == wanted else state.integral[i]
-        return _triple(volts), _triple(integral)
+        a, b, c = _times(self.kinematics, twist)
+        x, y, z = state.measured
+        p, q, r = state.integral
+        first, p = self._control(a - x, p)
+        second, q = self._control(b - y, q)
+        third, r = self._control(c - z, r)
+        return (first, second, third), (p, q, r)
+
+    def _control(self, error: float, integral: float) -> tuple[float, float]:
+        """Voltage [V] and new integral [rad] of one driver; in saturation it does not wind up."""
+        total = integral + error * self.step_s
+        wanted = self.proportional * error + self.integral * total
+        volts = _clip(wanted, self.voltage)
+        return volts, total if volts == wanted else integral
 
     def _body_torque(self, speed: Triple) -> Triple:
         """Wheel torques of the omega x v terms and of axle drag [N m], see `physics.body`."""
-        vx, vy, wz = (_dot(row, speed) for row in self.to_twist)
-        force = [0.0, 0.0, 0.0]
-        if wz != 0.0:
-            mass, (x, y) = self.model.body.mass, self.model.body.mass_center
-            force = [
-                -mass * wz * (vy + wz * x),
-                mass * wz * (vx - wz * y),
-                mass * wz * (x * vx + y * vy),
-            ]
+        vx, vy, wz = _times(self.to_twist, speed)
+        mass, (x, y) = self.model.body.mass, self.model.body.mass_center
+        fx = -mass * wz * (vy + wz * x)
+        fy = mass * wz * (vx - wz * y)
+        moment = mass * wz * (x * vx + y * vy)
         for i, limit in enumerate(self.axle_drag):
             ax, ay = self.axles[i]
             along = ax * vx + ay * vy
             sliding = math.hypot(along, self.rolling_slip[i] * speed[i])
             if sliding > 0.0:
                 drag = limit * math.tanh(sliding / STICKING_SLIDE) * along / sliding
-                force[0] += drag * ax
-                force[1] += drag * ay
-        body = _triple(force)
-        rows = self.from_force
-        return _dot(rows[0], body), _dot(rows[1], body), _dot(rows[2], body)
+                fx += drag * ax
+                fy += drag * ay
+        return _times(self.from_force, (fx, fy, moment))
 
     def _resistance(self, state: LoopState) -> tuple[Triple, Triple]:
         """Limits of dry friction and moving torque [N m] where they change with the motion."""
@@ -198,10 +207,11 @@ class ClosedLoop:
         return _triple(np.maximum(dry, 0.0)), _triple(moving)
 
     def _stick_or_slide(self, free: Triple, guess: Triple, dry: Triple) -> Triple:
-        friction = list(guess)
+        (a, b, c), (d, e, f), (g, h, i) = self.gain
+        first, second, third = free
+        x, y, z = guess
         for _ in range(_SWEEPS):
-            for i in range(3):
-                row = self.gain[i]
-                others = _dot(row, (friction[0], friction[1], friction[2])) - row[i] * friction[i]
-                friction[i] = _clip((free[i] - others) / row[i], dry[i])
-        return friction[0], friction[1], friction[2]
+            x = _clip((first - (b * y + c * z)) / a, dry[0])
+            y = _clip((second - (d * x + f * z)) / e, dry[1])
+            z = _clip((third - (g * x + h * y)) / i, dry[2])
+        return x, y, z
