@@ -5,14 +5,20 @@ import json
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+from attrs import asdict
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.states import STATES
 from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.errors import InputError
+
+if TYPE_CHECKING:  # torch is there only where someone trains
+    from tomr_fault_diag.training.fit import Fitted, Recipe
 
 _EPILOG = """\
 Drives are drawn from the seeds FIRST, FIRST+1, ...; validation takes the seeds that follow and
@@ -58,26 +64,29 @@ def _train(arguments: Sequence[str] | None) -> int:
             bar.update()
 
         fitted = fit(train, recipe, progress)
-    network = fitted.network
-    confusion = confusion_of(network, unseen.codes, unseen.labels)
-    store(network, options.out)
-    provenance = {
+    confusion = confusion_of(fitted.network, unseen.codes, unseen.labels)
+    store(fitted.network, options.out)
+    drives = {
+        "simulator": "tomr_sim_bridge, MuJoCo " + version("mujoco"),
+        "training_seeds": [options.first_seed, between - 1],
+        "validation_seeds": [between, between + options.validation - 1],
+        "training_ticks": len(train.labels),
+        "validation_ticks": len(unseen.labels),
+    }
+    text = json.dumps(_provenance(recipe, drives, fitted, confusion), indent=2)
+    options.out.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
+    _print(confusion)
+    return EXIT_OK
+
+
+def _provenance(
+    recipe: "Recipe", drives: dict[str, object], fitted: "Fitted", confusion: NDArray[np.int64]
+) -> dict[str, object]:
+    """Where the weights come from, what they reached, and what torch answers with them."""
+    return {
         "network": "10-30-6, ReLU, softmax (Wang 2024, section 4)",
-        "recipe": {
-            "learning_rate": recipe.learning_rate,
-            "batch": recipe.batch,
-            "epochs": recipe.epochs,
-            "seed": recipe.seed,
-            "silent": recipe.silent,
-            "blinded": recipe.blinded,
-        },
-        "drives": {
-            "simulator": "tomr_sim_bridge, MuJoCo " + version("mujoco"),
-            "training_seeds": [options.first_seed, between - 1],
-            "validation_seeds": [between, between + options.validation - 1],
-            "training_ticks": len(train.labels),
-            "validation_ticks": len(unseen.labels),
-        },
+        "recipe": asdict(recipe),
+        "drives": drives,
         "torch": version("torch"),
         "torch_check": {
             "inputs": fitted.check_inputs.astype(int).tolist(),
@@ -89,16 +98,11 @@ def _train(arguments: Sequence[str] | None) -> int:
             "confusion_rows_true": confusion.tolist(),
         },
     }
-    options.out.with_suffix(".json").write_text(
-        json.dumps(provenance, indent=2) + "\n", encoding="utf-8"
-    )
-    _print(confusion)
-    return EXIT_OK
 
 
 def confusion_of(
-    network: Network, codes: np.typing.NDArray[np.int8], labels: np.typing.NDArray[np.int8]
-) -> np.typing.NDArray[np.int64]:
+    network: Network, codes: NDArray[np.int8], labels: NDArray[np.int8]
+) -> NDArray[np.int64]:
     """Counts of (true state, named state) over ticks, without any filter in time."""
     named = network.probabilities(codes.astype(np.float64)).argmax(axis=1)
     confusion = np.zeros((len(STATES), len(STATES)), dtype=np.int64)
@@ -118,7 +122,7 @@ def store(network: Network, path: Path) -> None:
     )
 
 
-def _print(confusion: np.typing.NDArray[np.int64]) -> None:
+def _print(confusion: NDArray[np.int64]) -> None:
     print(
         f"{'true state':24}" + "".join(f"{n:>9}" for n in range(1, len(STATES) + 1)) + "   recall"
     )
