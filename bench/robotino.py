@@ -13,6 +13,7 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import redirect_stdout
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -127,7 +128,8 @@ def _main(arguments: Sequence[str] | None) -> int:
         return 0
     with TemporaryDirectory() as folder:
         out = Path(folder) / "bags"
-        import_robotino([str(options.dataset), "--out", str(out), "--surface", options.surface])
+        with redirect_stdout(sys.stderr):
+            import_robotino([str(options.dataset), "--out", str(out), "--surface", options.surface])
         bags = sorted((out / options.surface).iterdir())
         with ProcessPoolExecutor(os.cpu_count()) as pool:
             drives = list(tqdm(pool.map(play, bags), total=len(bags), desc="drives"))
