@@ -46,13 +46,25 @@ def test_a_silent_stream_is_not_waited_for() -> None:
 
 def test_an_expected_stream_is_waited_for_before_its_first_message() -> None:
     clock = TickClock(SETTINGS, expected=("b",))
-    clock.arrive("a", BASE + 10 * MS)
-    clock.arrive("a", BASE + 290 * MS)
+    for at in range(10, 300, 10):
+        clock.arrive("a", BASE + at * MS)
     assert _ms(clock) == []
     clock.arrive("b", BASE + 100 * MS)
     assert _ms(clock) == [50, 100]
-    clock.arrive("a", BASE + 410 * MS)
+    for at in range(300, 420, 10):
+        clock.arrive("a", BASE + at * MS)
     assert _ms(clock) == [150]
+
+
+def test_after_a_silence_of_all_an_expected_stream_gets_its_time() -> None:
+    clock = TickClock(SETTINGS, expected=("b",))
+    for at in (10, 60):
+        clock.arrive("a", BASE + at * MS)
+        clock.arrive("b", BASE + at * MS)
+    clock.arrive("a", BASE + 480 * MS)  # 0.42 s of nothing, then "a" is the first to go on
+    assert _ms(clock) == [50]
+    clock.arrive("b", BASE + 450 * MS)
+    assert _ms(clock) == list(range(100, 451, 50))
 
 
 def test_sparse_streams_are_not_waited_for() -> None:

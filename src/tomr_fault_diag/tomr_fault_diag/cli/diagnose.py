@@ -138,7 +138,9 @@ def _as_json(summary: Summary) -> str:
 def _diagnose(arguments: Sequence[str] | None) -> int:
     options = _parser().parse_args(arguments)
     given = read_node_sections(options.robot, STAGE_NODES)
-    settings = DiagnosisSettings.of({**given, **parse_assignments(options.set)}, "parameters")
+    settings = DiagnosisSettings.of(
+        {**given, **parse_assignments(options.set)}, f"--set or {options.robot}"
+    )
     pipeline = Pipeline(load_robot(options.robot), settings)
     with open_recording(options.bag) as recording:
         if recording.warning:

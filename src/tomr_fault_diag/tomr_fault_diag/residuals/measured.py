@@ -6,7 +6,7 @@ from collections import deque
 from attrs import frozen
 
 from tomr_fault_diag.residuals.frame import Unit
-from tomr_power_model.messages.readings import NAN, SupplyReading
+from tomr_power_model.messages.readings import NAN
 
 
 @frozen
@@ -54,13 +54,3 @@ class SupplyWindow:
             return Measured(sum(powers) / len(powers), "W")
         currents = [current for _, _, current in inside if not math.isnan(current)]
         return Measured(sum(currents) / len(currents) if currents else NAN, "A")
-
-
-def modelled(reading: SupplyReading, unit: Unit) -> float:
-    """What the model says of a supply in the unit that is measured."""
-    return reading.power if unit == "W" else reading.drawn_current
-
-
-def modelled_sum(motors: tuple[SupplyReading, ...], unit: Unit) -> float:
-    """What the model says of all motors together."""
-    return math.fsum(modelled(reading, unit) for reading in motors)

@@ -53,6 +53,7 @@ class TickClock:
         self._newest: dict[str, int] = {}
         self._periodic: set[str] = set()
         self._watermark = 0
+        self._resumed = 0  # stamp at which all streams went on after a silence
         self._next = 0  # stamp of the next tick, 0: not started
 
     def arrive(self, stream: str, stamp_ns: int, periodic: bool = True) -> Arrival:
@@ -71,6 +72,8 @@ class TickClock:
         self._newest[stream] = stamp_ns
         if periodic:
             self._periodic.add(stream)
+        if ahead > self.settings.period:
+            self._resumed = stamp_ns
         if ahead > 0:
             self._watermark = stamp_ns
         return Arrival.TAKEN
@@ -78,7 +81,7 @@ class TickClock:
     def _start(self, stream: str, stamp_ns: int, periodic: bool) -> None:
         self._newest = {stream: stamp_ns}
         self._periodic = {stream} if periodic else set()
-        self._watermark = stamp_ns
+        self._watermark = self._resumed = stamp_ns
         period = self.settings.period
         self._next = (stamp_ns // period + 1) * period
 
@@ -90,7 +93,9 @@ class TickClock:
         ticks = []
         while self._watermark >= self._next + self.settings.settle:
             tick = self._next
-            if self._slowest_live() < tick and self._watermark < tick + self.settings.patience:
+            # After a silence of all streams the others deserve as much time to go on as the first.
+            patient_until = max(tick, self._resumed) + self.settings.patience
+            if self._slowest_live() < tick and self._watermark < patient_until:
                 break
             self._next = tick + self.settings.period
             ticks.append(tick)
