@@ -27,6 +27,7 @@ LIBRARIES = {
     "attr": ("python3-attrs", "attrs"),
     "attrs": ("python3-attrs", "attrs"),
     "hypothesis": ("python3-hypothesis", "hypothesis"),
+    "jinja2": ("python3-jinja2", "Jinja2"),
     "matplotlib": ("python3-matplotlib", "matplotlib"),
     "mujoco": ("python3-mujoco-pip", "mujoco"),
     "numpy": ("python3-numpy", "numpy"),

@@ -15,7 +15,7 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.11",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed", "robots/*.yaml"]},
+    package_data={NAME: ["py.typed", "robots/*.yaml", "calibration/*.j2"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -27,6 +27,7 @@ setup(
     entry_points={
         "console_scripts": [
             f"power_model = {NAME}.nodes.power_model_node:main",
+            f"tomr_calibrate = {NAME}.calibrate_cli:main",
         ],
     },
 )

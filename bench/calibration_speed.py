@@ -1,0 +1,93 @@
+"""How fast the model is: vectorised over samples, and step by step."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from attrs import evolve
+from rich.console import Console
+
+from tomr_power_model.model.predictor import PowerPredictor
+from tomr_power_model.physics.model import PhysicalModel, WheelMotion
+from tomr_power_model.response.closed_loop import ClosedLoop
+from tomr_power_model.robot import Robot, load_robot
+
+_ROWS = 200_000
+_STEPS = 5_000
+_TICKS = 1_000
+_ROUNDS = 5
+_S = 1_000_000_000
+
+
+def _best(run: Callable[[], None]) -> float:
+    """CPU seconds of the fastest round."""
+    found = []
+    for _ in range(_ROUNDS):
+        begin = time.process_time()
+        run()
+        found.append(time.process_time() - begin)
+    return min(found)
+
+
+def _with_drag(robot: Robot) -> Robot:
+    drag = {"coefficient": 0.05, "slip": 0.4}
+    return evolve(robot, physics={**robot.physics, "contact.roller_drag": (drag, drag, drag)})
+
+
+def _streaming(robot: Robot) -> float:
+    """Microseconds per decision of the whole predictor, encoders at 100 Hz and commands at 20."""
+    predictor = PowerPredictor(robot)
+    begin = time.process_time()
+    count = 0
+    for step in range(5 * _TICKS):
+        stamp = _S + step * _S // 100
+        if step % 5 == 0:
+            predictor.command(stamp, (0.3, 0.1, 0.2))
+        angle = 0.05 * step
+        predictor.encoders(stamp, (angle, -angle, 0.5 * angle), (5.0, -5.0, 2.5))
+        count += len(predictor.due())
+    return 1e6 * (time.process_time() - begin) / count
+
+
+def measure_speed() -> dict[str, Any]:
+    """Speeds for the reference robot, plain and with a roller drag."""
+    found: dict[str, Any] = {}
+    random = np.random.default_rng(0)
+    for name, robot in (
+        ("reference", load_robot("reference")),
+        ("reference with roller drag", _with_drag(load_robot("reference"))),
+    ):
+        model = PhysicalModel.of(robot)
+        many = WheelMotion(random.normal(0, 5, (_ROWS, 3)), random.normal(0, 20, (_ROWS, 3)))
+        one = WheelMotion(many.speed[:1], many.acceleration[:1])
+        loop = ClosedLoop.of(robot, model, 0.005)
+
+        def steps(loop: ClosedLoop = loop) -> None:
+            state = loop.moving((0.0, 0.0, 0.0))
+            for _ in range(_STEPS):
+                state = loop.step(state, (0.3, 0.1, 0.2))
+
+        def single(model: PhysicalModel = model, one: WheelMotion = one) -> None:
+            for _ in range(_STEPS):
+                model.power(one)
+
+        found[name] = {
+            "samples_per_second": _ROWS / _best(lambda m=model, r=many: m.power(r)),
+            "microseconds_per_sample": 1e6 * _best(single) / _STEPS,
+            "microseconds_per_control_step": 1e6 * _best(steps) / _STEPS,
+            "microseconds_per_decision": min(_streaming(robot) for _ in range(_ROUNDS)),
+        }
+    return found
+
+
+def print_speed(console: Console, found: dict[str, Any]) -> None:
+    """A line per robot."""
+    for name, figures in found.items():
+        console.print(
+            f"{name}: {figures['samples_per_second'] / 1e6:.2f} million samples of three wheels "
+            f"per second vectorised; one at a time {figures['microseconds_per_sample']:.0f} us; "
+            f"a step of the closed loop {figures['microseconds_per_control_step']:.0f} us; a "
+            f"decision of the streaming predictor, command and encoders, "
+            f"{figures['microseconds_per_decision']:.0f} us"
+        )

@@ -1,0 +1,241 @@
+"""Calibration on drives whose truth is known: values, intervals, what cannot be told."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from attrs import evolve
+from scipy.ndimage import maximum_filter1d
+
+from tomr_power_model.calibration.calibrate import Result, Timing, align, calibrate
+from tomr_power_model.calibration.fit import fit
+from tomr_power_model.calibration.intervals import autocorrelation_time
+from tomr_power_model.calibration.motion import wheel_motion
+from tomr_power_model.calibration.parameters import Choice, choose, with_values
+from tomr_power_model.calibration.problem import Problem, modelled_power
+from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.calibration.samples import Samples, samples_of
+from tomr_power_model.errors import InputError
+from tomr_power_model.physics.model import PhysicalModel, WheelMotion
+from tomr_power_model.response.closed_loop import ClosedLoop
+from tomr_power_model.robot import (
+    GRAVITY,
+    Robot,
+    read_description,
+    robot_from_parameters,
+    shipped_robot,
+)
+
+MakeDrive = Callable[..., Recorded]
+VALUES = read_description("reference")
+ROBOT = shipped_robot("reference")
+# Samples without a window: the drives of these tests are sampled in an instant.
+TIMING = Timing(span=0.05, window=1e-9)
+FRICTION = (
+    "physics.friction.coulomb.torque",
+    "physics.friction.viscous.coefficient",
+    "physics.electrical.driver_standby.power",
+)
+
+
+def calibrated(
+    recorded: list[Recorded], choice: Choice, held_out: tuple[Recorded, ...] = ()
+) -> Result:
+    """A calibration of the reference robot on recordings."""
+    return calibrate(
+        VALUES, "test", align(recorded, ROBOT, TIMING), align(held_out, ROBOT, TIMING), choice
+    )
+
+
+def fitted_values(result: Result) -> dict[str, tuple[float, float]]:
+    """Value and half of the 95 % interval by key."""
+    rows = zip(result.free, result.fitted.numbers, result.half_widths, strict=True)
+    return {item.key: (number, half) for item, number, half in rows}
+
+
+def test_values_are_recovered_within_their_intervals(
+    make_drive: MakeDrive, other_values: Callable[[Robot], Robot]
+) -> None:
+    real = other_values(ROBOT)
+    drives = [make_drive(real, seed, noise=0.2, name=f"tour{seed}") for seed in (1, 2)]
+    unseen = make_drive(real, 7, name="unseen")
+    result = calibrated(drives, Choice(keys=(*FRICTION, "robot.mass")), (unseen,))
+    found = fitted_values(result)
+    for wheel, name in enumerate(ROBOT.wheel_names):
+        truth = real.effect("friction.coulomb", wheel)
+        assert truth is not None
+        value, half = found[f"physics.friction.coulomb.{name}.torque"]
+        # 95 % intervals of ten values: one in ten tests may miss by a little.
+        assert value == pytest.approx(truth["torque"], abs=1.5 * half)
+        assert half < 0.1 * truth["torque"]
+    value, half = found["robot.mass"]
+    assert value == pytest.approx(real.mass, abs=1.5 * half)
+    assert result.held_out_scores.whole is not None
+    assert result.held_out_scores_before.whole is not None
+    motors, before = 3, result.held_out_scores_before.whole
+    assert result.held_out_scores.whole.accuracy[motors] > 0.975 > before.accuracy[motors]
+
+
+def test_a_knock_does_not_bend_the_result(make_drive: MakeDrive) -> None:
+    drive = make_drive(ROBOT, 3)
+    knocked = drive.power.copy()
+    knocked[300:312, 1] += 40.0
+    choice = Choice(keys=FRICTION)
+    clean = fitted_values(calibrated([drive], choice))
+    robust = fitted_values(calibrated([evolve(drive, power=knocked)], choice))
+    key = f"physics.friction.coulomb.{ROBOT.wheel_names[1]}.torque"
+    assert robust[key][0] == pytest.approx(clean[key][0], rel=0.03)
+
+
+def correlated_samples(seed: int, phi: float, truth: Robot) -> Samples:
+    """Exact motion, and power with first-order autoregressive noise of 0.2 W."""
+    random = np.random.default_rng(seed)
+    count, step = 2000, 0.02
+    corners = np.arange(0, count, 40)
+    targets = random.uniform(-8.0, 8.0, (len(corners), 3))
+    time = np.arange(count)
+    speed = np.column_stack([np.interp(time, corners, column) for column in targets.T])
+    motion = WheelMotion(speed, np.gradient(speed, step, axis=0))
+    noise = 0.2 * np.sqrt(1.0 - phi**2) * random.standard_normal((count, 4))
+    for row in range(1, count):
+        noise[row] += phi * noise[row - 1]
+    measured = modelled_power(truth, motion) + noise
+    measured[:, 3] = np.nan
+    return Samples("x", time * step, measured, motion, 1, np.zeros(count, dtype=np.int64))
+
+
+def test_intervals_hold_for_correlated_noise() -> None:
+    choice = Choice(keys=(*FRICTION, "robot.mass"), alike=("all",))
+    free = tuple(choose(VALUES, ROBOT.wheel_names, choice, "test"))
+    inside = []
+    for seed in range(40):
+        random = np.random.default_rng(seed + 500)
+        truth = [item.believed * (1.0 + 0.05 * random.standard_normal()) for item in free]
+        robot = robot_from_parameters(with_values(VALUES, free, truth), "test")
+        samples = correlated_samples(seed, 0.9, robot)
+        found = fit(Problem(VALUES, free, (samples,), "test"))
+        width = found.spread.factor * found.spread.deviation * [item.spread for item in free]
+        inside.append(np.abs(found.numbers - truth) < width)
+    # 160 intervals; counted as independent they would cover 91.6 % to 98.4 % in 19 of 20 runs.
+    assert 0.90 < np.mean(inside) < 0.995
+
+
+def test_autocorrelation_time_of_a_known_process() -> None:
+    times = []
+    for seed in range(4):
+        samples = correlated_samples(seed, 0.9, ROBOT)
+        noise = samples.measured - modelled_power(ROBOT, samples.motion)
+        times += [autocorrelation_time((samples,), noise[:, wheel]) for wheel in range(3)]
+    # (1 + phi) / (1 - phi) = 19 samples.
+    assert np.mean(times) == pytest.approx(19.0, rel=0.2)
+    white = np.random.default_rng(0).standard_normal(2000)
+    assert autocorrelation_time((samples,), white) == pytest.approx(1.0, abs=0.3)
+
+
+def test_what_the_drives_do_not_tell_is_said(make_drive: MakeDrive) -> None:
+    result = calibrated([make_drive(ROBOT, 1)], Choice())
+    told = "\n".join(result.warnings)
+    # Supply power depends on R and k through R / k^2 alone.
+    assert "motor.resistance and motor.torque_constant are told only together" in told
+    assert "motor.torque_constant of every wheel: not determined" in told
+    assert "robot.inertia_z:" not in told
+    steady = make_drive(ROBOT, 1)
+    change = np.abs(np.gradient(steady.velocity, axis=0)).max(axis=1)
+    still = maximum_filter1d(change, 11) < 1e-9
+    power = np.where(still[4::4, None], steady.power, np.nan)
+    result = calibrated(
+        [evolve(steady, power=power, total=np.full_like(steady.total, np.nan))],
+        Choice(keys=("robot.inertia_z", *FRICTION)),
+    )
+    assert any(
+        "robot.inertia_z: not determined" in line and "spins" in line for line in result.warnings
+    )
+
+
+def test_motor_currents_without_sign_and_total_power_alone(make_drive: MakeDrive) -> None:
+    drive = make_drive(ROBOT, 2, noise=0.0)
+    empty = np.full_like(drive.power, np.nan)
+    choice = Choice(keys=("physics.friction.coulomb.torque",), alike=("all",))
+    heavier = {**VALUES, "physics.friction.coulomb.torque": 0.09}
+    total = align([evolve(drive, power=empty)], ROBOT, TIMING)
+    found = calibrate(heavier, "test", total, (), choice)
+    assert found.fitted.numbers[0] == pytest.approx(0.06, rel=0.05)
+
+    unsigned = {"measurement.quantity": "motor_current", "measurement.signed": False}
+    robot = robot_from_parameters({**VALUES, **unsigned}, "test")
+    motion = samples_of(drive, ROBOT, TIMING.span, TIMING.window)
+    rows = np.isin(drive.power_time, motion.time)
+    current = empty.copy()
+    current[rows] = np.abs(PhysicalModel.of(ROBOT).power(motion.motion).current)
+    currents = evolve(drive, power=current, total=drive.total[:0], total_time=drive.total_time[:0])
+    found = calibrate({**heavier, **unsigned}, "test", align([currents], robot, TIMING), (), choice)
+    assert found.fitted.numbers[0] == pytest.approx(0.06, rel=0.02)
+    with pytest.raises(InputError, match="measures motor currents"):
+        choose(
+            {**VALUES, **unsigned},
+            ROBOT.wheel_names,
+            evolve(choice, keys=("motor.resistance",), quantity="motor_current"),
+            "test",
+        )
+
+
+def test_motion_between_irregular_samples() -> None:
+    random = np.random.default_rng(0)
+    time = np.cumsum(random.uniform(0.007, 0.013, 300))
+    time[150:] += 0.05  # a gap within the span of the fit
+    angle = np.stack([2.0 * time + 1.5 * time**2, -time, 0.0 * time], axis=1)
+    # In mid-drive, before the gap, in it, after it, and just before the end.
+    at = np.array([0.5, time[149] - 0.02, time[149] + 0.025, 2.0, time[-1] - 0.01])
+    none = np.full_like(angle, np.nan)
+    motion = wheel_motion(time, angle, none, at, 0.12)
+    np.testing.assert_allclose(motion.speed[0], [3.5, -1.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(motion.acceleration[0], [3.0, 0.0, 0.0], atol=1e-7)
+    np.testing.assert_allclose(motion.speed[3], [8.0, -1.0, 0.0], atol=1e-9)
+    assert np.isnan(motion.speed[[1, 2, 4]]).all()
+    speed = np.stack([2.0 + 3.0 * time, -1.0 + 0.0 * time, 0.0 * time], axis=1)
+    from_speed = wheel_motion(time, none, speed, at, 0.12)
+    np.testing.assert_allclose(from_speed.speed[0], [3.5, -1.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(from_speed.acceleration[0], [3.0, 0.0, 0.0], atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("keys", "reason"),
+    [
+        (("robot.weight",), "did you mean robot.wheel"),
+        (("physics.friction.coulomb.wheel_9_joint.torque",), "no such value"),
+        (("robot.wheel_names",), "no such value"),
+    ],
+)
+def test_a_key_that_cannot_be_fitted_is_refused(keys: tuple[str, ...], reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        choose(VALUES, ROBOT.wheel_names, Choice(keys=keys), "test")
+
+
+def dragged(slip: float) -> Robot:
+    drag = {"physics.contact.roller_drag.coefficient": 0.3}
+    bare = {key: value for key, value in VALUES.items() if not key.startswith("physics.")}
+    return robot_from_parameters({**bare, **drag, "physics.contact.roller_drag.slip": slip}, "test")
+
+
+def test_roller_drag_turns_with_the_slip_by_hand() -> None:
+    # Wheels at 0, 120, 240 degrees; travel along +x at 0.4 m/s: sliding along the axles 0.4, -0.2,
+    # -0.2 m/s, rolling at 0, 0.3464, -0.3464 m/s. Drag 0.3 * 15 g / 3 = 14.71 N, times u / hypot(
+    # u, 0.5 v): 1, and 0.2 / hypot(0.2, 0.1732) = 0.7559. Along x: 14.71 (1 + 0.7559) = 25.83 N.
+    force = 0.3 * 15.0 * GRAVITY / 3.0 * (1.0 + 0.2 / np.hypot(0.2, 0.5 * 0.4 * np.sqrt(0.75)))
+    robot = dragged(0.5)
+    model = PhysicalModel.of(robot)
+    speed = np.array([[0.0, 0.4 * np.sqrt(0.75) / 0.05, -0.4 * np.sqrt(0.75) / 0.05]])
+    torque = model.power(WheelMotion(speed, np.zeros((1, 3)))).torque
+    np.testing.assert_allclose(
+        torque, force * 0.05 / np.sqrt(3.0) * np.array([[0, 1, -1]]), atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("slip", [0.0, 0.4])
+def test_closed_loop_feels_the_same_roller_drag(slip: float) -> None:
+    robot = dragged(slip)
+    model = PhysicalModel.of(robot)
+    speed = (3.0, -5.0, 1.0)
+    torque = model.power(WheelMotion(np.array([speed]), np.zeros((1, 3)))).torque[0]
+    loop = ClosedLoop.of(robot, model, 0.005)
+    np.testing.assert_allclose(loop._body_torque(speed), torque, rtol=1e-9)

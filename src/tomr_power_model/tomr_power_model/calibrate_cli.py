@@ -1,0 +1,277 @@
+"""`tomr_calibrate`: fit a robot's description to recordings of it."""
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import cast
+
+from rich.console import Console
+from rich.table import Table
+from tqdm import tqdm
+
+from tomr_power_model.calibration.calibrate import (
+    Result,
+    Skips,
+    Timing,
+    align,
+    calibrate,
+    names_of,
+    read_all,
+)
+from tomr_power_model.calibration.checks import refuse_faults, refuse_little_motion
+from tomr_power_model.calibration.fitted import fitted_text
+from tomr_power_model.calibration.parameters import Choice, Values
+from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.calibration.scoring import COLUMNS
+from tomr_power_model.calibration.tables import rows, tables
+from tomr_power_model.cli import EXIT_OK, run_main
+from tomr_power_model.errors import InputError
+from tomr_power_model.robot import (
+    Robot,
+    load_robot,
+    read_description,
+    read_node_sections,
+    shipped_robots,
+)
+
+_MOST_NAMES = 6  # of recordings in a line
+_WIDTH = 120  # characters; a table that is cut off says nothing
+
+_EPILOG = """\
+examples:
+  tomr_calibrate tour1 tour2 --robot my_robot.yaml --out fitted.yaml --holdout tour3
+  tomr_calibrate day/* --robot my_robot.yaml --out fitted.yaml --report report.html
+  tomr_calibrate tour --robot my_robot.yaml --out fitted.yaml --fit robot.mass \\
+      --alike physics.contact.roller_drag.coefficient --tolerance robot.mass=0.02
+  tomr_calibrate tour --robot my_robot.yaml --out fitted.yaml --skip tour=8.0:14.5
+
+Drive about three minutes on the floor that counts: starts and stops, several headings and speeds,
+spins, and ten seconds of standing. Without --fit, mass, inertia, resistance, torque constant,
+auxiliary power and the values of all effects in the description are fitted, those of wheels and
+motors one by one (--alike all: together). A value is believed by its --tolerance, a relative
+standard deviation, and moves from there as far as the recordings say.
+
+An accuracy is 1 - sum|P - P_model| / sum|P| over every sample of whole drives.
+
+exit codes: 0 done, 2 bad input: a fault, a dead sensor, too little motion, another robot's file"""
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="tomr_calibrate",
+        description="Fit a robot's description to healthy recordings of its motion and power.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add("bags", nargs="+", type=Path, metavar="BAG", help="recordings to fit")
+    add("--robot", required=True, help=f"robot.yaml, or one of {', '.join(shipped_robots())}")
+    add("--out", type=Path, metavar="YAML", help="write the fitted robot.yaml here")
+    add("--holdout", nargs="+", type=Path, default=[], metavar="BAG", help="score on these only")
+    add("--report", type=Path, metavar="HTML", help="write a page with tables and pictures")
+    add("--fit", action="append", default=[], metavar="KEY", help="fit this value; repeatable")
+    add(
+        "--alike",
+        action="append",
+        default=[],
+        metavar="KEY",
+        help="fit this as one value for all wheels instead of one each; repeatable, `all`: every",
+    )
+    add("--tolerance", action="append", default=[], metavar="KEY=REL", help="belief in a value")
+    add("--skip", action="append", default=[], metavar="BAG=FROM:TO", help="leave out [s]")
+    add("--namespace", help="of the robot's topics, if a bag holds several")
+    add("--power-window", type=float, default=0.005, metavar="S", help="the power sensor's average")
+    add(
+        "--encoder-window",
+        type=float,
+        metavar="S",
+        help="span of the fit to the encoders (default: as robot.yaml gives it to power_model, "
+        "else 0.05; five samples at least)",
+    )
+    add("--squares", action="store_true", help="plain least squares, no robust loss")
+    return parser
+
+
+def _numbers(given: Sequence[str], option: str) -> dict[str, float]:
+    """KEY=NUMBER options."""
+    found = {}
+    for text in given:
+        key, _, number = text.partition("=")
+        try:
+            found[key] = float(number)
+        except ValueError:
+            raise InputError(f"{option} {text}: give KEY=NUMBER, e.g. robot.mass=0.05") from None
+        if not found[key] > 0.0:
+            raise InputError(f"{option} {text}: give a number above 0")
+    return found
+
+
+def _skips(given: Sequence[str], bags: Sequence[Path]) -> Skips:
+    """NAME=FROM:TO options."""
+    found: dict[str, list[tuple[float, float]]] = {}
+    names = names_of(bags)
+    for text in given:
+        name, _, interval = text.rpartition("=")
+        start, _, end = interval.partition(":")
+        try:
+            limits = float(start), float(end)
+        except ValueError:
+            raise InputError(f"--skip {text}: give BAG=FROM:TO in seconds") from None
+        if name not in names:
+            raise InputError(f"--skip {text}: no recording {name}: {', '.join(names)} are given")
+        found.setdefault(name, []).append(limits)
+    return found
+
+
+@contextmanager
+def _bar(title: str, total: int | None, unit: str) -> Iterator[Callable[[], None]]:
+    with tqdm(total=total, desc=title, unit=unit, disable=None, leave=False, delay=1.0) as bar:
+        yield lambda: cast(None, bar.update())
+
+
+def _timing(options: argparse.Namespace) -> Timing:
+    span = options.encoder_window
+    if span is None:
+        span = read_node_sections(options.robot, ["power_model"]).get("encoder_window", 0.05)
+    for name, value in (("--encoder-window", span), ("--power-window", options.power_window)):
+        if not isinstance(value, int | float) or not 0.0 < value <= 1.0:
+            raise InputError(f"{name} {value}: give seconds above 0 and up to 1")
+    return Timing(float(span), options.power_window)
+
+
+def _calibrate(arguments: Sequence[str] | None) -> int:
+    options = _parser().parse_args(arguments)
+    for path in (options.out, options.report):
+        if path is not None and not path.parent.is_dir():
+            raise InputError(f"{path}: no folder {path.parent}: make it first")
+    robot = load_robot(options.robot)
+    values = read_description(options.robot)
+    choice = Choice(
+        keys=tuple(options.fit),
+        alike=tuple(options.alike),
+        tolerances=_numbers(options.tolerance, "--tolerance"),
+    )
+    timing = _timing(options)
+    recorded = _recorded(options, robot)
+    fitted, held_out = recorded[: len(options.bags)], recorded[len(options.bags) :]
+    samples, unseen = align(fitted, robot, timing), align(held_out, robot, timing)
+    with _bar("fitting", None, "evaluation") as tick:
+        result = calibrate(
+            values, options.robot, samples, unseen, choice, not options.squares, tick
+        )
+    _print(result, [note for item in recorded for note in item.notes])
+    if options.out is not None:
+        _write(options.out, _fitted_text(options.robot, values, result))
+    if options.report is not None:
+        # Pictures take a second to import: --help and a plain fit do without.
+        from tomr_power_model.calibration.report import report_page
+
+        with _bar("report", None, "picture") as tick:
+            _write(options.report, report_page(result, options.robot, tick))
+    return EXIT_OK
+
+
+def _recorded(options: argparse.Namespace, robot: Robot) -> tuple[Recorded, ...]:
+    """The recordings, those to fit before those held out, all found to be healthy."""
+    bags = [*options.bags, *options.holdout]
+    skips = _skips(options.skip, bags)
+    with _bar("reading", len(bags), "bag") as tick:
+        recorded = read_all(bags, robot, options.namespace, skips, tick)
+    refuse_little_motion(recorded[: len(options.bags)], robot)
+    with _bar("looking for faults", len(bags), "bag") as tick:
+        refuse_faults(recorded, robot, tick)
+    return recorded
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}): give another") from None
+
+
+def _fitted_text(source: str, values: Values, result: Result) -> str:
+    """The fitted robot.yaml with its provenance."""
+    names = [item.name for item in result.samples]
+    unseen = [item.name for item in result.held_out]
+    ours, theirs = result.scores.whole, result.held_out_scores.whole
+    assert ours is not None
+    header = [
+        f"Fitted by tomr_calibrate from {Path(source).name} and {_listed(names)}.",
+        f"Accuracy on these drives: {_accuracies(ours.accuracy)}.",
+    ]
+    provenance: dict[str, object] = {
+        "description": Path(source).name,
+        "bags": names,
+        "seconds": round(ours.seconds, 1),
+    }
+    if theirs is not None:
+        header.append(f"On {_listed(unseen)}, not fitted: {_accuracies(theirs.accuracy)}.")
+        provenance["held_out.bags"] = unseen
+    header += [f"Beware: {line}" for line in result.warnings]
+    return fitted_text(
+        source,
+        values,
+        result.free,
+        [float(number) for number in result.fitted.numbers],
+        [float(half) for half in result.half_widths],
+        header,
+        provenance,
+    )
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Some of the names in words."""
+    more = len(names) - _MOST_NAMES
+    return ", ".join(names[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+
+
+def _accuracies(numbers: Sequence[float]) -> str:
+    parts = [
+        f"{name} {100 * number:.1f} %"
+        for name, number in zip(COLUMNS, numbers, strict=True)
+        if number == number
+    ]
+    return ", ".join(parts)
+
+
+def _print(result: Result, notes: Sequence[str]) -> None:
+    console = Console(highlight=False, soft_wrap=True)
+    console.width = max(console.width, _WIDTH)
+    values = _table("value", "fitted", "95 %", "unit", "before", "left")
+    for row in rows(result):
+        style = "yellow" if row.open else None
+        cells = (row.key, row.fitted, row.half, row.unit, row.believed, row.left)
+        values.add_row(*cells, style=style)
+    console.print(values)
+    console.print("left: of the uncertainty before\n")
+    scores = _table("accuracy, %", "s", *COLUMNS)
+    for title, lines in tables(result):
+        scores.add_row(title, style="bold")
+        for line in lines:
+            figures = (f"{100 * value:.1f}" if value == value else "-" for value in line.values)
+            scores.add_row(f"  {line.name}", f"{line.seconds:.0f}", *figures)
+    console.print(scores)
+    if not result.held_out:
+        notes = [*notes, "no --holdout: the figures are those of the fitted drives"]
+    for text in (*notes, *result.notes):
+        console.print(f"note: {text}", markup=False)
+    for text in result.warnings:
+        console.print(f"warning: {text}", markup=False, style="yellow")
+
+
+def _table(*headings: str) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for number, heading in enumerate(headings):
+        table.add_column(heading, justify="right" if number else "left", no_wrap=True)
+    return table
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of `tomr_calibrate`."""
+    return run_main(_calibrate, arguments)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

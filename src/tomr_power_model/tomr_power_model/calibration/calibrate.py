@@ -1,0 +1,184 @@
+"""A calibration from recordings to figures: read, check, fit, score."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from tomr_power_model.calibration.checks import Finding
+from tomr_power_model.calibration.fit import Fit, fit
+from tomr_power_model.calibration.identify import warnings_of
+from tomr_power_model.calibration.parameters import Choice, Free, Values, choose
+from tomr_power_model.calibration.problem import Problem
+from tomr_power_model.calibration.recorded import Recorded, read_recorded
+from tomr_power_model.calibration.samples import TOTAL, Samples, samples_of
+from tomr_power_model.calibration.scoring import Scores, score, suspicious
+from tomr_power_model.errors import InputError
+from tomr_power_model.robot import WHEELS, Robot, robot_from_parameters
+
+Array = NDArray[np.float64]
+Skips = Mapping[str, Sequence[tuple[float, float]]]
+
+_MOST_NOTES = 4
+_WORST_SHARE = 0.05  # of the time that may look like a fault
+
+
+@frozen
+class Timing:
+    """How motion and power are brought to the same instants [s]."""
+
+    span: float = 0.05  # of the fit to the encoders
+    window: float = 0.005  # of the power sensor
+
+
+@frozen
+class Result:
+    """All that a calibration found."""
+
+    robot: Robot  # fitted
+    free: tuple[Free, ...]
+    fitted: Fit
+    samples: tuple[Samples, ...]
+    held_out: tuple[Samples, ...]
+    scores: Scores
+    scores_before: Scores  # of the description as it was
+    held_out_scores: Scores
+    held_out_scores_before: Scores
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def half_widths(self) -> Array:
+        """Half of the 95 % intervals, in the values' units."""
+        width = np.array([item.spread for item in self.free])
+        return np.asarray(self.fitted.spread.factor * self.fitted.spread.deviation * width)
+
+
+def read_all(
+    paths: Sequence[Path],
+    robot: Robot,
+    namespace: str | None,
+    skips: Skips,
+    tick: Callable[[], None] = lambda: None,
+) -> tuple[Recorded, ...]:
+    """Read recordings and cut out what is to be skipped. Raises InputError."""
+    found = []
+    for path, name in zip(paths, names_of(paths), strict=True):
+        recorded = evolve(read_recorded(path, robot, namespace), name=name)
+        found.append(without(recorded, skips.get(name, ())))
+        tick()
+    return tuple(found)
+
+
+def names_of(paths: Sequence[Path]) -> list[str]:
+    """What to call each recording: its last part, with its folder where two are called alike."""
+    short = [path.resolve().name for path in paths]
+    names = [
+        "/".join(path.resolve().parts[-2:]) if short.count(name) > 1 else name
+        for path, name in zip(paths, short, strict=True)
+    ]
+    twice = {name for name in names if names.count(name) > 1}
+    if twice:
+        raise InputError(f"{min(twice)} is given twice: give each recording once")
+    return names
+
+
+def without(recorded: Recorded, intervals: Sequence[tuple[float, float]]) -> Recorded:
+    """A recording without some intervals [s]. Raises InputError if nothing is left."""
+
+    def kept(time: Array) -> NDArray[np.bool_]:
+        keep = np.ones(len(time), dtype=bool)
+        for start, end in intervals:
+            keep &= (time < start) | (time > end)
+        return keep
+
+    if not intervals:
+        return recorded
+    encoders, power = kept(recorded.encoder_time), kept(recorded.power_time)
+    total = kept(recorded.total_time)
+    if np.count_nonzero(encoders) < 2:
+        raise InputError(f"--skip {recorded.name}: nothing is left: leave the recording out")
+    return evolve(
+        recorded,
+        encoder_time=recorded.encoder_time[encoders],
+        position=recorded.position[encoders],
+        velocity=recorded.velocity[encoders],
+        power_time=recorded.power_time[power],
+        power=recorded.power[power],
+        reading=recorded.reading[power],
+        total_time=recorded.total_time[total],
+        total=recorded.total[total],
+    )
+
+
+def align(recorded: Sequence[Recorded], robot: Robot, timing: Timing) -> tuple[Samples, ...]:
+    """Samples of recordings. Raises InputError for one whose power and encoders never meet."""
+    found = []
+    for item in recorded:
+        samples = samples_of(item, robot, timing.span, timing.window)
+        if not len(samples.time):
+            raise InputError(
+                f"{item.name}: no power sample falls between encoder samples: are both stamped by "
+                "the same clock?"
+            )
+        found.append(samples)
+    return tuple(found)
+
+
+def calibrate(
+    values: Values,
+    place: str,
+    samples: Sequence[Samples],
+    held_out: Sequence[Samples],
+    choice: Choice,
+    robust: bool = True,
+    tick: Callable[[], None] = lambda: None,
+) -> Result:
+    """Fit a description to samples and score it on others. Raises InputError."""
+    believed = robot_from_parameters(values, place)
+    measured = [np.isfinite(item.measured) for item in samples]
+    choice = evolve(
+        choice,
+        quantity=believed.measurement.quantity,
+        has_total=any(item[:, TOTAL].any() for item in measured),
+        has_motors=any(item[:, :WHEELS].any() for item in measured),
+    )
+    free = tuple(choose(values, believed.wheel_names, choice, place))
+    problem = Problem(values, free, tuple(samples), place)
+    fitted = fit(problem, robust, tick)
+    robot = problem.robot(fitted.numbers)
+    findings = [found for item in samples for found in suspicious(item, robot)]
+    _refuse_faults(findings, samples)
+    elsewhere = [found for item in held_out for found in suspicious(item, robot)]
+    return Result(
+        robot=robot,
+        free=free,
+        fitted=fitted,
+        samples=tuple(samples),
+        held_out=tuple(held_out),
+        scores=score(samples, robot),
+        scores_before=score(samples, believed),
+        held_out_scores=score(held_out, robot),
+        held_out_scores_before=score(held_out, believed),
+        warnings=tuple(warnings_of(free, fitted, robot.wheel_names)),
+        notes=_told([*findings, *elsewhere]),
+    )
+
+
+def _told(findings: Sequence[Finding]) -> tuple[str, ...]:
+    """The longest ones in words, and how many more there are."""
+    ordered = sorted(findings, key=lambda found: found.start - found.end)
+    more = len(ordered) - _MOST_NOTES
+    notes = [str(found) for found in ordered[:_MOST_NOTES]]
+    return (*notes, f"{more} shorter stretches are like that") if more > 0 else tuple(notes)
+
+
+def _refuse_faults(findings: Sequence[Finding], samples: Sequence[Samples]) -> None:
+    """Raise InputError where too much of the time looks like a fault."""
+    total = sum(float(item.time[-1] - item.time[0]) for item in samples)
+    odd = sum(found.end - found.start for found in findings)
+    if odd > _WORST_SHARE * total:
+        longest = max(findings, key=lambda found: found.end - found.start)
+        raise InputError(f"{longest} ({odd:.0f} s of {total:.0f} s are like that)")

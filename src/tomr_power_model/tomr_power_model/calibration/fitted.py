@@ -1,0 +1,117 @@
+"""The fitted robot.yaml: complete, with where its values come from and which robot they belong to.
+
+The header and the section of `tomr_calibrate` say what was fitted to what, how well, and to which
+robot; reading the file as a robot description looks at that robot's identity again.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from tomr_power_model.calibration.parameters import Free, Values, with_values
+from tomr_power_model.robot import read_sections
+from tomr_power_model.robot.files import CALIBRATION, EVERY_NODE, IDENTITY
+from tomr_power_model.robot.vocabulary import EFFECTS
+
+Array = NDArray[np.float64]
+Tree = dict[str, "Tree | object"]
+
+# What a calibration cannot change: another value means another robot.
+IDENTITY_KEYS = (
+    "robot.wheel_names",
+    "robot.wheel_offset",
+    "robot.robot_radius",
+    "robot.wheel_radius",
+    "motor.gear_ratio",
+)
+_DIGITS = 6
+
+
+def fitted_text(
+    source: Path | str,
+    values: Values,
+    free: Sequence[Free],
+    numbers: Sequence[float] | Array,
+    half_widths: Sequence[float] | Array,
+    header: Sequence[str],
+    provenance: Mapping[str, object],
+) -> str:
+    """Text of a robot.yaml with fitted values.
+
+    Args:
+        source: robot.yaml that was fitted; sections of single nodes are taken over.
+        values: its description, flat.
+        free: what was fitted.
+        numbers: fitted values.
+        half_widths: half of their 95 % intervals.
+        header: lines of comment at the top.
+        provenance: flat parameters of the section that says where the values come from.
+    """
+    rounded = [float(f"{number:.{_DIGITS}g}") for number in numbers]
+    comments = {
+        item.key: f"fitted, +- {half:.2g} (95 %); was {item.believed:g}"
+        for item, half in zip(free, half_widths, strict=True)
+    }
+    fixed = {key for key in IDENTITY_KEYS if not any(item.key == key for item in free)}
+    identity = {IDENTITY + key: values[key] for key in IDENTITY_KEYS if key in fixed}
+    sections = dict(read_sections(source))
+    sections[EVERY_NODE] = _own_values_alone(with_values(values, free, rounded), free)
+    sections[CALIBRATION] = {**identity, **provenance}
+    lines = [f"# {line}".rstrip() for line in header]
+    for node, flat in sections.items():
+        lines += [f"{node}:", "  ros__parameters:"]
+        lines += _lines(_nested(flat), 4, "", comments if node == EVERY_NODE else {})
+    return "\n".join(lines) + "\n"
+
+
+def _own_values_alone(values: Values, free: Sequence[Free]) -> Values:
+    """Without an effect's value for all wheels where each wheel has its own."""
+    by_general: dict[str, int] = {}
+    for item in free:
+        if item.wheel is not None and item.general.startswith("physics."):
+            by_general[item.general] = by_general.get(item.general, 0) + 1
+    return {key: value for key, value in values.items() if by_general.get(key, 0) < 3}
+
+
+def _nested(flat: Mapping[str, object]) -> Tree:
+    """Dotted keys as a tree; an effect's id stays one key."""
+    tree: Tree = {}
+    for key, value in flat.items():
+        branch = tree
+        *groups, leaf = _parts(key)
+        for group in groups:
+            following = branch.setdefault(group, {})
+            assert isinstance(following, dict)
+            branch = following
+        branch[leaf] = value
+    return tree
+
+
+def _parts(key: str) -> list[str]:
+    for effect_id in EFFECTS:
+        before, found, after = key.partition(f"physics.{effect_id}.")
+        if found:
+            return [*before.split(".")[:-1], "physics", effect_id, *after.split(".")]
+    return key.split(".")
+
+
+def _lines(tree: Tree, indent: int, prefix: str, comments: Mapping[str, str]) -> list[str]:
+    lines = []
+    for key, value in tree.items():
+        name = f"{prefix}{key}"
+        start = f"{' ' * indent}{key}:"
+        if isinstance(value, dict):
+            lines += [start, *_lines(value, indent + 2, name + ".", comments)]
+            continue
+        dumped = yaml.safe_dump(_plain(value), default_flow_style=True, width=10_000)
+        text = dumped.partition("\n")[0]
+        comment = f"  # {comments[name]}" if name in comments else ""
+        lines.append(f"{start} {text}{comment}")
+    return lines
+
+
+def _plain(value: object) -> object:
+    return list(value) if isinstance(value, tuple) else value

@@ -1,0 +1,76 @@
+"""Modelled power at the measured instants, as a function of the values that are fitted."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from attrs import field, frozen
+from numpy.typing import NDArray
+
+from tomr_power_model.calibration.parameters import Free, Values, with_values
+from tomr_power_model.calibration.samples import CHANNELS, TOTAL, Samples, motor_power
+from tomr_power_model.physics.model import PhysicalModel, WheelMotion
+from tomr_power_model.robot import WHEELS, Robot, robot_from_parameters
+
+Array = NDArray[np.float64]
+
+
+def modelled_power(robot: Robot, motion: WheelMotion, parts: int = 1) -> Array:
+    """Power of motors 1-3 and of the whole robot [W] as it would be measured, (n, 4).
+
+    The mean over each `parts` rows of the motion: the power sensor's window.
+    """
+    drives = PhysicalModel.of(robot).power(motion)
+    power = drives.power
+    if robot.measurement.quantity == "motor_current":
+        power = motor_power(robot, drives.current, motion.speed)
+    rows = np.empty((len(power), CHANNELS))
+    rows[:, :WHEELS] = power
+    rows[:, TOTAL] = drives.power.sum(axis=1) + robot.supply.auxiliary_power
+    return rows if parts == 1 else np.asarray(rows.reshape(-1, parts, CHANNELS).mean(axis=1))
+
+
+@frozen
+class Problem:
+    """Recordings to be explained by one robot."""
+
+    values: Values
+    free: tuple[Free, ...]
+    samples: tuple[Samples, ...]
+    place: str
+    _motion: WheelMotion = field(init=False)
+    measured: Array = field(init=False)  # W, (n, 4) of all recordings together
+
+    def __attrs_post_init__(self) -> None:
+        joined = WheelMotion(
+            np.concatenate([item.motion.speed for item in self.samples]),
+            np.concatenate([item.motion.acceleration for item in self.samples]),
+        )
+        object.__setattr__(self, "_motion", joined)
+        measured = np.concatenate([item.measured for item in self.samples])
+        object.__setattr__(self, "measured", measured)
+
+    @property
+    def parts(self) -> int:
+        return self.samples[0].parts
+
+    def robot(self, numbers: Sequence[float] | Array) -> Robot:
+        """The robot with these values."""
+        return robot_from_parameters(with_values(self.values, self.free, numbers), self.place)
+
+    def residual(self, numbers: Sequence[float] | Array) -> Array:
+        """Measured minus modelled power [W], (n, 4), NaN where nothing was measured."""
+        return self.measured - modelled_power(self.robot(numbers), self._motion, self.parts)
+
+    def jacobian(
+        self, numbers: Array, step: Array, count: Callable[[], None] = lambda: None
+    ) -> Array:
+        """Derivative of the modelled power by each value, (n, 4, p), by central differences."""
+        columns = []
+        for index, width in enumerate(step):
+            upper, lower = numbers.copy(), numbers.copy()
+            upper[index] = min(numbers[index] + width, self.free[index].upper)
+            lower[index] = max(numbers[index] - width, self.free[index].lower)
+            change = self.residual(lower) - self.residual(upper)
+            columns.append(change / (upper[index] - lower[index]))
+            count()
+        return np.stack(columns, axis=-1)
