@@ -1,6 +1,6 @@
 """The real Robotino as it stands: share of each state, and the error of the modelled current.
 
-    .venv/bin/python bench/robotino.py [--surface gray]
+    .venv/bin/python bench/robotino.py [--surface gray] [--robot robotino_v2]
 
 Plays every drive of a surface through the three stages. The description holds the published
 constants and the friction of the bench only; nothing is fitted to the drives.
@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import redirect_stdout
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -34,7 +35,6 @@ from tomr_power_model.robot import load_robot, read_node_sections
 from tomr_sim_bridge.cli.import_robotino import import_robotino
 from tomr_sim_bridge.importers.dataset import default_dataset
 
-ROBOT = "robotino_v2"
 Array = NDArray[np.float64]
 
 
@@ -50,10 +50,10 @@ class Drive:
     speed_error: Array  # rad/s
 
 
-def play(bag: Path) -> Drive:
+def play(bag: Path, robot: str) -> Drive:
     """Play one recording through the stages."""
-    settings = DiagnosisSettings.of(read_node_sections(ROBOT, STAGE_NODES), ROBOT)
-    pipeline = Pipeline(load_robot(ROBOT), settings)
+    settings = DiagnosisSettings.of(read_node_sections(robot, STAGE_NODES), robot)
+    pipeline = Pipeline(load_robot(robot), settings)
     summariser, frames = Summariser(), []
     with open_recording(bag) as recording:
         for _, step in diagnose(recording, pipeline):
@@ -122,6 +122,7 @@ def _main(arguments: Sequence[str] | None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--surface", default="gray")
     parser.add_argument("--dataset", type=Path, default=default_dataset())
+    parser.add_argument("--robot", default="robotino_v2", help="shipped name or robot.yaml")
     options = parser.parse_args(arguments)
     if not options.dataset.exists():
         print(f"skipped: {options.dataset} is absent; set TOMR_RECORDINGS", file=sys.stderr)
@@ -132,7 +133,8 @@ def _main(arguments: Sequence[str] | None) -> int:
             import_robotino([str(options.dataset), "--out", str(out), "--surface", options.surface])
         bags = sorted((out / options.surface).iterdir())
         with ProcessPoolExecutor(os.cpu_count()) as pool:
-            drives = list(tqdm(pool.map(play, bags), total=len(bags), desc="drives"))
+            played = pool.map(partial(play, robot=options.robot), bags)
+            drives = list(tqdm(played, total=len(bags), desc="drives"))
     print(json.dumps(report(drives), indent=2))
     return 0
 
