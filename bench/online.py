@@ -11,7 +11,7 @@ from pathlib import Path
 
 from attrs import frozen
 from drive import ROBOT, Drive, Raw
-from feeder import feeder
+from feeder_node import feeder
 from processes import command_path, cpu_seconds, running
 
 from tomr_fault_diag.classifier.messages import TOPIC as DIAGNOSTICS
@@ -124,7 +124,8 @@ def measure_latency(drive: Drive, warmup_s: float) -> Latencies:
         feeder(drive.sensors) as source,
     ):
         noted = Path(folder, "arrivals")
-        listener: dict[str, Command] = {"listener": [sys.executable, _BENCH / "listener.py", noted]}
+        program = _BENCH / "listener_node.py"
+        listener: dict[str, Command] = {"listener": [sys.executable, program, noted]}
         with running(suite_commands(robot_path, PROMPT) | listener, Path(folder)) as processes:
             source.wait_for(_listeners({DIAGNOSTICS: 1}), lambda: _all_run(processes))
             handed = source.play(timed, time.monotonic_ns() + _LEAD_NS)

@@ -1,4 +1,4 @@
-"""`listener.py FILE`: note when each message of /diagnostics arrives, until SIGTERM.
+"""`listener_node.py FILE`: note when each message of /diagnostics arrives, until SIGTERM.
 
 Writes to FILE one line per message: arrival on the monotonic clock [ns], stamp [ns].
 """
