@@ -17,6 +17,7 @@ from contextlib import redirect_stdout
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import cast
 
 import numpy as np
 from attrs import frozen
@@ -131,7 +132,13 @@ def _main(arguments: Sequence[str] | None) -> int:
         out = Path(folder) / "bags"
         with redirect_stdout(sys.stderr):
             import_robotino([str(options.dataset), "--out", str(out), "--surface", options.surface])
-        bags = sorted((out / options.surface).iterdir())
+        # A description is not scored on the drives it was fitted to.
+        fitted = read_node_sections(options.robot, ["tomr_calibrate"]).get("bags", ())
+        bags = [
+            bag
+            for bag in sorted((out / options.surface).iterdir())
+            if options.surface != "gray" or bag.name not in cast(Sequence[str], fitted)
+        ]
         with ProcessPoolExecutor(os.cpu_count()) as pool:
             played = pool.map(partial(play, robot=options.robot), bags)
             drives = list(tqdm(played, total=len(bags), desc="drives"))

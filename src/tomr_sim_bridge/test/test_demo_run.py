@@ -21,12 +21,12 @@ from tomr_sim_bridge.demo import processes
 from tomr_sim_bridge.demo.processes import Children, DemoFailure
 from tomr_sim_bridge.demo.topics import PROCESSES, all_topics
 
-SLEEP = [sys.executable, "-c", "import time; print('up', flush=True); time.sleep(600)"]
+SLEEP = [sys.executable, "-c", "import signal; print('up', flush=True); signal.pause()"]
 DEAF = [
     sys.executable,
     "-c",
-    "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN);"
-    "print('up', flush=True); time.sleep(600)",
+    "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN);"
+    "print('up', flush=True); signal.pause()",
 ]
 
 
@@ -87,6 +87,7 @@ def test_processes_end_when_the_demo_is_killed(
     tmp_path: Path, spawn: Callable[..., Any], wait_until: Callable[..., Any]
 ) -> None:
     script = f"""
+import signal
 import time
 from pathlib import Path
 from tomr_sim_bridge.demo.processes import Children
@@ -96,7 +97,7 @@ with Children(Path({str(tmp_path)!r})) as children:
     while not all("up" in children.named(name).last_lines() for name in "ab"):
         time.sleep(0.01)
     print("pids", *(children.named(name).popen.pid for name in "ab"), flush=True)
-    time.sleep(600)
+    signal.pause()
 """
     parent = spawn([sys.executable, "-c", script])
     output = parent.wait_for_output("pids")
