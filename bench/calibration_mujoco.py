@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
+from plants import every_value
 from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
@@ -66,31 +67,9 @@ def deviating(robot: Robot, seed: int) -> Robot:
     def off(value: float) -> float:
         return float(value * (1.0 + DEVIATION * random.choice([-1.0, 1.0])))
 
-    first, second, third = (
-        evolve(
-            motor,
-            resistance=off(motor.resistance),
-            torque_constant=off(motor.torque_constant),
-            rotor_inertia=off(motor.rotor_inertia),
-        )
-        for motor in robot.motors
-    )
-    physics = {}
-    for effect, wheels in robot.physics.items():
-        one, two, three = (
-            None if wheel is None else {key: off(value) for key, value in wheel.items()}
-            for wheel in wheels
-        )
-        physics[effect] = (one, two, three)
-    return evolve(
-        robot,
-        mass=off(robot.mass),
-        inertia_z=off(robot.inertia_z),
-        wheel_inertia=off(robot.wheel_inertia),
-        motors=(first, second, third),
-        supply=evolve(robot.supply, auxiliary_power=off(robot.supply.auxiliary_power)),
-        physics=physics,
-    )
+    plant = every_value(robot, off)
+    supply = evolve(plant.supply, auxiliary_power=off(plant.supply.auxiliary_power))
+    return evolve(plant, supply=supply)
 
 
 def record(job: Job) -> None:

@@ -18,8 +18,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 from numpy.typing import NDArray
+from plants import every_value
 from tqdm import tqdm
 
 from tomr_fault_diag.diagnosis.offline import diagnose
@@ -67,30 +68,7 @@ def deviating(robot: Robot, share: float, seed: int) -> Robot:
     def off(value: float) -> float:
         return float(value * random.uniform(1.0 - share, 1.0 + share))
 
-    first, second, third = (
-        evolve(
-            motor,
-            resistance=off(motor.resistance),
-            torque_constant=off(motor.torque_constant),
-            rotor_inertia=off(motor.rotor_inertia),
-        )
-        for motor in robot.motors
-    )
-    physics = {}
-    for effect, wheels in robot.physics.items():
-        one, two, three = (
-            None if wheel is None else {key: off(value) for key, value in wheel.items()}
-            for wheel in wheels
-        )
-        physics[effect] = (one, two, three)
-    return evolve(
-        robot,
-        mass=off(robot.mass),
-        inertia_z=off(robot.inertia_z),
-        wheel_inertia=off(robot.wheel_inertia),
-        motors=(first, second, third),
-        physics=physics,
-    )
+    return every_value(robot, off)
 
 
 def record(planned: tuple[str, int], deviation: float, deviation_seed: int, folder: Path) -> Path:
