@@ -69,6 +69,10 @@ def make_drive() -> MakeDrive:
             total=power[:, 3],
             command_time=tour.time[::5],
             command=tour.twist[::5],
+            voltage=np.full((len(power), 3), robot.supply.nominal_voltage),
+            total_voltage=np.full(len(power), robot.supply.nominal_voltage),
+            yaw_time=np.empty(0),
+            yaw_rate=np.empty(0),
         )
 
     return make

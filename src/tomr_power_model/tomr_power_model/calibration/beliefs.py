@@ -37,6 +37,16 @@ ABSENT = {
     "physics.electrical.regeneration_loss.efficiency": (0.8, 0.3),
     "physics.electrical.iron_loss.hysteresis": (0.0, 0.01),
     "physics.electrical.iron_loss.eddy": (0.0, 1e-4),
+    # What an instant's motion does not tell: if asked for, a fit finds them undetermined.
+    "physics.drivetrain.torque_ripple.torque": (0.0, 0.05),
+    "physics.drivetrain.torque_ripple.order": (1.0, 10.0),
+    "physics.body.slope.angle": (0.0, 0.05),
+    "physics.electrical.winding_heating.thermal_resistance": (0.0, 5.0),
+    "physics.electrical.winding_heating.time_constant": (100.0, 100.0),
+    "physics.electrical.winding_heating.initial": (0.0, 20.0),
+    "physics.sensor.power_scale.scale": (1.0, 0.1),
+    "physics.sensor.power_lag.time_constant": (0.0, 0.1),
+    "physics.sensor.clock_offset.delay": (0.0, 0.05),
 }
 
 # The drive that would tell a value, by the beginning of its key.

@@ -108,8 +108,10 @@ def without(recorded: Recorded, intervals: Sequence[tuple[float, float]]) -> Rec
         power_time=recorded.power_time[power],
         power=recorded.power[power],
         reading=recorded.reading[power],
+        voltage=recorded.voltage[power],
         total_time=recorded.total_time[total],
         total=recorded.total[total],
+        total_voltage=recorded.total_voltage[total],
     )
 
 

@@ -22,6 +22,8 @@ EVERY = "all"
 _AXES = ("x", "y", "z")
 _CENTER = "robot.mass_center"
 _MOTOR = {spec.name: spec for spec in MOTOR_PARAMETERS}
+# Of place or past, which an instant's motion does not tell, or of other tools.
+_NOT_BY_DEFAULT = ("kinematic.", "sensor.", "body.", "drivetrain.", "electrical.winding_heating")
 _FIXED = {
     spec.name: spec
     for spec in ROBOT_PARAMETERS
@@ -78,7 +80,7 @@ def default_keys(values: Values, wheels: tuple[str, str, str], choice: Choice) -
         # With currents alone the voltage is modelled from these two: nothing measures them.
         keys += ["motor.resistance", "motor.torque_constant"]
     for effect_id, effect in EFFECTS.items():
-        if effect_id.startswith(("kinematic.", "sensor.", "body.")):
+        if effect_id.startswith(_NOT_BY_DEFAULT):
             continue
         told = [key for key in values if key.startswith(f"physics.{effect_id}.")]
         keys += [

@@ -46,6 +46,11 @@ class Recorded:
     total: Array  # W drawn by the whole robot, (l,)
     command_time: Array  # (c,)
     command: Array  # m/s, m/s, rad/s in base_link, (c, 3)
+    voltage: Array  # of each driver's supply [V], NaN where not told, (m, 3)
+    total_voltage: Array  # V, (l,)
+    yaw_time: Array  # (g,)
+    yaw_rate: Array  # of the gyro [rad/s], (g,)
+    start_ns: int = 0  # stamp of time 0
     notes: tuple[str, ...] = ()
 
     @property
@@ -91,9 +96,10 @@ class _Collector:
         self.robot = robot
         self.namespace = namespace
         self.encoders = _Series(2 * WHEELS)
-        self.motors = [_Series(2) for _ in range(WHEELS)]  # power or current; the reading
-        self.total = _Series(2)
+        self.motors = [_Series(3) for _ in range(WHEELS)]  # power or current; the reading; V
+        self.total = _Series(3)
         self.commands = _Series(3)
+        self.gyro = _Series(1)
         self.takers: dict[str, Taker] = {}
         self.voltage_missing = False
         self.complaints: dict[str, int] = {}
@@ -111,6 +117,9 @@ class _Collector:
         topic = resolve_topic(self.recording, "cmd_vel", self.namespace)
         if topic is not None:
             self._on(topic, self._command)
+        topic = resolve_topic(self.recording, "imu/data", self.namespace)
+        if topic is not None:
+            self._on(topic, self._imu)
 
     def read(self) -> None:
         """Take all messages; what cannot be used is counted and left out."""
@@ -130,17 +139,20 @@ class _Collector:
         self.encoders.add(stamp, *found.position, *found.velocity)
         if self.robot.measurement.source == "joint_effort":
             for series, current in zip(self.motors, found.effort, strict=True):
-                series.add(stamp, self._drawn(NAN, current), current)
+                series.add(stamp, self._drawn(NAN, current), current, NAN)
 
     def _command(self, message: Any, receive_ns: int) -> None:
         self.commands.add(stamp_of(message, receive_ns, fallback=True), *twist_of(message))
+
+    def _imu(self, message: Any, receive_ns: int) -> None:
+        self.gyro.add(stamp_of(message, receive_ns), float(message.angular_velocity.z))
 
     def _supply(self, series: _Series) -> Taker:
         def take(message: Any, receive_ns: int) -> None:
             voltage, current = battery_of(message)
             is_current = self._is_current and series is not self.total
             drawn = -current if is_current else self._drawn(voltage, -current)
-            series.add(stamp_of(message, receive_ns), drawn, -current)
+            series.add(stamp_of(message, receive_ns), drawn, -current, voltage)
 
         return take
 
@@ -173,7 +185,8 @@ class _Collector:
         def take(message: Any, receive_ns: int) -> None:
             values = numbers_of(message, WHEELS)[:WHEELS]
             for series, value in zip(self.motors, values, strict=True):
-                series.add(receive_ns, value if is_power else self._drawn(NAN, value), value)
+                drawn = value if is_power else self._drawn(NAN, value)
+                series.add(receive_ns, drawn, value, NAN)
 
         self._on(require_topic(self.recording, _ARRAY_TOPIC, self.namespace), take)
 
@@ -206,6 +219,7 @@ def read_recorded(path: Path, robot: Robot, namespace: str | None = None) -> Rec
     power_time, motors = _merged([series.since(start) for series in collector.motors])
     total_time, total = collector.total.since(start)
     command_time, command = collector.commands.since(start)
+    yaw_time, yaw_rate = collector.gyro.since(start)
     if not len(power_time) and not len(total_time):
         raise InputError(f"{path}: no power was measured: record the power topics too")
     return Recorded(
@@ -220,6 +234,11 @@ def read_recorded(path: Path, robot: Robot, namespace: str | None = None) -> Rec
         total=total[:, 0],
         command_time=command_time,
         command=command,
+        voltage=motors[:, :, 2],
+        total_voltage=total[:, 2],
+        yaw_time=yaw_time,
+        yaw_rate=yaw_rate[:, 0],
+        start_ns=start,
         notes=(*notes, *_notes(path, collector)),
     )
 
@@ -244,9 +263,9 @@ def _notes(path: Path, collector: _Collector) -> list[str]:
 
 
 def _merged(series: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """Three series on one time axis, (m, 3, 2), NaN where a wheel has no sample."""
+    """Three series on one time axis, (m, 3, 3), NaN where a wheel has no sample."""
     times = np.unique(np.concatenate([time for time, _ in series]))
-    merged = np.full((len(times), WHEELS, 2), np.nan)
+    merged = np.full((len(times), WHEELS, 3), np.nan)
     for wheel, (time, rows) in enumerate(series):
         merged[np.searchsorted(times, time), wheel] = rows
     return times, merged

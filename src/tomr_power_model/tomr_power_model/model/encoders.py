@@ -64,6 +64,19 @@ class EncoderWindow:
             return _from_positions(times, positions)
         return self._mixed(samples, times, positions)
 
+    def angle(self, tick_ns: int) -> Array:
+        """Angles at the middle of the window that `at` fits [rad], (3,), NaN where not told."""
+        samples = self._until(tick_ns)
+        middle = tick_ns - self._period // 2
+        found = np.full(3, np.nan)
+        for wheel in range(3):
+            told = [s for s in samples if not np.isnan(s.position[wheel])]
+            if len(told) > 2:
+                times = tuple(sample.stamp_ns - middle for sample in told)
+                turned = np.array([s.position[wheel] for s in told]) - told[0].position[wheel]
+                found[wheel] = told[0].position[wheel] + _weights(times, 2)[0] @ turned
+        return found
+
     def _until(self, tick_ns: int) -> list[EncoderSample]:
         """Samples of the window, and the two newest where encoders are slower than it."""
         oldest = tick_ns - self._span

@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,23 +46,40 @@ class ExpectedMotion:
         """Take a command; one that comes too late for its stamp acts from the next step on."""
         self._pending.append((stamp_ns + self._delay, twist))
 
-    def over(self, tick_ns: int, measured: Array) -> WheelMotion | None:
+    @property
+    def steps(self) -> int:
+        """Parts of a tick's window."""
+        return self._steps
+
+    def over(
+        self,
+        tick_ns: int,
+        measured: Array,
+        resisting: Array | None = None,
+        warm: Array | None = None,
+    ) -> WheelMotion | None:
         """Motion in the steps of the window that ends at a tick, or None without a command.
 
         `measured` [rad/s], (3,): where the loop starts when the first command finds the robot
-        already moving; NaN after a while without encoders counts as standstill.
+        already moving; NaN after a while without encoders counts as standstill. `resisting` [N m],
+        (steps, 3): torques besides those of the model; `warm` [K], (3,): windings above 25 C.
         """
         if self._state is None and not self._started(tick_ns, measured):
             return None
         assert self._state is not None
         start = tick_ns - self._period
         speeds = [self._state.speed]
-        for step in range(self._steps):
-            self._advance(start + step * self._period // self._steps)
+        torques: Sequence[Triple | None] = [None] * self._steps
+        if resisting is not None:
+            torques = [_triple(row) for row in resisting]
+        heat = None if warm is None else _triple(warm)
+        for step, torque in enumerate(torques):
+            self._advance(start + step * self._period // self._steps, torque, heat)
             speeds.append(self._state.speed)
         edges = np.array(speeds)
         rate = 1.0 / self._loop.step_s
-        return WheelMotion(0.5 * (edges[1:] + edges[:-1]), rate * (edges[1:] - edges[:-1]))
+        speed, acceleration = 0.5 * (edges[1:] + edges[:-1]), rate * (edges[1:] - edges[:-1])
+        return WheelMotion(speed, acceleration, resisting=resisting)
 
     def _started(self, tick_ns: int, measured: Array) -> bool:
         """Take up the motion that the first command finds; without encoders, standstill."""
@@ -73,11 +91,16 @@ class ExpectedMotion:
         self._command = self._state.twist
         return True
 
-    def _advance(self, now_ns: int) -> None:
+    def _advance(self, now_ns: int, resisting: Triple | None, warm: Triple | None) -> None:
         while self._pending and self._pending[0][0] <= now_ns:
             self._given, self._command = self._pending.popleft()
         if self._timeout and now_ns > self._given + self._timeout:
             self._command = _STOP
         assert self._state is not None
         assert self._command is not None
-        self._state = self._loop.step(self._state, self._command)
+        self._state = self._loop.step(self._state, self._command, resisting, warm)
+
+
+def _triple(values: Array) -> Triple:
+    first, second, third = values.tolist()
+    return first, second, third

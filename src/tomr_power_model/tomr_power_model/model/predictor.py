@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.messages.readings import UNKNOWN_READING, SupplyReading
@@ -20,8 +20,9 @@ from tomr_power_model.model.expected import ExpectedMotion
 from tomr_power_model.model.power_models import POWER_MODELS
 from tomr_power_model.model.prediction import Prediction, Readings
 from tomr_power_model.model.settings import ModelSettings
+from tomr_power_model.model.slow_states import Monitors, Surroundings, Windings
 from tomr_power_model.model.ticks import Arrival, TickClock
-from tomr_power_model.physics.model import DrivePower, PhysicalModel, WheelMotion
+from tomr_power_model.physics.model import DrivePower, PhysicalModel, PowerModel, WheelMotion
 from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -53,7 +54,21 @@ class PowerPredictor:
         )
         self._gyro: tuple[int, float] | None = None
         self._reads_motor = robot.measurement.quantity == "motor_current"
-        self._drop = sum(effect.voltage_drop() for effect in self._dynamics.effects)
+        self._make_slow_states(self._model)
+        self._drop = sum(float(effect.voltage_drop()) for effect in self._dynamics.effects)
+
+    def _make_slow_states(self, model: PowerModel) -> None:
+        """States of the effects that remember; None for each that this robot has not."""
+        period_s = 1e-9 * self.settings.ticks.period
+        self._surroundings = Surroundings.of(self._dynamics, period_s, self._expected.steps)
+        self._windings: Windings | None = None
+        self._commanded: Monitors | None = None
+        self._measured: Monitors | None = None
+        if isinstance(model, PhysicalModel):
+            # The paper's coefficients are fitted to what the monitors showed of warm windings.
+            self._windings = Windings.of(model, period_s)
+            self._commanded = Monitors.of(model.effects, period_s)
+            self._measured = Monitors.of(model.effects, period_s)
 
     def command(self, stamp_ns: int, twist: Triple) -> Arrival:
         """Take a commanded twist (v_x, v_y [m/s], omega_z [rad/s]) in base_link."""
@@ -86,26 +101,54 @@ class PowerPredictor:
             self._expected.clear()
             self._encoders.clear()
             self._gyro = None
+            for state in (self._surroundings, self._windings, self._commanded, self._measured):
+                if state is not None:
+                    state.clear()
         return arrival
 
     def _predict(self, tick: int) -> Prediction:
         estimate = self._encoders.at(tick)
-        motion = self._expected.over(tick, estimate.speed)
-        drives = self._model.power(_stacked(motion, estimate, self._yaw_rate(tick)))
-        measured = _Means.last(drives)
+        yaw_rate = self._yaw_rate(tick)
+        motion, measured_motion = self._motions(tick, estimate, yaw_rate)
+        stacked = _stacked(motion, measured_motion, yaw_rate)
+        if self._windings is not None:
+            stacked = evolve(stacked, warm=self._windings.warm)
+        drives = self._model.power(stacked)
+        rows = len(measured_motion.speed)
+        if self._windings is not None:
+            squared = drives.current**2
+            expected = np.full(3, np.nan) if motion is None else squared[:-rows].mean(axis=0)
+            self._windings.heat(squared[-rows:].mean(axis=0), expected)
+        measured = _Means.last(drives) if rows == 1 else _Means.of(drives, slice(-rows, None))
+        from_encoders = self._readings(measured, self._measured)
         if motion is None:
-            return Prediction(
-                tick, UNKNOWN, UNKNOWN, _UNKNOWN, UNKNOWN_READING, self._readings(measured)
-            )
-        commanded = _Means.of_all_but_last(drives)
+            if self._commanded is not None:
+                self._commanded.shown(UNKNOWN)
+            return Prediction(tick, UNKNOWN, UNKNOWN, _UNKNOWN, UNKNOWN_READING, from_encoders)
+        commanded = _Means.of(drives, slice(None, -rows))
         return Prediction(
             stamp_ns=tick,
             speed=_triple(motion.speed.mean(axis=0).tolist()),
             torque=_triple(commanded.torque),
-            motors=self._readings(commanded),
+            motors=self._readings(commanded, self._commanded),
             total=self._total(commanded),
-            from_encoders=self._readings(measured),
+            from_encoders=from_encoders,
         )
+
+    def _motions(
+        self, tick: int, estimate: WheelEstimate, yaw_rate: float
+    ) -> tuple[WheelMotion | None, WheelMotion]:
+        """Motion expected from the command, if any, and measured."""
+        around = self._surroundings
+        warm = None if self._windings is None else self._windings.warm
+        if around is None:
+            motion = self._expected.over(tick, estimate.speed, warm=warm)
+            return motion, WheelMotion(estimate.speed[None, :], estimate.acceleration[None, :])
+        angle = self._encoders.angle(tick) if around.needs_angle else np.full(3, np.nan)
+        resisting = around.torque(estimate, angle, yaw_rate)
+        motion = self._expected.over(tick, estimate.speed, resisting, warm)
+        around.turn(motion)
+        return motion, around.motion(estimate, resisting)
 
     def _yaw_rate(self, tick: int) -> float:
         """The gyro's yaw rate [rad/s], NaN where it is not used or stale."""
@@ -119,15 +162,27 @@ class PowerPredictor:
         nominal = self._robot.supply.nominal_voltage
         return nominal - self._drop * power / nominal
 
-    def _readings(self, means: "_Means") -> Readings:
+    def _readings(self, means: "_Means", monitors: Monitors | None) -> Readings:
         if self._reads_motor:
+            if monitors is not None:
+                means = self._as_shown(means, monitors)
             first, second, third = map(self._at_motor, means.at_motor, means.current)
         else:
             voltage = self._bus_voltage(means.total)
+            powers = means.power if monitors is None else monitors.shown(means.power)
             first, second, third = (
-                SupplyReading.rounded(voltage, power / voltage) for power in means.power
+                SupplyReading.rounded(voltage, power / voltage) for power in powers
             )
         return first, second, third
+
+    def _as_shown(self, means: "_Means", monitors: Monitors) -> "_Means":
+        """Motor currents as their monitors show them, which take them for those of the supply."""
+        nominal = self._robot.supply.nominal_voltage
+        shown = monitors.shown([nominal * current for current in means.current])
+        current = [power / nominal for power in shown]
+        volts = [p / i if i else 0.0 for p, i in zip(means.at_motor, means.current, strict=True)]
+        at_motor = [v * i for v, i in zip(volts, current, strict=True)]
+        return evolve(means, current=current, at_motor=at_motor)
 
     def _at_motor(self, power: float, current: float) -> SupplyReading:
         """Motor current, and the terminal voltage that makes voltage * current the power."""
@@ -156,10 +211,11 @@ class _Means:
     other: float | None
 
     @classmethod
-    def of_all_but_last(cls, drives: DrivePower) -> Self:
+    def of(cls, drives: DrivePower, rows: slice) -> Self:
         values = (drives.torque, drives.current, drives.voltage * drives.current, drives.power)
-        means = np.add.reduce(np.array(values)[:, :-1], axis=1) / (len(drives.power) - 1)
-        other = None if drives.other is None else float(drives.other[:-1].mean())
+        chosen = np.array(values)[:, rows]
+        means = np.add.reduce(chosen, axis=1) / chosen.shape[1]
+        other = None if drives.other is None else float(drives.other[rows].mean())
         torque, current, at_motor, power = means.tolist()
         return cls(torque, current, at_motor, power, other)
 
@@ -186,17 +242,19 @@ def _sum(values: list[float]) -> float:
     return values[0] + values[1] + values[2]
 
 
-def _stacked(motion: WheelMotion | None, estimate: WheelEstimate, yaw_rate: float) -> WheelMotion:
-    """Expected motion and, as the last row, the measured one: one pass through the model."""
-    speed, acceleration = estimate.speed[None, :], estimate.acceleration[None, :]
-    if motion is not None:
-        speed = np.concatenate([motion.speed, speed])
-        acceleration = np.concatenate([motion.acceleration, acceleration])
+def _stacked(expected: WheelMotion | None, measured: WheelMotion, yaw_rate: float) -> WheelMotion:
+    """Expected motion and, as the last rows, the measured one: one pass through the model."""
+    speed, acceleration, resisting = measured.speed, measured.acceleration, measured.resisting
+    if expected is not None:
+        speed = np.concatenate([expected.speed, speed])
+        acceleration = np.concatenate([expected.acceleration, acceleration])
+        if resisting is not None and expected.resisting is not None:
+            resisting = np.concatenate([expected.resisting, resisting])
     if math.isnan(yaw_rate):
-        return WheelMotion(speed, acceleration)
+        return WheelMotion(speed, acceleration, None, resisting)
     gyro = np.full(len(speed), np.nan)
-    gyro[-1] = yaw_rate
-    return WheelMotion(speed, acceleration, gyro)
+    gyro[-len(measured.speed) :] = yaw_rate
+    return WheelMotion(speed, acceleration, gyro, resisting)
 
 
 def _triple(values: Sequence[float] | Array) -> Triple:

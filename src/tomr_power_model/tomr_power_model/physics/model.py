@@ -8,7 +8,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.physics.body import Body
-from tomr_power_model.physics.effects import Effect, WheelState, effects_of
+from tomr_power_model.physics.effects import COPPER, Effect, WheelState, acting, effects_of
 from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -28,6 +28,9 @@ class WheelMotion:
     acceleration: Array  # rad/s^2
     # Of a gyro [rad/s], (n,); NaN or None: as the wheels say.
     yaw_rate: Array | None = None
+    # What the surroundings and the past do; None: nothing.
+    resisting: Array | None = None  # torque that resists besides [N m], (n, 3)
+    warm: Array | None = None  # winding temperature above 25 C [K], (3,)
 
 
 @frozen
@@ -57,7 +60,8 @@ class PhysicalModel:
         tau = K^-T (M nu_dot + c(nu) + drag) + J omega_dot + friction
         i = tau / k,  v = R i + k omega,  P = supplied(v i) + driver losses
 
-    with k the torque constant at the wheel (k_e times gear ratio).
+    with k the torque constant at the wheel (k_e times gear ratio). What depends on place or past
+    (slope, ripple, heat) comes with the motion.
     """
 
     body: Body
@@ -91,7 +95,10 @@ class PhysicalModel:
         """Power of each drive; motion and results of shape (n, 3)."""
         torque = self._torque(motion)
         current = torque / self.constant
-        voltage = self.resistance * current + self.constant * motion.speed
+        resistance = self.resistance
+        if motion.warm is not None:
+            resistance = resistance * (1.0 + COPPER * motion.warm)
+        voltage = resistance * current + self.constant * motion.speed
         return DrivePower(torque, current, voltage, self._drawn(voltage * current, current))
 
     def _torque(self, motion: WheelMotion) -> Array:
@@ -104,7 +111,8 @@ class PhysicalModel:
         if self._drags:
             force += self._drag(twist, motion.speed)
         carried = force @ body.from_force.T + motion.acceleration * body.wheel_inertia
-        return carried + self.friction(motion.speed, carried)
+        torque = carried + self.friction(motion.speed, carried)
+        return torque if motion.resisting is None else torque + motion.resisting
 
     def friction(self, speed: Array, carried: Array) -> Array:
         """Resisting torque at the axles [N m]; `carried` is what the gear transmits besides."""
@@ -122,12 +130,7 @@ class PhysicalModel:
 
     @cached_property
     def _acting(self) -> dict[str, tuple[Effect, ...]]:
-        """The effects by the hook that they override: the others would add zeros."""
-        hooks = ("dry_torque", "moving_torque", "driver_power", "supplied")
-        return {
-            hook: tuple(e for e in self.effects if getattr(type(e), hook) != getattr(Effect, hook))
-            for hook in hooks
-        }
+        return acting(self.effects)
 
     def resistance_at(self, speed: Array, carried: Array) -> tuple[Array, Array]:
         """Limit of dry friction, and the torque that is neither dry nor viscous [N m]."""

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.physics.effects import COPPER
 from tomr_power_model.physics.model import STICKING_SLIDE, PhysicalModel
 from tomr_power_model.robot import Robot
 
@@ -140,8 +141,18 @@ class ClosedLoop:
         integral = [volt / self.integral if self.integral else 0.0 for volt in volts]
         return LoopState(twist, wheels, wheels, _triple(integral), _triple(dry))
 
-    def step(self, state: LoopState, command: Triple) -> LoopState:
-        """One step under a commanded twist (v_x, v_y [m/s], omega_z [rad/s])."""
+    def step(
+        self,
+        state: LoopState,
+        command: Triple,
+        resisting: Triple | None = None,
+        warm: Triple | None = None,
+    ) -> LoopState:
+        """One step under a commanded twist (v_x, v_y [m/s], omega_z [rad/s]).
+
+        `resisting` are torques at the wheels besides those of the model [N m], `warm` is the
+        temperature of the windings above 25 C [K].
+        """
         twist = self._ramped(state.twist, command)
         volts, integral = self._driver(state, twist)
         before = state.speed
@@ -150,6 +161,12 @@ class ClosedLoop:
         if self.varying:
             dry, moving = self._resistance(state)
             torque = torque[0] + moving[0], torque[1] + moving[1], torque[2] + moving[2]
+        if resisting is not None:
+            x, y, z = resisting
+            torque = torque[0] + x, torque[1] + y, torque[2] + z
+        if warm is not None:
+            x, y, z = self._lost_to_heat(volts, before, warm)
+            torque = torque[0] + x, torque[1] + y, torque[2] + z
         (a, b, c), (d, e, f), (x, y, z) = self.drive, volts, torque
         load = a * d - x, b * e - y, c * f - z
         (a, b, c), (x, y, z) = _times(self.decay, before), _times(self.gain, load)
@@ -159,6 +176,14 @@ class ClosedLoop:
         speed = x, y, z = a - x, b - y, c - z
         mean = 0.5 * (x + before[0]), 0.5 * (y + before[1]), 0.5 * (z + before[2])
         return LoopState(twist, speed, mean, integral, friction)
+
+    def _lost_to_heat(self, volts: Triple, speed: Triple, warm: Triple) -> Triple:
+        """Torque that warm windings deliver less than cold ones [N m]."""
+        lost = []
+        for wheel, constant in enumerate(self.model.constant.tolist()):
+            cold = self.drive[wheel] * (volts[wheel] - constant * speed[wheel])
+            lost.append(cold - cold / (1.0 + COPPER * warm[wheel]))
+        return _triple(lost)
 
     def _ramped(self, twist: Triple, command: Triple) -> Triple:
         dx, dy = command[0] - twist[0], command[1] - twist[1]

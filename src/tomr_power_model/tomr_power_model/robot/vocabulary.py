@@ -61,8 +61,12 @@ EFFECTS: Mapping[str, Effect] = MappingProxyType(
         "body.payload_mass": _effect("body", mass=_ANY("kg", _FREE)),
         "body.mass_center_offset": _effect("body", x=_ANY("m", _FREE), y=_ANY("m", _FREE)),
         "body.slope": _effect("body", angle=_ANY("rad", 0.0, 1.0), azimuth=_ANY("rad", _FREE)),
+        # Beyond the contract: `initial`, the temperature above 25 C that a recording begins with.
         "electrical.winding_heating": _effect(
-            "wheel", thermal_resistance=_ANY("K/W"), time_constant=_ANY("s", above=0.0)
+            "wheel",
+            thermal_resistance=_ANY("K/W"),
+            time_constant=_ANY("s", above=0.0),
+            initial=_ANY("K", _FREE, default=0.0),
         ),
         "electrical.supply_sag": _effect("supply", resistance=_ANY("ohm")),
         "electrical.driver_standby": _effect("wheel", power=_ANY("W")),

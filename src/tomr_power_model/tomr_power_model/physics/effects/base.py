@@ -4,7 +4,7 @@ An effect is one frozen class. Its fields are named as its parameters in the voc
 one number per wheel, shape (3,). It overrides the hooks that it acts on; all others are neutral.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import ClassVar, TypeVar
 
 import numpy as np
@@ -26,6 +26,7 @@ class WheelState:
     transmitted: Array  # torque carried by the gear [N m], (n, 3)
     wheel_radius: Array  # m, (3,)
     gear_ratio: Array  # motor turns per wheel turn, (3,)
+    angle: Array | None = None  # as joint_states count it [rad], (n, 3); None: not known
 
 
 @frozen
@@ -64,13 +65,29 @@ class Effect:
         """Power lost in the driver on top of the motor's [W], from motor current [A]."""
         return 0.0
 
-    def voltage_drop(self) -> float:
+    def floor_force(self, mass: Array, heading: Array) -> Array | float:
+        """Force of a tilted floor on the body, in base_link [N], shape (..., 2)."""
+        return 0.0
+
+    def voltage_drop(self) -> Array | float:
         """Fall of the supply voltage per ampere of total current [ohm]."""
         return 0.0
 
     def supplied(self, power: Array) -> Array:
         """Power at the supply [W] from power at the motor terminals [W]."""
         return power
+
+    def reported(self, power: Array) -> Array:
+        """Power that a wheel's monitor reports [W]."""
+        return power
+
+    def lag(self) -> Array | float:
+        """Time constant with which a wheel's monitor follows [s]."""
+        return 0.0
+
+    def delayed(self) -> Array | float:
+        """Age of what a wheel's monitor reports, by its stamp [s]."""
+        return 0.0
 
 
 _REGISTRY: dict[str, type[Effect]] = {}
@@ -93,6 +110,42 @@ def modelled_effects() -> list[str]:
     return sorted(_REGISTRY)
 
 
+_HOOKS = (
+    "dry_torque",
+    "moving_torque",
+    "driver_power",
+    "supplied",
+    "floor_force",
+    "reported",
+    "lag",
+    "delayed",
+)
+
+
+def acting(effects: Sequence[Effect]) -> dict[str, tuple[Effect, ...]]:
+    """Effects by the hook that they override: the others would add zeros."""
+    return {
+        hook: tuple(e for e in effects if getattr(type(e), hook) != getattr(Effect, hook))
+        for hook in _HOOKS
+    }
+
+
+def stacked_effects(robots: Sequence[Robot]) -> tuple[Effect, ...]:
+    """The effects that any of v robots has, fields of shape (v, 1, 3): neutral where absent."""
+    found = dict.fromkeys(effect_id for robot in robots for effect_id in robot.physics)
+    return tuple(_stack([_make(effect_id, robot) for robot in robots]) for effect_id in found)
+
+
+def _stack(effects: Sequence[Effect]) -> Effect:
+    cls = type(effects[0])
+    return cls(
+        **{
+            field.name: np.stack([getattr(item, field.name) for item in effects])[:, None, :]
+            for field in fields(cls)
+        }
+    )
+
+
 def effects_of(robot: Robot) -> tuple[Effect, ...]:
     """The effects that this robot's description switches on.
 
@@ -103,7 +156,7 @@ def effects_of(robot: Robot) -> tuple[Effect, ...]:
 
 
 # Parameters whose neutral value is not zero: a speed divides, an efficiency or a scale multiplies.
-_NEUTRAL = {"speed": 1.0, "efficiency": 1.0, "scale": 1.0}
+_NEUTRAL = {"speed": 1.0, "efficiency": 1.0, "scale": 1.0, "time_constant": 0.0}
 
 
 def _make(effect_id: str, robot: Robot) -> Effect:

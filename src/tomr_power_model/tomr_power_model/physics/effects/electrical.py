@@ -5,6 +5,8 @@ from attrs import frozen
 
 from tomr_power_model.physics.effects.base import Array, Effect, effect
 
+COPPER = 0.00393  # 1/K, growth of the winding resistance
+
 
 @effect("electrical.driver_standby")
 @frozen
@@ -46,5 +48,19 @@ class SupplySag(Effect):
 
     resistance: Array  # ohm
 
-    def voltage_drop(self) -> float:
-        return float(self.resistance[0])
+    def voltage_drop(self) -> Array:
+        return np.asarray(self.resistance[..., 0])
+
+
+@effect("electrical.winding_heating")
+@frozen
+class WindingHeating(Effect):
+    """R grows by COPPER per kelvin of a hidden winding temperature T above 25 C.
+
+    T' = (thermal_resistance * copper loss - T) / time_constant. Whoever steps through time
+    integrates T, from `initial` on; beyond the contract, which starts at 0.
+    """
+
+    thermal_resistance: Array  # K/W
+    time_constant: Array  # s
+    initial: Array  # K

@@ -131,3 +131,20 @@ class IronLoss(Effect):
 
     def viscous(self, gear_ratio: Array) -> Array:
         return np.asarray(self.eddy * gear_ratio**2)
+
+
+@effect("drivetrain.torque_ripple")
+@frozen
+class TorqueRipple(Effect):
+    """tau = torque * sin(order * theta + phase), theta the wheel angle; opposes positive motion."""
+
+    varies: ClassVar[bool] = True
+
+    torque: Array  # N m
+    order: Array  # 1/rev
+    phase: Array  # rad
+
+    def moving_torque(self, state: WheelState) -> Array | float:
+        if state.angle is None:
+            return 0.0
+        return np.asarray(self.torque * np.sin(self.order * state.angle + self.phase))

@@ -1,0 +1,350 @@
+"""The drivers' closed loop of many robots at once, over many stretches of one recording.
+
+The same loop as `closed_loop`, with every quantity an array (v, c, 3): v variants of a robot, c
+stretches that begin a warm-up earlier, wheels. Stretches run side by side because the loop forgets
+in less than a second; variants, because a derivative is the difference of two of them.
+
+Each driver period h is integrated in `substeps` equal parts; the voltage holds over the period.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Self
+
+import numpy as np
+from attrs import field, frozen
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from tomr_power_model.physics.effects import COPPER, Effect, WheelState, acting, stacked_effects
+from tomr_power_model.physics.model import STICKING_SLIDE, PhysicalModel
+from tomr_power_model.robot import Robot
+
+Array = NDArray[np.float64]
+
+_COARSEST = 0.005  # s, of a substep
+_SWEEPS = 2  # of Gauss-Seidel; the last step's friction is the first guess
+_NO_SLIDE = 1e-12
+
+
+@frozen
+class Stretches:
+    """What the loops are driven with: c stretches of s driver periods, variants alike.
+
+    Where variants differ the first axis has length v, else 1.
+    """
+
+    set_speed: Array  # wheel speeds asked for by the ramped command [rad/s], (1 or v, c, s, 3)
+    speed: Array  # wheel speeds at the start [rad/s], (c, 3)
+    acceleration: Array  # rad/s^2, (c, 3)
+    angle: Array  # wheel angles at the start, as joint_states count them [rad], (c, 3)
+    heading: Array  # of base_link against the start of the recording [rad], (c,)
+    warm: Array | None = None  # winding temperature above 25 C [K], (v, c, s, 3); None: cold
+    prompt: bool = False  # whether the drivers' sum of errors holds the present one already
+    torque: Array | None = None  # that resists besides, as a function of time [N m], (v, c, s, 3)
+
+
+@frozen
+class Runs:
+    """What came out, means over substeps of the driver periods; arrays (s, v, c, ...)."""
+
+    speed: Array  # of the wheels [rad/s], (s, v, c, 3)
+    power: Array  # drawn by each driver [W], (s, v, c, 3)
+    tilt: Array  # change of that power from a substep's start to its end [W], (s, v, c, 3)
+    voltage: Array  # of the supply [V], (s, v, c)
+    yaw_rate: Array  # rad/s, (s, v, c)
+    copper: Array  # i^2 R of each motor [W], (s, v, c, 3)
+
+
+@frozen
+class ManyLoops:
+    """Loops of v robots that share a driver period; see `closed_loop.ClosedLoop` for the names."""
+
+    period_s: float
+    substeps: int
+    inertia: Array  # M as the wheels feel it, (v, 3, 3)
+    decay: Array  # E^T, (v, 3, 3): rows of wheels times it
+    gain: Array  # G^T
+    constant: Array  # k, (v, 1, 3)
+    resistance: Array  # ohm, (v, 1, 3)
+    to_twist: Array  # transposed, (v, 3, 3)
+    from_force: Array  # transposed
+    turning: Array  # (v, 3, 3)
+    axles: Array  # (3, 2)
+    mass: Array  # (v, 1, 1)
+    rotor: Array  # rotor inertia at the wheel [kg m^2], (v, 1, 3)
+    normal: Array  # (v, 1, 3)
+    wheel_radius: Array  # (v, 1, 3)
+    gear_ratio: Array  # (v, 1, 3)
+    proportional: Array  # (v, 1, 1)
+    integral: Array  # (v, 1, 1)
+    voltage: Array  # nominal [V], (v, 1, 1)
+    auxiliary: Array  # W, (v, 1)
+    effects: tuple[Effect, ...] = field(repr=False)
+
+    @classmethod
+    def of(cls, robots: Sequence[Robot]) -> Self:
+        """Discretise the loops of robots that differ in numbers, not in the driver's rate."""
+        models = [PhysicalModel.of(robot) for robot in robots]
+        period = 1.0 / robots[0].controller.rate
+        substeps = max(1, math.ceil(period / _COARSEST - 1e-9))
+        bodies = [model.body for model in models]
+
+        def rows(values: Callable[[int], object]) -> Array:
+            return np.array([values(v) for v in range(len(robots))], dtype=np.float64)
+
+        constant = rows(lambda v: models[v].constant)
+        resistance = rows(lambda v: models[v].resistance)
+        viscous = rows(lambda v: models[v].viscous)
+        inertia = rows(lambda v: bodies[v].wheel_mass_matrix)
+        damping = np.zeros_like(inertia)
+        damping[:, range(3), range(3)] = constant**2 / resistance + viscous
+        decay = expm(-(period / substeps) * np.linalg.solve(inertia, damping))
+        gain = (np.eye(3) - decay) @ np.linalg.inv(damping)
+        transposed = (0, 2, 1)
+        return cls(
+            period_s=period,
+            substeps=substeps,
+            inertia=inertia.transpose(transposed),
+            decay=decay.transpose(transposed),
+            gain=gain.transpose(transposed),
+            constant=constant[:, None, :],
+            resistance=resistance[:, None, :],
+            to_twist=rows(lambda v: bodies[v].to_twist.T),
+            from_force=rows(lambda v: bodies[v].from_force.T),
+            turning=rows(lambda v: bodies[v].turning),
+            axles=bodies[0].axles,
+            mass=rows(lambda v: bodies[v].mass)[:, None, None],
+            rotor=rows(lambda v: [m.gear_ratio**2 * m.rotor_inertia for m in robots[v].motors])[
+                :, None, :
+            ],
+            normal=rows(lambda v: bodies[v].normal)[:, None, :],
+            wheel_radius=rows(lambda v: models[v].wheel_radius)[:, None, :],
+            gear_ratio=rows(lambda v: models[v].gear_ratio)[:, None, :],
+            proportional=rows(lambda v: robots[v].controller.proportional)[:, None, None],
+            integral=rows(lambda v: robots[v].controller.integral)[:, None, None],
+            voltage=rows(lambda v: robots[v].supply.nominal_voltage)[:, None, None],
+            auxiliary=rows(lambda v: robots[v].supply.auxiliary_power)[:, None],
+            effects=stacked_effects(robots),
+        )
+
+    def run(self, stretches: Stretches, tick: Callable[[], None] = lambda: None) -> Runs:
+        """Run all variants over all stretches; `tick` is called once per driver period."""
+        loop = _Stepper(self, stretches)
+        count = stretches.set_speed.shape[2]
+        variants = max(len(self.constant), 1 if stretches.torque is None else len(stretches.torque))
+        shape = count * self.substeps, variants, len(stretches.speed)
+        runs = Runs(
+            speed=np.empty((*shape, 3)),
+            power=np.empty((*shape, 3)),
+            tilt=np.empty((*shape, 3)),
+            voltage=np.empty(shape),
+            yaw_rate=np.empty(shape),
+            copper=np.empty((*shape, 3)),
+        )
+        for step in range(count):
+            loop.period(step, runs)
+            tick()
+        return runs
+
+
+class _Stepper:
+    """State of all loops while they run; arrays (v, c, 3)."""
+
+    def __init__(self, loops: ManyLoops, stretches: Stretches) -> None:
+        self._loops = loops
+        self._stretches = stretches
+        variants = max(
+            len(loops.constant), 1 if stretches.torque is None else len(stretches.torque)
+        )
+        shape = (variants, *stretches.speed.shape)
+        self.speed = np.broadcast_to(stretches.speed, shape).copy()
+        self.turned = np.zeros(shape)
+        self.heading = np.broadcast_to(stretches.heading, shape[:2]).copy()
+        self.torque = np.zeros(shape)  # of the motors [N m]
+        self.acceleration = np.broadcast_to(stretches.acceleration, shape).copy()
+        self.measured = self.speed.copy()
+        self.drawn = np.zeros(shape[:2])  # A of the whole robot
+        self.extra: Array | float = 0.0
+        self.acting = acting(loops.effects)
+        drag = sum((e.axle_drag(loops.normal) for e in loops.effects), np.zeros((1, 1, 3)))
+        self.drag = np.asarray(drag)
+        self.slide = np.asarray(
+            loops.wheel_radius * sum((e.axle_slip() for e in loops.effects), np.zeros((1, 1, 3)))
+        )
+        self.holds = bool(np.any(self.drag)) and not np.any(self.slide)
+        self.contacts = _Contacts.of(loops, self.holds)
+        self.friction = np.zeros((*shape[:2], self.contacts.count))
+        self.sag = np.asarray(sum((e.voltage_drop() for e in loops.effects), np.zeros(1)))
+        self.integral = self._steady()
+
+    def _steady(self) -> Array:
+        """Integrals [rad] that hold the motion which the stretches begin with."""
+        loops = self._loops
+        state = self._state()
+        dry, moving = self._resistance(state)
+        inertial = self.acceleration @ loops.inertia
+        torque = inertial + self._external(self.speed) + dry * np.sign(self.speed) + moving
+        volts = loops.constant * self.speed + torque * loops.resistance / loops.constant
+        return np.where(loops.integral > 0.0, volts / np.maximum(loops.integral, 1e-12), 0.0)
+
+    def _state(self) -> WheelState:
+        loops = self._loops
+        transmitted = self.torque - loops.rotor * self.acceleration
+        angle = self._stretches.angle + self.turned
+        return WheelState(
+            self.speed, loops.normal, transmitted, loops.wheel_radius, loops.gear_ratio, angle
+        )
+
+    def _resistance(self, state: WheelState) -> tuple[Array, Array]:
+        """Limit of dry friction, and the torque that is neither dry nor viscous [N m]."""
+        still = np.zeros_like(self.speed)
+        dry = sum((e.dry_torque(state) for e in self.acting["dry_torque"]), still)
+        moving = sum((e.moving_torque(state) for e in self.acting["moving_torque"]), still)
+        return np.maximum(dry, 0.0), np.asarray(moving)
+
+    def _external(self, speed: Array) -> Array:
+        """Wheel torques of omega x v, of axle drag and of the floor's slope [N m]."""
+        loops = self._loops
+        twist = speed @ loops.to_twist
+        force = twist[..., 2:] * (twist @ loops.turning)
+        if np.any(self.slide):
+            along = twist[..., :2] @ loops.axles.T
+            sliding = np.maximum(np.hypot(along, self.slide * speed), _NO_SLIDE)
+            share = np.tanh(sliding / STICKING_SLIDE) * along / sliding
+            force[..., :2] += (self.drag * share) @ loops.axles
+        for effect in self.acting["floor_force"]:
+            force[..., :2] -= effect.floor_force(loops.mass, self.heading[..., None])
+        self.yaw_rate = twist[..., 2]
+        return np.asarray(force @ loops.from_force)
+
+    def _volts(self, step: int) -> Array:
+        """Voltages of the drivers [V], after one control step."""
+        loops = self._loops
+        error = self._stretches.set_speed[:, :, step] - self.measured
+        total = self.integral + error * loops.period_s
+        summed = total if self._stretches.prompt else self.integral
+        wanted = loops.proportional * error + loops.integral * summed
+        volts = np.clip(wanted, -loops.voltage, loops.voltage)
+        self.integral = np.where(volts == wanted, total, self.integral)
+        return np.asarray(volts)
+
+    def period(self, step: int, runs: Runs) -> None:
+        """One driver period; writes its means into the runs."""
+        loops, warm = self._loops, self._stretches.warm
+        before = self.turned
+        bus = loops.voltage[..., 0] - self.sag * self.drawn
+        volts = self._volts(step) * (bus[..., None] / loops.voltage)
+        resistance = loops.resistance
+        if warm is not None:
+            resistance = resistance * (1.0 + COPPER * warm[:, :, step])
+        drawn = np.zeros(volts.shape[:2])
+        rows = range(step * loops.substeps, (step + 1) * loops.substeps)
+        extra = self._stretches.torque
+        self.extra = 0.0 if extra is None else extra[:, :, step]
+        for row in rows:
+            turned, speed = self.turned, self.speed
+            current = self._substep(volts, resistance)
+            before_it = (volts - loops.constant * speed) / resistance
+            after_it = 2.0 * current - before_it
+            first = self._drawn(volts * before_it, before_it)
+            last = self._drawn(volts * after_it, after_it)
+            power = 0.5 * (first + last)
+            runs.tilt[row] = last - first
+            drawn += power.sum(axis=2)
+            runs.power[row] = power
+            runs.copper[row] = resistance * current**2
+            runs.speed[row] = (self.turned - turned) * (loops.substeps / loops.period_s)
+            runs.yaw_rate[row] = self.yaw_rate
+        self.measured = (self.turned - before) / loops.period_s
+        self.drawn = (drawn / loops.substeps + loops.auxiliary) / bus
+        runs.voltage[rows.start : rows.stop] = loops.voltage[..., 0] - self.sag * self.drawn
+
+    def _substep(self, volts: Array, resistance: Array) -> Array:
+        """Advance all wheels; returns the mean motor currents [A]."""
+        loops = self._loops
+        duration = loops.period_s / loops.substeps
+        dry, moving = self._resistance(self._state())
+        load = (
+            loops.constant / resistance * volts - moving - self._external(self.speed) - self.extra
+        )
+        if resistance is not loops.resistance:
+            # The discretised damping is that of cold windings: what is less is given back.
+            cold, hot = loops.constant**2 / loops.resistance, loops.constant**2 / resistance
+            load += (cold - hot) * self.speed
+        free = self.speed @ loops.decay + load @ loops.gain
+        limits = dry
+        if self.holds:
+            limits = np.concatenate([dry, np.broadcast_to(self.drag, dry.shape)], axis=-1)
+        self.friction = self.contacts.solve(free, limits, self.friction)
+        speed = free - self.contacts.effect(self.friction)
+        mean = 0.5 * (speed + self.speed)
+        self.acceleration = (speed - self.speed) / duration
+        self.speed = speed
+        self.turned = self.turned + mean * duration
+        self.heading += self.yaw_rate * duration
+        current = (volts - loops.constant * mean) / resistance
+        self.torque = loops.constant * current
+        return np.asarray(current)
+
+    def _drawn(self, power: Array, current: Array) -> Array:
+        for effect in self.acting["supplied"]:
+            power = effect.supplied(power)
+        for effect in self.acting["driver_power"]:
+            power = power + effect.driver_power(current)
+        return power
+
+
+@frozen
+class _Contacts:
+    """Dry friction at the axles, and of the rollers along them, as one complementarity problem.
+
+    u = S (free - G S^T f) with S = [I; D], D the sliding of each contact along its axle per wheel
+    speed; each f is the force within its limit that brings its u to rest if it can.
+    """
+
+    slides: Array  # S^T, (v, 3, k)
+    moves: Array  # (G S^T)^T, (v, k, 3)
+    coupling: Array  # columns of S G S^T, (k, k, v, 1): [column, row]
+    own: Array  # its diagonal, (k, v, 1)
+
+    @classmethod
+    def of(cls, loops: ManyLoops, holds: bool) -> Self:
+        """Three rows, or six where rollers drag."""
+        gain = loops.gain.transpose(0, 2, 1)
+        rows = np.broadcast_to(np.eye(3), gain.shape)
+        if holds:
+            along = loops.axles @ loops.to_twist.transpose(0, 2, 1)[:, :2]
+            rows = np.concatenate([rows, along], axis=1)
+        moves = gain @ rows.transpose(0, 2, 1)
+        coupling = np.ascontiguousarray((rows @ moves).transpose(2, 1, 0))[..., None]
+        return cls(
+            np.ascontiguousarray(rows.transpose(0, 2, 1)),
+            np.ascontiguousarray(moves.transpose(0, 2, 1)),
+            coupling,
+            np.stack([coupling[row, row] for row in range(len(coupling))]),
+        )
+
+    @property
+    def count(self) -> int:
+        return int(self.slides.shape[2])
+
+    def effect(self, forces: Array) -> Array:
+        """Change of wheel speeds [rad/s], (v, c, 3)."""
+        return np.asarray(forces @ self.moves)
+
+    def solve(self, free: Array, limits: Array, guess: Array) -> Array:
+        """Forces and torques after projected Gauss-Seidel from the last ones, (v, c, k)."""
+        moving = np.ascontiguousarray(
+            ((free - self.effect(guess)) @ self.slides).transpose(2, 0, 1)
+        )
+        forces = np.ascontiguousarray(guess.transpose(2, 0, 1))
+        most = np.ascontiguousarray(np.broadcast_to(limits, guess.shape).transpose(2, 0, 1))
+        least = -most
+        for row in [*range(self.count)] * _SWEEPS:
+            wanted = forces[row] + moving[row] / self.own[row]
+            np.maximum(wanted, least[row], out=wanted)
+            np.minimum(wanted, most[row], out=wanted)
+            moving -= self.coupling[row] * (wanted - forces[row])
+            forces[row] = wanted
+        return np.asarray(forces.transpose(1, 2, 0))
