@@ -1,0 +1,80 @@
+"""Evidence by hand, and effects that the search must find in made recordings."""
+
+import numpy as np
+import pytest
+from attrs import evolve
+from scipy.stats import multivariate_normal
+
+from tomr_power_model.robot import Robot, read_description
+from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.fit.linear import Gram, evidence
+from tomr_reality_gap.fit.noise import rows_of
+from tomr_reality_gap.fit.search import search
+from tomr_reality_gap.fit.study import Model, Study
+from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
+from tomr_reality_gap.hypotheses.knobs import Turned, turned
+from tomr_reality_gap.hypotheses.scales import scales_of
+
+from .test_alignment import forward  # noqa: F401 -- the fixture
+
+NOISE = {"power": 0.1, "total": 0.2, "voltage": 3e-3, "speed": 0.02, "yaw": 2e-3}
+TRIED = ("friction.asymmetric", "friction.viscous", "electrical.switching_loss", "body.payload")
+
+
+def test_evidence_is_the_ratio_of_gaussian_densities() -> None:
+    random = np.random.default_rng(0)
+    columns, residual = random.normal(size=(12, 3)), random.normal(size=12)
+    with_all = multivariate_normal(np.zeros(12), np.eye(12) + columns @ columns.T)
+    nothing = multivariate_normal(np.zeros(12), np.eye(12))
+    expected = with_all.logpdf(residual) - nothing.logpdf(residual)
+    assert evidence(Gram.of(columns, residual), [0, 1, 2]) == pytest.approx(expected)
+
+
+def _base(robot: Robot) -> Turned:
+    return turned(dict(read_description("reference")), robot.wheel_names, "reference")
+
+
+def _searched(made: Forward, real: Robot):  # type: ignore[no-untyped-def]
+    """Record `real` with noise, and search with the description of the reference robot."""
+    random = np.random.default_rng(5)
+    value = made.predict([real])[0]
+    channels = tuple(
+        evolve(c, value=value[part] + NOISE[c.kind] * random.standard_normal(len(c.time)))
+        for c, part in zip(made.channels, rows_of(made.channels), strict=True)
+    )
+    base, wheels = _base(made.robot), made.robot.wheel_names
+    run = made.run(base.robot)
+    scales = scales_of(made.robot, run["speed"], run["power"], run["copper"], 30.0)
+    knobs = nuisances(base, wheels, 0.02)
+    candidates = [
+        item for item in catalogue(base, wheels, scales, 0.02) if item.effect.startswith(TRIED)
+    ]
+    study = Study((evolve(made, channels=channels),))
+    return search(study, Model(base, knobs, (0.0,) * len(knobs)), candidates)
+
+
+def test_a_concealed_friction_is_named_with_its_wheel_and_size(
+    forward: Forward,  # noqa: F811
+) -> None:
+    robot = forward.robot
+    concealed = (None, {"torque": 0.02}, None)
+    real = evolve(
+        robot, mass=1.01 * robot.mass, physics={**robot.physics, "friction.asymmetric": concealed}
+    )
+    found = _searched(forward, real).best
+    assert [item.name for item in found.model.hypotheses] == [
+        "friction.asymmetric at wheel_2_joint"
+    ]
+    value, sigma = found.model.turns[0][0], found.own_sigma[0]
+    assert abs(value - 0.02) < 4.0 * sigma
+    assert sigma < 0.004
+
+
+def test_deviations_within_the_tolerance_are_no_finding(forward: Forward) -> None:  # noqa: F811
+    robot = forward.robot
+    motors = tuple(
+        evolve(motor, resistance=motor.resistance * scale)
+        for motor, scale in zip(robot.motors, (1.015, 0.99, 0.985), strict=True)
+    )
+    real = evolve(robot, mass=0.985 * robot.mass, motors=motors)
+    assert not _searched(forward, real).best.model.hypotheses

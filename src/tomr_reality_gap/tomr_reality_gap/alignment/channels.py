@@ -1,0 +1,113 @@
+"""A recording as channels: what was measured when, each compared with a model in its own unit."""
+
+from typing import Literal
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.robot import Robot
+from tomr_reality_gap.alignment.steady import steady
+
+Array = NDArray[np.float64]
+Kind = Literal["power", "total", "voltage", "speed", "yaw"]
+
+_BLOCK = 0.05  # s, over which wheel speed and yaw rate are averaged
+_GAP = 3.0  # usual periods between two encoder samples: a longer time is a gap, and stays one
+
+
+@frozen
+class Channel:
+    """One measured quantity; times in seconds since the recording's start."""
+
+    name: str  # as in the report: a topic, or a wheel and what of it
+    kind: Kind
+    wheel: int | None
+    unit: str
+    time: Array  # end of what the value is a mean of [s], (n,)
+    span: Array  # how long that is [s], (n,)
+    value: Array  # (n,)
+
+
+def channels_of(
+    recorded: Recorded, robot: Robot, window: float, even: bool = False
+) -> tuple[Channel, ...]:
+    """All channels of a recording that hold anything.
+
+    Args:
+        recorded: the recording.
+        robot: its description.
+        window: over which the power sensors average before their stamp [s].
+        even: whether the stamps of power jitter around even ones.
+    """
+    found = [*_powers(recorded, robot, window), *_speeds(recorded, robot)]
+    if even:
+        found = [
+            item if item.kind == "speed" else evolve(item, time=steady(item.time)) for item in found
+        ]
+    if len(recorded.yaw_time) > 1:
+        found.append(_blocks(recorded))
+    return tuple(channel for channel in found if len(channel.time))
+
+
+def _known(
+    name: str, kind: Kind, wheel: int | None, unit: str, time: Array, window: float, value: Array
+) -> Channel:
+    rows = np.isfinite(value)
+    span = np.full(int(rows.sum()), window)
+    return Channel(name, kind, wheel, unit, time[rows], span, value[rows])
+
+
+def _powers(recorded: Recorded, robot: Robot, window: float) -> list[Channel]:
+    found = [
+        _known(
+            f"{topic}/power",
+            "power",
+            wheel,
+            "W",
+            recorded.power_time,
+            window,
+            recorded.power[:, wheel],
+        )
+        for wheel, topic in enumerate(robot.wheel_topics)
+    ]
+    total = recorded.total_time, window, recorded.total
+    found.append(_known("battery_state", "total", None, "W", *total))
+    volts = recorded.total_voltage
+    found.append(
+        _known("battery_state voltage", "voltage", None, "V", recorded.total_time, window, volts)
+    )
+    return found
+
+
+def _blocks(recorded: Recorded) -> Channel:
+    """The gyro's yaw rate, means over blocks of `_BLOCK`."""
+    time, rate = recorded.yaw_time, recorded.yaw_rate
+    every = max(1, round(_BLOCK / float(np.median(np.diff(time)))))
+    rows = np.arange(len(time) // every * every).reshape(-1, every)
+    usual = every * float(np.median(np.diff(time)))
+    whole = np.ptp(time[rows], axis=1) < usual
+    middle, value = time[rows].mean(axis=1)[whole], rate[rows].mean(axis=1)[whole]
+    span = np.full(len(middle), usual)
+    return Channel("imu/data", "yaw", None, "rad/s", middle + 0.5 * usual, span, value)
+
+
+def _speeds(recorded: Recorded, robot: Robot) -> list[Channel]:
+    """Mean wheel speeds between encoder samples, from angles; the sample's speed without them."""
+    found = []
+    for wheel, name in enumerate(robot.wheel_names):
+        known = np.isfinite(recorded.position[:, wheel])
+        time = recorded.encoder_time
+        if known.sum() > 1:
+            every = max(1, round(_BLOCK / float(np.median(np.diff(time[known])))))
+            time, angle = time[known][::every], recorded.position[known, wheel][::every]
+            span = np.diff(time)
+            rows = span < _GAP * np.median(span)
+            speed = np.diff(angle)[rows] / span[rows]
+            found.append(Channel(name, "speed", wheel, "rad/s", time[1:][rows], span[rows], speed))
+        else:
+            found.append(
+                _known(name, "speed", wheel, "rad/s", time, 0.0, recorded.velocity[:, wheel])
+            )
+    return found

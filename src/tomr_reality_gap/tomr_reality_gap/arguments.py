@@ -1,0 +1,112 @@
+"""What the commands are given: recordings, a description and how far it is believed."""
+
+import argparse
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from attrs import frozen
+
+from tomr_power_model.errors import InputError
+from tomr_power_model.robot import shipped_robots
+
+DEFAULT_TOLERANCE = 0.02
+
+
+@frozen
+class Inputs:
+    """One robot, its recordings, and how far its description may be off (relative)."""
+
+    robot: str
+    real: tuple[Path, ...]
+    sim: Path | None
+    holdout: tuple[Path, ...]
+    tolerance: float
+    tolerances: Mapping[str, float]
+
+
+def add_inputs(parser: argparse.ArgumentParser) -> None:
+    """Options that `inputs_of` reads."""
+    add = parser.add_argument
+    add("--robot", required=True, help=f"robot.yaml, or one of {', '.join(shipped_robots())}")
+    add(
+        "--real",
+        nargs="+",
+        action="extend",
+        type=Path,
+        required=True,
+        metavar="BAG",
+        help="recordings of the real robot",
+    )
+    add("--sim", type=Path, metavar="BAG", help="recording of the simulation, commanded alike")
+    add(
+        "--holdout",
+        nargs="+",
+        action="extend",
+        type=Path,
+        default=[],
+        metavar="BAG",
+        help="real recordings that are scored only",
+    )
+    add_tolerance(parser)
+
+
+def add_tolerance(parser: argparse.ArgumentParser) -> None:
+    """The option that `tolerances_of` reads."""
+    parser.add_argument(
+        "--tolerance",
+        action="append",
+        default=[],
+        metavar="REL or KEY=REL",
+        help="how far values, or this one, may be off; repeatable",
+    )
+
+
+def add_quiet(parser: argparse.ArgumentParser) -> None:
+    """The option to print nothing."""
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+
+
+def inputs_of(options: argparse.Namespace) -> Inputs:
+    """The inputs. Raises InputError for what cannot be meant."""
+    tolerance, tolerances = tolerances_of(options.tolerance)
+    seen: dict[Path, str] = {}
+    given = [("--real", path) for path in options.real]
+    given += [("--holdout", path) for path in options.holdout]
+    given += [("--sim", options.sim)] if options.sim is not None else []
+    for option, path in given:
+        if not path.exists():
+            raise InputError(f"{option} {path}: no such recording: give a folder or file of a bag")
+        first = seen.setdefault(path.resolve(), option)
+        if first != option:
+            raise InputError(f"{option} {path}: it is given as {first}, too: give it once")
+    return Inputs(
+        robot=options.robot,
+        real=tuple(dict.fromkeys(options.real)),
+        sim=options.sim,
+        holdout=tuple(dict.fromkeys(options.holdout)),
+        tolerance=tolerance,
+        tolerances=tolerances,
+    )
+
+
+def tolerances_of(given: Sequence[str]) -> tuple[float, dict[str, float]]:
+    """The general tolerance and those of single values, from REL and KEY=REL."""
+    general: float | None = None
+    single: dict[str, float] = {}
+    for text in given:
+        key, _, number = text.rpartition("=")
+        try:
+            value = float(number)
+        except ValueError:
+            raise InputError(
+                f"--tolerance {text}: give REL or KEY=REL, e.g. 0.02 or robot.mass=0.05"
+            ) from None
+        if not 0.0 <= value < 1.0:
+            raise InputError(f"--tolerance {text}: give a share from 0 to below 1")
+        if key in single or (not key and general is not None):
+            raise InputError(f"--tolerance {text}: it is given twice: give it once")
+        if key:
+            single[key] = value
+        else:
+            general = value
+    return (DEFAULT_TOLERANCE if general is None else general), single

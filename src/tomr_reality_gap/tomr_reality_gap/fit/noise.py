@@ -1,0 +1,116 @@
+"""What is left when everything imaginable has been fitted: the noise of each channel.
+
+A channel's variance is  a + b (dP/dt)^2 + c P^2  with P what the model says: sensor noise, jitter
+of stamps, and noise that grows with the quantity (an encoder's quanta pass through the driver into
+the voltage). What is correlated counts for less: a sample weighs 1 / (variance T) with T the
+autocorrelation time in samples.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from tomr_reality_gap.alignment.channels import Channel
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 4
+_RIDGE = 1e-2
+_FLOOR = 0.3  # of the median deviation: a channel that stands still for long is not that exact
+_INEXACT = 4e-3  # of motion: what the simulator itself is not sure of
+_OUTLIER = 4.0  # standard deviations: beyond, a sample weighs less
+_LAGS = 80
+_UNCORRELATED = 0.03
+
+
+@frozen
+class Noise:
+    """Weights of all samples, and what they were made of."""
+
+    weight: Array  # 1 / sigma of each sample, correlation and outliers accounted for, (n,)
+    sigma: Array  # of each sample, (n,)
+    time: tuple[float, ...]  # autocorrelation time of each channel [samples]
+
+
+def rows_of(channels: Sequence[Channel]) -> list[slice]:
+    """Rows of each channel in the stacked values."""
+    edges = np.cumsum([0, *(len(channel.time) for channel in channels)])
+    return [slice(int(first), int(last)) for first, last in pairwise(edges)]
+
+
+def noise_of(
+    channels: Sequence[Channel], residual: Array, columns: Array, value: Array, slope: Array
+) -> Noise:
+    """Noise left by a fit of all columns together.
+
+    Args:
+        channels: that the rows belong to.
+        residual: measured - modelled, (n,).
+        columns: of everything that may explain it, scaled by beliefs, (n, p).
+        value: modelled, (n,).
+        slope: its derivative in time, (n,).
+    """
+    rows = rows_of(channels)
+    variance = np.empty_like(residual)
+    for part in rows:
+        variance[part] = _scale(residual[part]) ** 2
+    times = np.ones(len(rows))
+    outlier = np.ones_like(residual)
+    for _ in range(_ROUNDS):
+        weight = _weight(rows, variance, times, outlier)
+        left = residual - columns @ _ridge(columns * weight[:, None], residual * weight)
+        for number, (channel, part) in enumerate(zip(channels, rows, strict=True)):
+            noise = left[part]
+            variance[part] = _variance(channel, noise, variance[part], value[part], slope[part])
+            standard = noise / np.sqrt(variance[part])
+            times[number] = _correlation_time(np.clip(standard, -_OUTLIER, _OUTLIER))
+            outlier[part] = np.minimum(1.0, _OUTLIER / np.maximum(np.abs(standard), 1e-12))
+    weight = _weight(rows, variance, times, outlier)
+    return Noise(weight, np.sqrt(variance), tuple(times.tolist()))
+
+
+def _weight(rows: Sequence[slice], variance: Array, times: Array, outlier: Array) -> Array:
+    weight = outlier / np.sqrt(variance)
+    for part, time in zip(rows, times, strict=True):
+        weight[part] /= np.sqrt(time)
+    return weight
+
+
+def _ridge(columns: Array, residual: Array) -> Array:
+    gram = columns.T @ columns
+    return np.asarray(np.linalg.solve(gram + _RIDGE * np.eye(len(gram)), columns.T @ residual))
+
+
+def _scale(noise: Array) -> float:
+    spread = 1.4826 * float(np.median(np.abs(noise)))
+    return max(spread, 0.1 * float(np.std(noise)), 1e-9)
+
+
+def _variance(channel: Channel, noise: Array, before: Array, value: Array, slope: Array) -> Array:
+    features = [np.ones_like(noise)]
+    if channel.kind != "voltage":
+        features += [slope**2, value**2]
+    matrix = np.stack(features, axis=1) / before[:, None]
+    square = np.minimum(noise**2, _OUTLIER**2 * before) / before
+    unit = np.sqrt((matrix**2).sum(axis=0)) + 1e-300
+    shares, _ = nnls(matrix / unit, square)
+    floor = (_FLOOR * _scale(noise)) ** 2
+    if channel.kind in ("speed", "yaw"):
+        floor += (_INEXACT * float(np.std(value))) ** 2
+    return np.asarray(np.maximum((matrix * before[:, None]) @ (shares / unit), floor))
+
+
+def _correlation_time(series: Array) -> float:
+    """1 + 2 sum of the autocorrelation up to where it has died away."""
+    power = float(np.mean(series**2))
+    time = 1.0
+    for lag in range(1, min(_LAGS, len(series) // 4)):
+        share = float(np.mean(series[:-lag] * series[lag:])) / power
+        if share < _UNCORRELATED:
+            break
+        time += 2.0 * share
+    return time

@@ -1,0 +1,67 @@
+"""Orders of torque ripples that may be in a recording: a periodogram over the wheels' angles."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomr_power_model.calibration.recorded import Recorded
+from tomr_reality_gap.alignment.channels import Channel
+
+Array = NDArray[np.float64]
+
+_ORDERS = np.arange(0.5, 48.0, 0.01)
+_BLOCK = 250
+_MOST = 2  # orders per wheel
+_ALONE = 0.1  # orders closer than this are one
+_SIGNIFICANT = 30.0  # power over the usual: chi2 of 2, so this is e^-15 by chance
+_SLOW = 0.3  # s: what is slower than this is no ripple
+
+
+def ripple_orders(
+    recorded: Recorded, channels: tuple[Channel, ...], residuals: list[Array], speeds: list[Array]
+) -> tuple[float, ...]:
+    """Orders [1/rev] at which a power residual swings with the angle of its wheel.
+
+    Args:
+        recorded: the recording.
+        channels: its channels.
+        residuals: of each channel [W].
+        speeds: of the wheel at each of the channel's times [rad/s].
+    """
+    found: list[float] = []
+    for channel, residual, speed in zip(channels, residuals, speeds, strict=True):
+        if channel.kind != "power" or channel.wheel is None or len(channel.time) < _BLOCK:
+            continue
+        middle = channel.time - 0.5 * channel.span
+        angle = np.interp(middle, recorded.encoder_time, recorded.position[:, channel.wheel])
+        if not np.isfinite(angle).all():
+            continue
+        power = _spectrum(_fast(channel.time, residual), speed, angle)
+        usual = float(np.median(power)) / np.log(2.0)
+        for _ in range(_MOST):
+            best = int(np.argmax(power))
+            if power[best] < _SIGNIFICANT * usual:
+                break
+            found.append(float(_ORDERS[best]))
+            power[np.abs(_ORDERS - _ORDERS[best]) < _ALONE] = 0.0
+    distinct: list[float] = []
+    for order in sorted(found):
+        if not distinct or order - distinct[-1] > _ALONE:
+            distinct.append(order)
+    return tuple(distinct)
+
+
+def _fast(time: Array, values: Array) -> Array:
+    """Without what is slow."""
+    width = max(3, round(_SLOW / float(np.median(np.diff(time)))))
+    return np.asarray(values - np.convolve(values, np.ones(width) / width, mode="same"))
+
+
+def _spectrum(residual: Array, speed: Array, angle: Array) -> Array:
+    """Power of residual ~ speed * sin(order * angle + phase), over all orders."""
+    scale = 1.4826 * float(np.median(np.abs(residual))) + 1e-12
+    weighted = np.clip(residual / scale, -4.0, 4.0) * speed
+    power = np.empty(len(_ORDERS))
+    for first in range(0, len(_ORDERS), _BLOCK):
+        turn = np.exp(1j * np.outer(_ORDERS[first : first + _BLOCK], angle))
+        power[first : first + _BLOCK] = np.abs(turn @ weighted) ** 2
+    return np.asarray(power / max(float(speed @ speed), 1e-12))

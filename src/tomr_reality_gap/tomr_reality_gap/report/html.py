@@ -1,0 +1,153 @@
+"""The explanation as one page of HTML that needs nothing beside it, read from the top."""
+
+import math
+from collections.abc import Callable, Mapping
+from importlib.resources import files
+
+import numpy as np
+from attrs import frozen
+from jinja2 import Environment, StrictUndefined
+
+from tomr_reality_gap.alignment.channels import Channel
+from tomr_reality_gap.explanation import Comparison, Explanation, Finding
+from tomr_reality_gap.report import figures, leftover
+from tomr_reality_gap.report.showing import best_view
+from tomr_reality_gap.report.words import (
+    channel_name,
+    effect_words,
+    estimate_words,
+    number_words,
+    percent_words,
+    place_words,
+    title,
+)
+
+_MOST_DRIVES = 4  # with a picture each
+_MOST_MAPS = 6
+
+Tick = Callable[[], None]
+
+
+@frozen
+class ChannelLine:
+    """How well one channel of one recording is simulated."""
+
+    recording: str
+    held_out: bool
+    channel: str
+    unit: str
+    rms: tuple[float, float]  # of the residual, before and after
+    nrmse: tuple[float, float]
+    level: tuple[float, float]  # RMS of residual / sigma; 1 is noise
+
+
+def report_page(explanation: Explanation, robot: str, tick: Tick = lambda: None) -> str:
+    """The page as HTML; `robot` names its description, `tick` is called after each picture."""
+    template = _environment().from_string(
+        files("tomr_reality_gap.report").joinpath("report.html.j2").read_text(encoding="utf-8")
+    )
+    found = bool(explanation.findings)
+    return template.render(
+        explanation=explanation,
+        robot=robot,
+        found=found,
+        rows=[_row(finding) for finding in explanation.findings],
+        lines=channel_lines(explanation.comparisons),
+        **_pictures(explanation, found, tick),
+    )
+
+
+def picture_count(explanation: Explanation) -> int:
+    """How often `tick` will be called."""
+    shapes = sum(finding.shape is not None for finding in explanation.findings)
+    drives = min(_MOST_DRIVES, len(_drives(explanation)))
+    shown = 1 if best_view(explanation) is not None else 0
+    left = 2 if explanation.comparisons else 0
+    return shown + shapes + min(_MOST_MAPS, len(explanation.maps)) + drives + left
+
+
+def channel_lines(comparisons: tuple[Comparison, ...]) -> list[ChannelLine]:
+    """Figures of all channels, held-out recordings first."""
+    return [
+        ChannelLine(
+            recording=one.name,
+            held_out=one.held_out,
+            channel=channel_name(channel),
+            unit=channel.unit,
+            rms=_pair(channel.value, one, number, 1.0),
+            nrmse=_pair(channel.value, one, number, _spread(channel)),
+            level=_pair(channel.value, one, number, one.sigma[number]),
+        )
+        for one in sorted(comparisons, key=lambda item: not item.held_out)
+        for number, channel in enumerate(one.channels)
+    ]
+
+
+def _spread(channel: Channel) -> float:
+    """Standard deviation; none of a supply's voltage, which is not meant to vary."""
+    return math.nan if channel.kind == "voltage" else float(np.std(channel.value))
+
+
+def _pair(
+    value: figures.Array, one: Comparison, number: int, scale: float | figures.Array
+) -> tuple[float, float]:
+    """RMS of (measured - simulated) / scale, before and after; NaN where the scale is 0."""
+    scale = np.where(np.asarray(scale) > 0.0, scale, np.nan)
+    before, after = (
+        float(np.sqrt(np.mean(((value - simulated[number]) / scale) ** 2)))
+        for simulated in (one.before, one.after)
+    )
+    return before, after
+
+
+def _environment() -> Environment:
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    environment.filters.update(
+        number=number_words, percent=percent_words, effect=effect_words, place=place_words
+    )
+    return environment
+
+
+def _row(finding: Finding) -> Mapping[str, object]:
+    """A finding, ready to be shown."""
+    return {
+        "finding": finding,
+        "title": title(finding),
+        "parameters": [
+            (name, estimate_words(estimate)) for name, estimate in finding.parameters.items()
+        ],
+        "channels": sorted(finding.located.channels.items(), key=lambda item: -item[1])[:3],
+    }
+
+
+def _drives(explanation: Explanation) -> list[Comparison]:
+    """Recordings to show over time: those held out; without any those explained."""
+    held_out = [item for item in explanation.comparisons if item.held_out]
+    return held_out or list(explanation.comparisons)
+
+
+def _pictures(explanation: Explanation, found: bool, tick: Tick) -> dict[str, object]:
+    def drawn(picture: str) -> str:
+        tick()
+        return picture
+
+    drives = _drives(explanation)
+    view = best_view(explanation)
+    maps = sorted(explanation.maps, key=lambda item: -figures.map_weight(item, found))[:_MOST_MAPS]
+    return {
+        "view": view,
+        "picture": drawn(figures.show(view, explanation)) if view is not None else "",
+        "shapes": [
+            (finding.shape, drawn(figures.shape_picture(finding.shape)))
+            for finding in explanation.findings
+            if finding.shape is not None
+        ],
+        "maps": [(item.variable, drawn(figures.map_picture(item, found))) for item in maps],
+        "drives": [
+            (item.name, drawn(figures.over_time(item, found))) for item in drives[:_MOST_DRIVES]
+        ],
+        "left_out": max(0, len(drives) - _MOST_DRIVES),
+        "held_out": bool(drives) and drives[0].held_out,
+        "residuals": drawn(leftover.residuals(drives, found)) if drives else "",
+        "whiteness": drawn(leftover.whiteness(drives, found)) if drives else "",
+    }

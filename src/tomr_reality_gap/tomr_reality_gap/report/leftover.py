@@ -1,0 +1,158 @@
+"""Pictures of the residuals: against what moves, their distribution, their whiteness."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from tomr_reality_gap.explanation import Comparison
+from tomr_reality_gap.report.canvas import AFTER, BEFORE, MEASURED, png, sheet
+from tomr_reality_gap.report.showing import POWER_KINDS
+from tomr_reality_gap.report.words import channel_name
+
+Array = NDArray[np.float64]
+
+_BINS = 24
+_LEAST_IN_BIN = 8
+_MOST_DOTS = 6000
+_SPREAD = 5.0  # standard deviations shown in a histogram
+_LAGS = 40
+_WHITE = 0.2  # shown of the autocorrelation at least, so that none looks like none
+
+
+def shown_names(comparisons: Sequence[Comparison]) -> list[str]:
+    """Channels to show: the powers, and without any all."""
+    channels = {channel_name(item): item.kind for one in comparisons for item in one.channels}
+    powers = [name for name, kind in channels.items() if kind in POWER_KINDS]
+    return powers or list(channels)
+
+
+def residuals(comparisons: Sequence[Comparison], found: bool) -> str:
+    """Measured - simulated against wheel speed, its rate and time; medians before and after.
+
+    A motor's power is held against its own wheel, the robot's against the mean of all.
+    """
+    names = shown_names(comparisons)
+    with sheet(len(names), 3, 2.1) as (page, panels):
+        for row, name in enumerate(names):
+            line = panels[3 * row : 3 * row + 3]
+            over, before, after, unit = _against(comparisons, name)
+            span = float(np.percentile(np.abs(before), 99.5)) or 1.0
+            labels = ("wheel speed, rad/s", "acceleration, rad/s²", "time, s")
+            for panel, variable, label in zip(line, over, labels, strict=True):
+                _scatter(panel, variable, after if found else before, MEASURED)
+                _medians(panel, variable, before, BEFORE)
+                if found:
+                    _medians(panel, variable, after, AFTER)
+                panel.axhline(0.0, color="black", lw=0.6)
+                panel.set_ylim(-span, span)
+                panel.set_xlabel(label if row == len(names) - 1 else "", fontsize=8)
+            line[0].set_ylabel(f"{name}\nmeasured - simulated, {unit}", fontsize=8)
+        return png(page)
+
+
+def _against(
+    comparisons: Sequence[Comparison], name: str
+) -> tuple[tuple[Array, Array, Array], Array, Array, str]:
+    """Speed, acceleration and time at a channel's samples; residual before and after; unit."""
+    parts: list[tuple[Array, Array, Array, Array, Array]] = []
+    unit = ""
+    for one in comparisons:
+        for number, channel in enumerate(one.channels):
+            if channel_name(channel) != name:
+                continue
+            unit = channel.unit
+            wheel = channel.wheel
+            speed = one.speed[:, wheel] if wheel is not None else np.abs(one.speed).mean(axis=1)
+            rate = np.gradient(speed, one.time)
+            parts.append(
+                (
+                    np.interp(channel.time, one.time, speed),
+                    np.interp(channel.time, one.time, rate),
+                    channel.time,
+                    channel.value - one.before[number],
+                    channel.value - one.after[number],
+                )
+            )
+    speed, rate, time, before, after = (
+        np.concatenate(column) for column in zip(*parts, strict=True)
+    )
+    return (speed, rate, time), before, after, unit
+
+
+def _scatter(panel: Axes, over: Array, rest: Array, colour: str) -> None:
+    step = max(1, len(over) // _MOST_DOTS)
+    panel.plot(over[::step], rest[::step], ".", ms=1.2, color=colour, alpha=0.3)
+
+
+def _medians(panel: Axes, over: Array, rest: Array, colour: str) -> None:
+    """Median of each bin that holds enough samples."""
+    edges = np.linspace(over.min(), over.max() + 1e-9, _BINS + 1)
+    bins = np.digitize(over, edges)
+    full = [b for b in range(1, _BINS + 1) if np.count_nonzero(bins == b) >= _LEAST_IN_BIN]
+    centers = [0.5 * (edges[b - 1] + edges[b]) for b in full]
+    panel.plot(centers, [np.median(rest[bins == b]) for b in full], "-o", ms=2, color=colour)
+
+
+def whiteness(comparisons: Sequence[Comparison], found: bool) -> str:
+    """Histogram of residual / sigma with the normal one, and its autocorrelation."""
+    names = shown_names(comparisons)
+    with sheet(len(names), 2, 1.8) as (page, panels):
+        for row, name in enumerate(names):
+            histogram, correlation = panels[2 * row], panels[2 * row + 1]
+            sides = (("as described", BEFORE, False), ("as explained", AFTER, True))
+            for label, colour, explained in sides[: 2 if found else 1]:
+                series = _standard(comparisons, name, explained)
+                _histogram(histogram, np.concatenate(series), colour, label)
+                values = autocorrelation(series)
+                correlation.plot(range(1, _LAGS + 1), values, "-o", ms=2, lw=0.9, color=colour)
+            samples = sum(len(item) for item in series)
+            correlation.axhspan(*_chance(samples), color=MEASURED, alpha=0.3, lw=0)
+            correlation.axhline(0.0, color="black", lw=0.6)
+            low, high = correlation.get_ylim()
+            correlation.set_ylim(min(low, -_WHITE), max(high, _WHITE))
+            points = np.linspace(-_SPREAD, _SPREAD, 201)
+            normal = np.exp(-0.5 * points**2) / np.sqrt(2.0 * np.pi)
+            histogram.plot(points, normal, color="black", lw=0.8, label="normal")
+            histogram.set_ylabel(f"{name}\ndensity", fontsize=8)
+            correlation.set_ylabel("autocorrelation", fontsize=8)
+        panels[0].legend(fontsize=7, framealpha=0.8)
+        panels[-2].set_xlabel("residual, in units of noise", fontsize=8)
+        panels[-1].set_xlabel("lag, samples (band: by chance)", fontsize=8)
+        return png(page)
+
+
+def _standard(comparisons: Sequence[Comparison], name: str, explained: bool) -> list[Array]:
+    """Residual / sigma of one channel, recording by recording."""
+    return [
+        (channel.value - (one.after if explained else one.before)[number]) / one.sigma[number]
+        for one in comparisons
+        for number, channel in enumerate(one.channels)
+        if channel_name(channel) == name
+    ]
+
+
+def _histogram(panel: Axes, standard: Array, colour: str, label: str) -> None:
+    edges = np.linspace(-_SPREAD, _SPREAD, 61)
+    counts, _ = np.histogram(np.clip(standard, -_SPREAD, _SPREAD), edges)
+    density = counts / (max(1, len(standard)) * (edges[1] - edges[0]))
+    panel.stairs(density, edges, color=colour, lw=1.0, label=label)
+
+
+def _chance(samples: int) -> tuple[float, float]:
+    """95 % of the autocorrelations of white noise."""
+    half = 1.96 / np.sqrt(max(1, samples))
+    return -half, half
+
+
+def autocorrelation(series: Sequence[Array]) -> Array:
+    """Of residuals about zero, lags 1 to 40; pairs do not reach across recordings, (40,)."""
+    power = sum(float(item @ item) for item in series) or 1.0
+    return np.array(
+        [
+            sum(float(item[: len(item) - lag] @ item[lag:]) for item in series if len(item) > lag)
+            / power
+            for lag in range(1, _LAGS + 1)
+        ]
+    )

@@ -1,0 +1,115 @@
+"""Effects, places and numbers as a person reads them."""
+
+import math
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+from tomr_reality_gap.alignment.channels import Channel
+from tomr_reality_gap.explanation import Estimate, Finding
+
+_EFFECTS: Mapping[str, str] = MappingProxyType(
+    {
+        "friction.coulomb": "Coulomb friction",
+        "friction.viscous": "viscous friction",
+        "friction.stribeck": "Stribeck friction",
+        "friction.asymmetric": "friction that differs with direction",
+        "friction.load_dependent": "gear meshing loss",
+        "friction.quadratic": "friction with the square of speed",
+        "drivetrain.torque_ripple": "torque ripple",
+        "contact.roller_drag": "drag of the rollers",
+        "contact.rolling_resistance": "rolling resistance",
+        "contact.slip": "wheel slip",
+        "body.payload_mass": "payload",
+        "body.mass_center_offset": "displaced mass centre",
+        "body.slope": "sloping floor",
+        "electrical.winding_heating": "heating of the windings",
+        "electrical.supply_sag": "sag of the supply voltage",
+        "electrical.driver_standby": "standby power of the drivers",
+        "electrical.switching_loss": "switching loss of the drivers",
+        "electrical.regeneration_loss": "braking power that is lost",
+        "electrical.iron_loss": "iron loss of the motors",
+        "kinematic.wheel_radius": "effective wheel radius",
+        "sensor.power_scale": "power sensor: wrong scale",
+        "sensor.power_bias": "power sensor: offset",
+        "sensor.power_lag": "power sensor: lag",
+        "sensor.clock_offset": "power sensor: clock offset",
+        "unknown": "an effect outside the vocabulary",
+    }
+)
+_PLACES = {
+    "all_wheels": "all wheels",
+    "body": "body",
+    "supply": "supply",
+}
+_ALIKE = 0.2  # of the width, by which the halves of an interval shown as ± may differ
+
+
+def effect_words(effect: str) -> str:
+    """What an effect is, in words."""
+    if effect.startswith("parameter."):
+        return f"wrong value of {effect.removeprefix('parameter.')}"
+    return _EFFECTS.get(effect, effect)
+
+
+def place_words(where: Sequence[str]) -> str:
+    """Where it acts, in words."""
+    return ", ".join(_PLACES.get(place, place) for place in where)
+
+
+def channel_name(channel: Channel) -> str:
+    """A channel's name; a topic's voltage is told from its power."""
+    return f"{channel.name} voltage" if channel.kind == "voltage" else channel.name
+
+
+def title(finding: Finding) -> str:
+    """E.g. `Stribeck friction, wheel_2_joint`."""
+    words = effect_words(finding.effect)
+    return f"{words[:1].upper()}{words[1:]}, {place_words(finding.where)}"
+
+
+def decimals(estimate: Estimate, digits: int) -> int:
+    """Decimal places at which the interval's half width has so many significant digits."""
+    sides = (estimate.value - estimate.low, estimate.high - estimate.value)
+    known = [side for side in sides if math.isfinite(side) and side > 0.0]
+    half = sum(known) / len(known) if known else 1e-3 * abs(estimate.value) or 1.0
+    return digits - 1 - math.floor(math.log10(half))
+
+
+def estimate_words(estimate: Estimate) -> str:
+    """E.g. `0.0410 ± 0.0035 N m`; both ends where the halves differ, none where it is fixed."""
+    unit = f" {estimate.unit}" if estimate.unit else ""
+    if estimate.low == estimate.high:
+        return f"{estimate.value:.4g}{unit}"
+    places = decimals(estimate, 2)
+    value, low, high = (
+        _fixed(number, places) for number in (estimate.value, estimate.low, estimate.high)
+    )
+    below, above = estimate.value - estimate.low, estimate.high - estimate.value
+    if not math.isfinite(below + above) or abs(above - below) > _ALIKE * (above + below):
+        return f"{value} ({low} to {high}){unit}"
+    return f"{value} ± {_fixed(0.5 * (above + below), places)}{unit}"
+
+
+def _fixed(number: float, places: int) -> str:
+    """Plain digits; powers of ten where these would be many zeros."""
+    if not math.isfinite(number):
+        return "∞" if number > 0.0 else "-∞"
+    if places > 6 and 0.0 < abs(number) < 1e-3:
+        exponent = math.floor(math.log10(abs(number)))
+        return f"{number / 10.0**exponent:.{max(0, places + exponent)}f}e{exponent}"
+    rounded = round(number, places)
+    return f"{rounded:.{max(0, places)}f}"
+
+
+def number_words(number: float, digits: int = 3) -> str:
+    """A number with so many significant digits; a dash where there is none."""
+    return f"{number:.{digits}g}" if math.isfinite(number) else "\N{EN DASH}"
+
+
+def percent_words(share: float) -> str:
+    """E.g. `83 %`, `0.4 %`, `99.6 %`: never 100 % or 0 % of what is not all or nothing."""
+    if not math.isfinite(share):
+        return "\N{EN DASH}"
+    percent = 100.0 * share
+    near_an_end = 0.0 < percent < 1.0 or 99.0 < percent < 100.0
+    return f"{percent:.{1 if near_an_end else 0}f}\N{NO-BREAK SPACE}%"
