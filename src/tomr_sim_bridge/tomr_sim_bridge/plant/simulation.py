@@ -1,6 +1,7 @@
 """The simulated robot: commands and faults in, samples of its sensors out. No ROS."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from attrs import define, frozen
@@ -10,7 +11,7 @@ from tomr_sim_bridge.faults import FaultActions, FaultBoard
 from tomr_sim_bridge.plant import moments
 from tomr_sim_bridge.plant.design import PlantDesign
 from tomr_sim_bridge.plant.drivers import NANOSECONDS, WheelDrivers
-from tomr_sim_bridge.plant.effects import DriverPower, WheelLoads, make_effects
+from tomr_sim_bridge.plant.effects import DriverPower, PlantEffect, WheelLoads, make_effects
 from tomr_sim_bridge.plant.engine import OPEN_CIRCUIT, Engine
 from tomr_sim_bridge.plant.moments import Memory, Moment
 from tomr_sim_bridge.plant.power_monitor import WINDOW_NS
@@ -77,6 +78,7 @@ class Simulation:
         floor_friction: float | None = None,
         payload: float = 0.0,
         stamp_jitter: float = 0.0,
+        further_effects: Sequence[PlantEffect] = (),
     ) -> None:
         """Build the plant at rest.
 
@@ -87,6 +89,7 @@ class Simulation:
             floor_friction: traction coefficient, None for that of the description.
             payload: mass on top of the description [kg].
             stamp_jitter: standard deviation of the sampling times [s].
+            further_effects: physics that no description can name, on top of those in it.
 
         Raises:
             InputError: an effect that the plant cannot do, or impossible masses.
@@ -94,7 +97,7 @@ class Simulation:
         self.robot = robot
         self.faults = FaultBoard()
         self.ledger = Ledger()
-        self._effects = make_effects(robot)
+        self._effects = [*make_effects(robot), *further_effects]
         design = PlantDesign.of(robot)
         for effect in self._effects:
             effect.shape(design)
@@ -154,6 +157,11 @@ class Simulation:
         """Time of the plant [ns]."""
         return self._boundary(self._count)
 
+    @property
+    def latest(self) -> Moment:
+        """What the sensors look at, at `stamp_ns`, before any flaw of theirs."""
+        return self._memory.latest
+
     def _boundary(self, count: int) -> int:
         return self._start_ns + round(count * self._grid.stretch * NANOSECONDS)
 
@@ -182,11 +190,12 @@ class Simulation:
 
     def _stretch(self) -> list[Sample]:
         engine = self.engine
-        actions = self.faults.actions(engine.contacts(self._yaw), self._design.floor_friction)
+        contact = engine.contacts(self._yaw)
+        actions = self.faults.actions(contact, self._design.floor_friction)
         engine.set_friction(self._design.floor_friction if actions is None else actions.friction)
         bus = self._bus_voltage()
         angle, speed = engine.angle, engine.speed
-        loads = self._loads(angle, speed)
+        loads = self._loads(angle, speed, contact)
         current, motor_power = self._run(bus, actions)
         turned = engine.angle - angle
         power = self._settle_power(current, motor_power, loads, turned)
@@ -219,7 +228,7 @@ class Simulation:
             mean_power += voltage * current
         return mean_current / grid.runs, mean_power / grid.runs
 
-    def _loads(self, angle: Vector, speed: Vector) -> WheelLoads:
+    def _loads(self, angle: Vector, speed: Vector, contact: Vector) -> WheelLoads:
         loads = WheelLoads(
             speed=speed,
             angle=angle,
@@ -229,6 +238,7 @@ class Simulation:
                 if self._needs_normal
                 else np.zeros(WHEELS)
             ),
+            contact=contact,
             dry=np.zeros(WHEELS),
             viscous=np.zeros(WHEELS),
             torque=np.zeros(WHEELS),

@@ -20,6 +20,7 @@ class WheelLoads:
     angle: Vector  # rad, as the encoder counts it
     transmitted: Vector  # N m through the gear during the last stretch
     normal: Vector  # N on the contact; only if an effect asks for it, else zero
+    contact: Vector  # m, where the wheels stand in the world, shape (3, 2)
     dry: Vector  # N m, to be filled: Coulomb-like, holds at standstill
     viscous: Vector  # N m s/rad, to be filled
     torque: Vector  # N m, to be filled: added to the axle
