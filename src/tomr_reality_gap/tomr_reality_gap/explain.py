@@ -107,6 +107,11 @@ def _described(request: Request) -> _Described:
     if robot.measurement.source == "battery_state" and _has_total_only(request.real, robot):
         values["measurement.source"] = "total_only"
         robot = robot_from_parameters(values, place)
+    if robot.measurement.quantity == "motor_current":
+        raise InputError(
+            f"{place}: measurement.quantity = motor_current: power is compared, and currents alone "
+            "do not tell it: record the supply's voltage and current of each driver"
+        )
     for key in request.tolerances:
         if key not in values:
             raise InputError(

@@ -73,7 +73,8 @@ class ManyLoops:
     axles: Array  # (3, 2)
     mass: Array  # (v, 1, 1)
     rotor: Array  # rotor inertia at the wheel [kg m^2], (v, 1, 3)
-    normal: Array  # (v, 1, 3)
+    normal: Array  # of a robot at rest [N], (v, 1, 3)
+    tilting: Array  # change of the loads per acceleration along the axles [N s^2/m], (v, 1, 1)
     wheel_radius: Array  # (v, 1, 3)
     gear_ratio: Array  # (v, 1, 3)
     proportional: Array  # (v, 1, 1)
@@ -119,6 +120,7 @@ class ManyLoops:
                 :, None, :
             ],
             normal=rows(lambda v: bodies[v].normal)[:, None, :],
+            tilting=rows(lambda v: 2.0 * bodies[v].mass * _height(robots[v]) / 3.0)[:, None, None],
             wheel_radius=rows(lambda v: models[v].wheel_radius)[:, None, :],
             gear_ratio=rows(lambda v: models[v].gear_ratio)[:, None, :],
             proportional=rows(lambda v: robots[v].controller.proportional)[:, None, None],
@@ -167,11 +169,12 @@ class _Stepper:
         self.drawn = np.zeros(shape[:2])  # A of the whole robot
         self.extra: Array | float = 0.0
         self.acting = acting(loops.effects)
-        drag = sum((e.axle_drag(loops.normal) for e in loops.effects), np.zeros((1, 1, 3)))
-        self.drag = np.asarray(drag)
+        self.drag = self._drag(loops.normal)
+        self.normal = np.broadcast_to(loops.normal, shape)
         self.slide = np.asarray(
             loops.wheel_radius * sum((e.axle_slip() for e in loops.effects), np.zeros((1, 1, 3)))
         )
+        self.leans = any(e.needs_load for e in loops.effects) and bool(np.any(loops.tilting))
         self.holds = bool(np.any(self.drag)) and not np.any(self.slide)
         self.contacts = _Contacts.of(loops, self.holds)
         self.friction = np.zeros((*shape[:2], self.contacts.count))
@@ -188,12 +191,27 @@ class _Stepper:
         volts = loops.constant * self.speed + torque * loops.resistance / loops.constant
         return np.where(loops.integral > 0.0, volts / np.maximum(loops.integral, 1e-12), 0.0)
 
+    def _drag(self, normal: Array) -> Array:
+        """Limits of the rollers' drag along the axles [N]."""
+        still = np.zeros_like(normal)
+        return np.asarray(sum((e.axle_drag(normal) for e in self._loops.effects), still))
+
+    def _loads(self) -> Array:
+        """Wheel loads [N]: speeding up leans on the wheels behind, height over radius much."""
+        loops = self._loops
+        twist, change = self.speed @ loops.to_twist, self.acceleration @ loops.to_twist
+        yaw = twist[..., 2]
+        along = np.stack(
+            [change[..., 0] - yaw * twist[..., 1], change[..., 1] + yaw * twist[..., 0]], axis=-1
+        )
+        return np.maximum(loops.normal - loops.tilting * (along @ loops.axles.T), 0.0)
+
     def _state(self) -> WheelState:
         loops = self._loops
         transmitted = self.torque - loops.rotor * self.acceleration
         angle = self._stretches.angle + self.turned
         return WheelState(
-            self.speed, loops.normal, transmitted, loops.wheel_radius, loops.gear_ratio, angle
+            self.speed, self.normal, transmitted, loops.wheel_radius, loops.gear_ratio, angle
         )
 
     def _resistance(self, state: WheelState) -> tuple[Array, Array]:
@@ -264,6 +282,9 @@ class _Stepper:
         """Advance all wheels; returns the mean motor currents [A]."""
         loops = self._loops
         duration = loops.period_s / loops.substeps
+        if self.leans:
+            self.normal = self._loads()
+            self.drag = self._drag(self.normal)
         dry, moving = self._resistance(self._state())
         load = (
             loops.constant / resistance * volts - moving - self._external(self.speed) - self.extra
@@ -348,3 +369,8 @@ class _Contacts:
             moving -= self.coupling[row] * (wanted - forces[row])
             forces[row] = wanted
         return np.asarray(forces.transpose(1, 2, 0))
+
+
+def _height(robot: Robot) -> float:
+    """Height of the mass centre over the distance of the contacts from the middle [-]."""
+    return robot.mass_center[2] / robot.robot_radius

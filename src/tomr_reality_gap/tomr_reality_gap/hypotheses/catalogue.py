@@ -17,6 +17,7 @@ from tomr_reality_gap.hypotheses.knobs import (
     Knob,
     Turned,
     bounds_of,
+    unit_of,
     wheel_key,
 )
 from tomr_reality_gap.hypotheses.scales import Scales
@@ -301,6 +302,6 @@ def _wrong_at(
     assert isinstance(value, float)
     spread = relative * abs(value)
     low, high = bounds_of(keys[0])
-    knob = Knob("value", keys, "", spread, _STEP * spread, low - value, high - value)
+    knob = Knob("value", keys, unit_of(keys[0]), spread, _STEP * spread, low - value, high - value)
     least = _WRONG * tolerance * abs(value)
     return Hypothesis(f"parameter.{general}", where, (knob,), {}, _WRONG_PARAMETER, least)

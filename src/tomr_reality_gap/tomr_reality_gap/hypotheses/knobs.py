@@ -104,6 +104,15 @@ def bounds_of(key: str) -> tuple[float, float]:
     return -math.inf, math.inf
 
 
+def unit_of(key: str) -> str:
+    """Unit of a description's number."""
+    leaf = key.rpartition(".")[2]
+    if key.startswith("physics."):
+        return EFFECTS[split_effect(key)[0]].parameters[leaf].unit
+    names = {spec.name: spec.unit for spec in ROBOT_PARAMETERS}
+    return names.get(f"{key.partition('.')[0]}.{leaf}", "")
+
+
 @frozen
 class Hypothesis:
     """One way in which reality may differ: an effect, or a wrong parameter, at a place."""

@@ -36,6 +36,8 @@ class Effect:
     effect_id: ClassVar[str] = ""
     # Whether its torque changes with speed or load: what does not is worked out only once.
     varies: ClassVar[bool] = False
+    # Whether it grows with a wheel's load, which moves when the robot speeds up.
+    needs_load: ClassVar[bool] = False
 
     def changed(self, robot: Robot) -> Robot:
         """The robot with this effect on its body (mass, mass centre)."""

@@ -88,6 +88,8 @@ class Quadratic(Effect):
 class RollingResistance(Effect):
     """tau = coefficient * N_i * wheel_radius * sign(omega)."""
 
+    needs_load: ClassVar[bool] = True
+
     coefficient: Array
 
     def dry_torque(self, state: WheelState) -> Array:
@@ -107,6 +109,8 @@ class RollerDrag(Effect):
 
     with u the sliding along the axle [m/s] as the wheels tell it; the rest is part of traction.
     """
+
+    needs_load: ClassVar[bool] = True
 
     coefficient: Array
     slip: Array

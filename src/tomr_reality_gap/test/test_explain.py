@@ -1,0 +1,35 @@
+"""Bad input of an explanation, and what goes into robot_explained.yaml."""
+
+from pathlib import Path
+
+import pytest
+
+from tomr_power_model.errors import InputError
+from tomr_power_model.robot import load_robot
+from tomr_reality_gap.explain import Request, explain
+
+BAGS = Path(__file__).parents[3] / "bags"
+SQUARE, CIRCLE = BAGS / "square", BAGS / "circle_encoder_lost"
+
+
+def test_a_simulation_of_another_drive_is_refused() -> None:
+    with pytest.raises(InputError, match="its commands are not those of square"):
+        explain(Request("reference", (SQUARE,), sim=CIRCLE))
+
+
+def test_a_tolerance_of_an_unknown_value_is_refused() -> None:
+    with pytest.raises(InputError, match=r"--tolerance robot\.weight: reference has no such value"):
+        explain(Request("reference", (SQUARE,), tolerances={"robot.weight": 0.1}))
+
+
+def test_another_robots_recording_is_refused(tmp_path: Path) -> None:
+    text = (Path(load_robot.__code__.co_filename).parents[1] / "robots/reference.yaml").read_text()
+    other = tmp_path / "other.yaml"
+    other.write_text(text.replace("wheel_1_joint", "left_joint"), encoding="utf-8")
+    with pytest.raises(InputError):
+        explain(Request(other, (SQUARE,)))
+
+
+def test_a_robot_that_tells_currents_only_is_refused() -> None:
+    with pytest.raises(InputError, match="motor_current"):
+        explain(Request("robotino_v2", (SQUARE,)))
