@@ -37,7 +37,7 @@ MANIFESTS := $(wildcard $(addprefix src/*/,package.xml setup.py setup.cfg resour
 LINKED := $(sort $(wildcard src/*/launch/*.launch.py \
     $(addprefix src/*/tomr_*/,robots/*.yaml missions/*.yaml weights/*)))
 
-.PHONY: help setup demo test lint format bench train bags clean FORCE
+.PHONY: help setup demo test lint format bench figures train bags clean FORCE
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -70,8 +70,11 @@ format: setup ## rewrite the sources in the house format
 bench: setup ## measure CPU, latency and offline speed, as ratios (not a test)
 	$(BIN)/python bench/run.py $(ARGS)
 
-train: .venv/training ## train the classifier anew (installs torch)
-	$(BIN)/tomr_train --out src/tomr_fault_diag/tomr_fault_diag/weights/wang2024.npz $(ARGS)
+figures: .venv/training ## draw the figures of docs/experiments.md anew (installs torch)
+	$(BIN)/python bench/experiments.py all --out docs/figures
+
+train: .venv/training ## train the classifier anew, in under a minute (installs torch)
+	$(BIN)/tomr_train --out src/tomr_fault_diag/tomr_fault_diag/weights/window.npz $(ARGS)
 
 bags: setup ## record the small recordings in bags/ anew
 	rm -rf $(BAGS:%=bags/%)

@@ -24,6 +24,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from tomr_fault_diag.classifier.states import FAULTLESS
 from tomr_fault_diag.cli.diagnose import STAGE_NODES
 from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
@@ -105,7 +106,7 @@ def report(drives: Sequence[Drive]) -> dict[str, object]:
         "ticks": ticks,
         "states": {name: count / ticks for name, count in states.most_common()},
         "drives_with_a_fault_named": sum(
-            any(name not in ("normal", "unknown") for name in drive.states) for drive in drives
+            any(name not in FAULTLESS for name in drive.states) for drive in drives
         ),
         "stale_share_of_motor_currents": float(np.mean([drive.stale for drive in drives])),
         "current_from_command": scores(

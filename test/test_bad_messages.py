@@ -149,11 +149,16 @@ class Bench:
         )
 
     def is_sound(self, since: int) -> bool:
-        """Whether the last three decisions found all as modelled and the state normal."""
+        """Whether the last three decisions found all as modelled and no fault."""
         last = self.frames[since:][-3:]
         found = [state for _, state in self.states[-3:]]
         sound = all(not frame.stale and not frame.outside for frame in last)
-        return self.is_answered() and len(last) == 3 and sound and found == ["normal"] * 3
+        return self.is_answered() and len(last) == 3 and sound and all(map(_quiet, found))
+
+
+def _quiet(headline: str) -> bool:
+    """Whether no fault is named: this robot stands still, and a fault could hide in that."""
+    return headline.startswith(("normal", "not observable in this motion"))
 
 
 def _stamp_ns(message: Any) -> int:
@@ -302,7 +307,7 @@ def _disturb(bench: Bench, name: str, case: Case) -> None:
         assert not frame.outside, (name, frame)
         assert case.stale or not frame.stale, (name, frame)
     for _, state in bench.states[said:]:
-        assert state == "normal" or (case.stale and state.startswith("unknown")), (name, state)
+        assert _quiet(state) or (case.stale and state.startswith("unknown")), (name, state)
     if case.node:
         bench.processes[case.node].wait_for_output(case.words)
 
@@ -318,7 +323,7 @@ def _lose_a_wheel(bench: Bench) -> None:
         assert set(frame.stale) <= {SPEEDS[1], *DERIVED}, frame
         assert "joint_states" in frame.stale[SPEEDS[1]]
         assert not frame.outside, frame
-    assert bench.states[-1][1] == "normal"
+    assert _quiet(bench.states[-1][1])
     bench.processes["power_model"].wait_for_output("no wheel_2_joint among its names")
     bench.wheels = WHEELS
     bench.until(lambda: bench.is_sound(since), "all is well with three wheels")

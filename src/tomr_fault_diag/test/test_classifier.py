@@ -1,4 +1,4 @@
-"""The network and its filter in time."""
+"""The paper's network, and what the stage makes of a judge's opinions."""
 
 import json
 from importlib.resources import files
@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.network import Network
+from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STATES, UNKNOWN
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
@@ -36,9 +38,14 @@ def _frame(tick: int, codes: tuple[int, ...], stale: bool = False) -> ResidualFr
     return ResidualFrame(BASE + tick * 50 * MS, residuals)
 
 
+def _classifier() -> FaultClassifier:
+    """The paper's, which codes alone decide."""
+    return FaultClassifier(make_judge(ClassifierSettings(classifier="wang2024")))
+
+
 def _run(*spells: tuple[tuple[int, ...], int]) -> list[Diagnosis]:
     """Diagnoses over spells of (codes, number of ticks)."""
-    classifier = FaultClassifier(Network.load())
+    classifier = _classifier()
     found, tick = [], 0
     for codes, count in spells:
         for _ in range(count):
@@ -108,7 +115,7 @@ def test_reports_come_once_a_second_and_on_changes() -> None:
 
 
 def test_nothing_to_compare_is_unknown_not_normal() -> None:
-    classifier = FaultClassifier(Network.load())
+    classifier = _classifier()
     diagnosis = classifier.classify(_frame(1, HEALTHY, stale=True))
     assert diagnosis is not None
     assert diagnosis.state is UNKNOWN
@@ -116,7 +123,7 @@ def test_nothing_to_compare_is_unknown_not_normal() -> None:
 
 
 def test_a_clock_that_goes_back_starts_afresh() -> None:
-    classifier = FaultClassifier(Network.load())
+    classifier = _classifier()
     for tick in range(100, 130):
         classifier.classify(_frame(tick, TABLE_1[MOTOR]))
     assert classifier.classify(_frame(129, HEALTHY)) is None

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tomr_fault_diag.classifier.judges import CodeJudge
 from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
@@ -18,7 +19,9 @@ CODES = (1, 1, 0, 0, -1, 0, 0, 1, 0, 0)
 
 def _probabilities(network: Network, settings: ClassifierSettings) -> tuple[float, ...]:
     residuals = tuple(Residual(2.0 * code, 1.0, 5.0) for code in CODES)
-    diagnosis = FaultClassifier(network, settings).classify(ResidualFrame(10**18, residuals))
+    diagnosis = FaultClassifier(CodeJudge(network, settings)).classify(
+        ResidualFrame(10**18, residuals)
+    )
     assert diagnosis is not None
     return diagnosis.probabilities
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.calibration.beliefs import drive_for
@@ -12,7 +12,6 @@ from tomr_power_model.calibration.fitted import fitted_text
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.explanation import (
-    Comparison,
     Estimate,
     Explanation,
     Finding,
@@ -27,6 +26,7 @@ from tomr_reality_gap.fit.search import Fitted, Found, finding_cost
 from tomr_reality_gap.fit.study import Columns, Model, Study, columns_at
 from tomr_reality_gap.hypotheses.knobs import NEUTRAL, Hypothesis, Knob, Turned
 from tomr_reality_gap.hypotheses.scales import Scales
+from tomr_reality_gap.mismatch.compare import comparison, score_of
 from tomr_reality_gap.mismatch.locate import located, maps_of, variables_at
 from tomr_reality_gap.suggest import suggested
 
@@ -37,6 +37,9 @@ _UNKNOWN_COST = 60.0  # log evidence that an effect without a name must bring
 _UNKNOWN_SHARE = 0.12  # of what all named findings bring: the simulator is not exact either
 _WIDE = 1.96
 _INEXACT = 0.01  # of a value
+_UNSURE = 0.03  # of the spread of power: error of the simulator itself
+_MUCH = 0.3  # of the mismatch left: what was named is not the whole story
+_DOUBTED = 0.45  # confidence of a finding that leaves so much
 _TEMPER = 3.0  # odds are trusted to their third root: the noise model is not exact
 _SURE = 0.97
 _LISTED = 12  # smallest sizes that are told
@@ -73,9 +76,9 @@ def explanation_of(
         model = model.without(number)
     explained = model.described.robot
     comparisons = [
-        _comparison(item, evidence.base.robot, explained, False) for item in study.forwards
-    ] + [_comparison(item, evidence.base.robot, explained, True) for item in held]
-    score = _score([item for item in comparisons if item.held_out])
+        comparison(item, evidence.base.robot, explained, False) for item in study.forwards
+    ] + [comparison(item, evidence.base.robot, explained, True) for item in held]
+    score = score_of([item for item in comparisons if item.held_out])
     share = _shares(evidence)
     variables = _variables(evidence)
     findings = [
@@ -83,6 +86,13 @@ def explanation_of(
         for number, wanted in enumerate(needed)
         if wanted
     ]
+    unexplained, size = 0.0, 0.0
+    if findings:
+        unexplained, size = _unexplained(evidence, study.predict([explained])[0])
+    if unexplained > _MUCH and size > 1.0 and unknown is None and left:
+        # Too much is left for what was named, even if no family of torques explains it either.
+        unknown = left[0]
+        findings = [evolve(item, confidence=min(item.confidence, _DOUBTED)) for item in findings]
     if unknown is not None:
         findings.append(_unnamed(evidence, unknown, score, variables))
     verdict = "mismatch" if findings else "match"
@@ -90,7 +100,7 @@ def explanation_of(
         verdict=verdict,
         sentence=_sentence(findings),
         findings=tuple(findings),
-        unexplained_share=_unexplained(evidence, unknown) if findings else 0.0,
+        unexplained_share=max(unexplained, float(bool(unknown) and not model.hypotheses)),
         comparisons=tuple(comparisons),
         maps=_maps(evidence, variables),
         alignment=_alignment(evidence),
@@ -255,60 +265,30 @@ def _share_of(evidence: Evidence, unknown: Leftover) -> float:
     return max(0.0, min(1.0, 2.0 * unknown.evidence / max(before - floor, 1e-9)))
 
 
-def _unexplained(evidence: Evidence, unknown: Leftover | None) -> float:
-    """Part of the mismatch's energy beyond noise that is left."""
-    study, found = evidence.study, evidence.found
-    weight = found.noise.weight
-    before = float((((study.value - found.without.value) * weight) ** 2).sum())
-    noise = float(len(study.value))
-    left = max(found.best.chi2 - noise, 0.0)
-    if unknown is not None:
-        left = max(left, 2.0 * unknown.evidence)
-    return float(min(1.0, left / max(before - noise, left, 1e-9)))
+def _unexplained(evidence: Evidence, after: Array) -> tuple[float, float]:
+    """Part of the power's mismatch that is left, beyond noise and what the simulator is unsure of;
+    and how much that is, noise being 1.
 
-
-def _comparison(forward: Forward, before: Robot, after: Robot, held_out: bool) -> Comparison:
-    values = forward.predict([before, after])
-    rows = rows_of(forward.channels)
-    run = forward.run(after)
-    line = forward.timeline
-    residual = np.concatenate([channel.value for channel in forward.channels]) - values[1]
-    sigma = tuple(
-        np.full(part.stop - part.start, 1.4826 * float(np.median(np.abs(residual[part]))) + 1e-9)
-        for part in rows
-    )
-    return Comparison(
-        name=forward.recorded.name,
-        held_out=held_out,
-        channels=forward.channels,
-        before=tuple(values[0, part] for part in rows),
-        after=tuple(values[1, part] for part in rows),
-        sigma=sigma,
-        speed=run["speed"],
-        time=np.asarray(line.start + line.period * (np.arange(line.count) + 0.5)),
-    )
-
-
-def _score(held: Sequence[Comparison]) -> Score | None:
-    """Pooled over the motors' power of all held-out recordings; of the total without motors."""
-    kinds = {channel.kind for item in held for channel in item.channels}
-    kind = "power" if "power" in kinds else "total"
-    measured, before, after, spread = [], [], [], []
-    for item in held:
-        for channel, first, last in zip(item.channels, item.before, item.after, strict=True):
-            if channel.kind == kind:
-                measured.append(channel.value)
-                before.append(channel.value - first)
-                after.append(channel.value - last)
-                spread.append(channel.value - channel.value.mean())
-    if not measured:
-        return None
-    total = np.abs(np.concatenate(measured)).sum()
-    deviation = np.sqrt(np.mean(np.concatenate(spread) ** 2))
-    errors = [np.concatenate(part) for part in (before, after)]
-    nrmse = [float(np.sqrt(np.mean(error**2)) / deviation) for error in errors]
-    accuracy = [float(1.0 - np.abs(error).sum() / total) for error in errors]
-    return Score(nrmse[0], nrmse[1], accuracy[0], accuracy[1])
+    Noise is what differs from one sample to the next: unlike the noise of the fit it knows nothing
+    of slow mismatches that no hypothesis explains.
+    """
+    study = evidence.study
+    before = study.predict([evidence.base.robot])[0]
+    first, left = 0.0, 0.0
+    for channel, part in zip(study.channels, rows_of(study.channels), strict=True):
+        if channel.kind not in ("power", "total"):
+            continue
+        value = channel.value
+        residuals = value - before[part], value - after[part]
+        steps = np.abs(np.diff(residuals[1]))
+        noise = (1.4826 * float(np.median(steps))) ** 2 / 2.0
+        noise = max(noise, 0.5 * float(np.mean(np.minimum(steps, 5.0 * np.median(steps)) ** 2)))
+        known = noise + (_UNSURE * float(np.std(value))) ** 2
+        first += max(float(np.mean(residuals[0] ** 2)) - known, 0.0) / known
+        left += max(float(np.mean(residuals[1] ** 2)) - known, 0.0) / known
+    count = sum(channel.kind in ("power", "total") for channel in study.channels)
+    share = min(1.0, left / first) if first > 0.0 else 0.0
+    return share, left / max(count, 1)
 
 
 def _maps(evidence: Evidence, variables: Mapping[str, Array]) -> tuple[Map, ...]:

@@ -1,7 +1,7 @@
 """A diagnosis as a DiagnosticArray (REP-107)."""
 
 from tomr_fault_diag.classifier.stage import Diagnosis
-from tomr_fault_diag.classifier.states import STATES, UNKNOWN
+from tomr_fault_diag.classifier.states import NORMAL, NOT_OBSERVABLE, STATES, UNKNOWN
 from tomr_fault_diag.residuals.frame import residual_names
 from tomr_fault_diag.residuals.messages import sentence
 from tomr_power_model.messages.outgoing import DiagnosticMessage, Status
@@ -16,6 +16,7 @@ def diagnosis_message(robot: Robot, diagnosis: Diagnosis, hardware_id: str) -> D
     """The message of one diagnosis: state, since when, probabilities, evidence."""
     seconds, rest = divmod(diagnosis.since_ns, NANOSECONDS)
     values = [("state", diagnosis.state.name), ("since", f"{seconds}.{rest:09d}")]
+    values.append(("not_observable", ", ".join(diagnosis.unseen.words)))
     for state, share in zip(STATES, diagnosis.probabilities, strict=False):
         values.append((f"p {state.name}", f"{share:.4f}"))
     evidence = evidence_of(robot, diagnosis)
@@ -41,6 +42,11 @@ def _headline(robot: Robot, diagnosis: Diagnosis) -> str:
     if state == UNKNOWN:
         missing = next((r.missing for r in diagnosis.frame.residuals if r.stale), "too little seen")
         return f"{state.name}: {missing}"
-    if state.wheel is not None:
-        return f"{state.name} ({robot.wheel_names[state.wheel]})"
+    if state == NOT_OBSERVABLE:
+        return f"{state.name}: the robot stands still"
+    if diagnosis.wheel is not None:
+        return f"{state.name} ({robot.wheel_names[diagnosis.wheel]})"
+    if state is STATES[NORMAL] and diagnosis.unseen.wheels:
+        motors = ", ".join(str(wheel + 1) for wheel in diagnosis.unseen.wheels)
+        return f"{state.name}; motor {motors} not observable in this motion"
     return state.name

@@ -11,47 +11,57 @@ from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot.parameters import ParameterSpec
 
 _S = ParameterSpec
+CLASSIFIERS = ("window", "wang2024")
+
+
+def _live(
+    name: str, description: str, default: float, unit: str, low: float, high: float
+) -> ParameterSpec:
+    return _S(name, description, "float", default, unit, low, high, read_only=False)
+
+
 CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
+    _S(
+        "classifier",
+        "window: continuous residuals of the last 0.4 s; wang2024: the paper's codes and network",
+        "str",
+        "window",
+        choices=CLASSIFIERS,
+    ),
     _S("weights", "file of network weights; empty: the shipped ones", "str", ""),
     _S(
         "input_order",
-        "whether the weights take speeds or derived powers as inputs 5-7",
+        "of wang2024: whether the weights take speeds or derived powers as inputs 5-7",
         "str",
         "speeds_first",
         choices=tuple(INPUT_ORDERS),
     ),
     _S("hardware_id", "of this robot, in every diagnostic status", "str", "tomr"),
-    _S("filter_time", "of the probabilities", "float", 0.15, "s", 0.0, 10.0, read_only=False),
+    _S("evidence_weight", "of window: what one window counts", "float", 0.4, "", 0.01, 1.0),
     _S(
-        "confirm_time",
-        "a fault must lead this long before it is named",
+        "caution",
+        "of window: decades of evidence needed before a fault is named",
         "float",
-        0.15,
-        "s",
+        11.0,
+        "",
         0.0,
-        10.0,
-        read_only=False,
+        30.0,
     ),
     _S(
-        "recovery_time",
-        "normal must lead this long before it is named again",
+        "striking",
+        "of window: log-likelihood ratio to normal that a single window must reach besides",
         "float",
-        1.0,
-        "s",
+        7.0,
+        "",
         0.0,
-        60.0,
-        read_only=False,
+        50.0,
     ),
-    _S(
-        "report_period",
-        "of /diagnostics besides changes",
-        "float",
-        1.0,
-        "s",
-        0.05,
-        60.0,
-        read_only=False,
+    _live("filter_time", "of wang2024: of the probabilities", 0.15, "s", 0.0, 10.0),
+    _live("confirm_time", "of wang2024: a fault must lead so long to be named", 0.15, "s", 0.0, 10),
+    _live(
+        "recovery_time", "normal must lead this long before it is named again", 1.0, "s", 0.0, 60.0
     ),
+    _live("report_period", "of /diagnostics besides changes", 1.0, "s", 0.05, 60.0),
 )
 
 
@@ -59,6 +69,11 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
 class ClassifierSettings:
     """Settings of the classifier; times in nanoseconds."""
 
+    classifier: str = "window"
+    weights: str = ""
+    evidence_weight: float = 0.4
+    caution: float = 11.0
+    striking: float = 7.0
     filter_time: int = to_ns(0.15)
     confirm_time: int = to_ns(0.15)
     recovery_time: int = to_ns(1.0)
@@ -75,14 +90,19 @@ class ClassifierSettings:
                 "give weights trained in that order as weights"
             )
 
-        def nanoseconds(name: str) -> int:
-            return to_ns(cast(float, values[name]))
+        def number(name: str) -> float:
+            return cast(float, values[name])
 
         return cls(
-            filter_time=nanoseconds("filter_time"),
-            confirm_time=nanoseconds("confirm_time"),
-            recovery_time=nanoseconds("recovery_time"),
-            report_period=nanoseconds("report_period"),
+            classifier=str(values["classifier"]),
+            weights=str(values["weights"]),
+            evidence_weight=number("evidence_weight"),
+            caution=number("caution"),
+            striking=number("striking"),
+            filter_time=to_ns(number("filter_time")),
+            confirm_time=to_ns(number("confirm_time")),
+            recovery_time=to_ns(number("recovery_time")),
+            report_period=to_ns(number("report_period")),
             hardware_id=str(values["hardware_id"]),
             input_order=str(values["input_order"]),
         )

@@ -1,18 +1,13 @@
 """The classifier stage: residual frames in, diagnoses out at 1 Hz and at once on a change."""
 
-import math
-from functools import lru_cache
-
 import numpy as np
-from attrs import frozen
-from numpy.typing import NDArray
+from attrs import field, frozen
 
-from tomr_fault_diag.classifier.network import Network
+from tomr_fault_diag.classifier.judges import Judge, Opinion
+from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
-from tomr_fault_diag.classifier.states import NORMAL, STATES, UNKNOWN, State
-from tomr_fault_diag.residuals.frame import INPUT_ORDERS, MOTORS, TOTAL, ResidualFrame
-
-Array = NDArray[np.float64]
+from tomr_fault_diag.classifier.states import NORMAL, NOT_OBSERVABLE, STATES, UNKNOWN, State
+from tomr_fault_diag.residuals.frame import MOTORS, TOTAL, ResidualFrame
 
 
 @frozen
@@ -22,34 +17,44 @@ class Diagnosis:
     stamp_ns: int
     state: State
     since_ns: int
-    probabilities: tuple[float, ...]  # of STATES, smoothed; empty where nothing is known
+    probabilities: tuple[float, ...]  # of STATES, given all so far; empty where nothing is known
     frame: ResidualFrame
     changed: bool
+    wheel: int | None = None  # 0..2 that the state concerns, where it is known
+    unseen: Unseen = field(factory=Unseen)
 
 
 class FaultClassifier:
     """Streaming core of the classifier; driven by stamps, the same online and offline.
 
-    The network's probabilities pass a first-order filter; a fault is named when it leads for
-    `confirm_time`, normal again when it leads for `recovery_time`: a fault that shows only while
-    its wheel turns does not blink.
+    A fault is named when the judge is sure of it, normal again when it leads for `recovery_time`.
+    A named fault stays named while nothing speaks against it, as when its wheel is idle.
     """
 
-    def __init__(self, network: Network, settings: ClassifierSettings | None = None) -> None:
-        self.settings = settings or ClassifierSettings()
-        order = list(INPUT_ORDERS[self.settings.input_order])
-        # Few of the 3^10 inputs occur, and most of them again and again.
-        self._answer = lru_cache(maxsize=4096)(
-            lambda codes: network.probabilities(np.array(codes, dtype=np.float64)[order])
-        )
+    def __init__(self, judge: Judge) -> None:
+        self._judge = judge
+        self._motion = MotionWatch()
         self.clear()
+
+    @property
+    def settings(self) -> ClassifierSettings:
+        """Of the judge as well: times may be changed while running."""
+        return self._judge.settings
+
+    @settings.setter
+    def settings(self, settings: ClassifierSettings) -> None:
+        self._judge.settings = settings
 
     def clear(self) -> None:
         """Start afresh."""
+        self._judge.clear()
+        self._motion.clear()
         self._stamp = 0
-        self._smoothed: Array | None = None
+        self._opinion: Opinion | None = None
+        self._unseen = Unseen()
         self._state: State | None = None
         self._since = 0
+        self._wheel: int | None = None
         self._candidate = UNKNOWN
         self._candidate_since = 0
 
@@ -71,8 +76,17 @@ class FaultClassifier:
         changed = self._state != before
         if not changed and not self._is_periodic(frame.stamp_ns, elapsed):
             return None
-        shares = () if self._smoothed is None else tuple(float(p) for p in self._smoothed)
-        return Diagnosis(frame.stamp_ns, self._state, self._since, shares, frame, changed)
+        shares = () if self._opinion is None else tuple(self._opinion.probabilities.tolist())
+        return Diagnosis(
+            frame.stamp_ns,
+            self._state,
+            self._since,
+            shares,
+            frame,
+            changed,
+            self._wheel,
+            self._unseen,
+        )
 
     def _is_periodic(self, stamp: int, elapsed: int) -> bool:
         """Whether a multiple of the report period lies since the last frame: no timer needed."""
@@ -80,32 +94,34 @@ class FaultClassifier:
         return stamp // period != (stamp - elapsed) // period
 
     def _decide(self, frame: ResidualFrame, elapsed: int) -> None:
+        self._unseen = self._motion.take(frame)
         if not _is_decidable(frame):
-            self._smoothed = None
-            self._enter(UNKNOWN, frame.stamp_ns)
+            self._judge.clear()
+            self._opinion = None
+            self._candidate = UNKNOWN
+            self._enter(UNKNOWN, frame.stamp_ns, None)
             return
-        now = self._answer(frame.codes)
-        if self._smoothed is None or not elapsed:
-            self._smoothed = now
-        else:
-            kept = math.exp(-elapsed / max(self.settings.filter_time, 1))
-            self._smoothed = kept * self._smoothed + (1.0 - kept) * now
-        leading = STATES[int(np.argmax(self._smoothed))]
+        opinion = self._opinion = self._judge.judge(frame, elapsed, self._unseen)
+        leading = STATES[int(np.argmax(opinion.probabilities))]
         if leading != self._candidate:
             self._candidate, self._candidate_since = leading, frame.stamp_ns
-        if self._state in (None, UNKNOWN) and leading is STATES[NORMAL]:
-            self._enter(leading, frame.stamp_ns)
-        elif leading != self._state and self._leads_long_enough(frame.stamp_ns):
-            self._enter(leading, self._candidate_since)
+        if leading is STATES[NORMAL]:
+            self._settle(frame.stamp_ns)
+        elif opinion.sure and (leading != self._state or opinion.wheel != self._wheel):
+            self._enter(leading, self._candidate_since, opinion.wheel)
         elif self._state is None:
-            self._enter(UNKNOWN, frame.stamp_ns)
+            self._enter(UNKNOWN, frame.stamp_ns, None)
 
-    def _leads_long_enough(self, stamp: int) -> bool:
-        is_normal = self._candidate is STATES[NORMAL]
-        wanted = self.settings.recovery_time if is_normal else self.settings.confirm_time
-        return stamp - self._candidate_since >= wanted
+    def _settle(self, stamp: int) -> None:
+        """Nothing is wrong, any more or still; what that is called depends on the motion."""
+        quiet = NOT_OBSERVABLE if self._unseen.everything else STATES[NORMAL]
+        if self._state in (None, UNKNOWN, NOT_OBSERVABLE, STATES[NORMAL]):
+            self._enter(quiet, stamp, None)
+        elif stamp - self._candidate_since >= self.settings.recovery_time:
+            self._enter(quiet, self._candidate_since, None)
 
-    def _enter(self, state: State, since: int) -> None:
+    def _enter(self, state: State, since: int, wheel: int | None) -> None:
+        self._wheel = wheel
         if state != self._state:
             self._state, self._since = state, since
 

@@ -27,3 +27,6 @@ SLIP = 1
 CONTROL = 2
 MOTOR = 3  # of wheel 0; those of wheels 1 and 2 follow
 UNKNOWN = State("unknown", Level.STALE)
+# Nothing is wrong as far as can be told, and in this motion nothing could be told.
+NOT_OBSERVABLE = State("not observable in this motion", Level.OK)
+FAULTLESS = frozenset({STATES[NORMAL].name, UNKNOWN.name, NOT_OBSERVABLE.name})

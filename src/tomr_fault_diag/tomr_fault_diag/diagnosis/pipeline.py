@@ -9,8 +9,8 @@ from typing import Any
 
 from attrs import frozen
 
+from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message
-from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import ResidualFrame
@@ -49,7 +49,7 @@ class Pipeline:
         self.complaints = Complaints()
         self._predictor = PowerPredictor(robot, settings.model)
         self._residuals = ResidualStage(robot, settings.residuals)
-        self._classifier = FaultClassifier(Network.load(settings.weights), settings.classifier)
+        self._classifier = FaultClassifier(make_judge(settings.classifier))
         wheels = WheelFinder(robot.wheel_names)
         self.inputs: tuple[Input, ...] = (
             *model_inputs(robot, self._predictor, TWIST_STAMPED, wheels),

@@ -26,7 +26,6 @@ class DiagnosisSettings:
     model: ModelSettings
     residuals: ResidualSettings
     classifier: ClassifierSettings
-    weights: str = ""
 
     @classmethod
     def of(cls, values: Mapping[str, object], place: str) -> Self:
@@ -42,7 +41,6 @@ class DiagnosisSettings:
             ModelSettings.of(checked),
             ResidualSettings.of(checked),
             ClassifierSettings.of(checked),
-            str(checked["weights"]),
         )
 
 

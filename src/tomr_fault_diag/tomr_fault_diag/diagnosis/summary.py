@@ -5,7 +5,7 @@ from collections import Counter
 from attrs import field, frozen
 
 from tomr_fault_diag.classifier.stage import Diagnosis
-from tomr_fault_diag.classifier.states import NORMAL, STATES, UNKNOWN
+from tomr_fault_diag.classifier.states import FAULTLESS
 from tomr_fault_diag.residuals.frame import RESIDUALS, ResidualFrame
 
 
@@ -30,8 +30,8 @@ class Summary:
 
     @property
     def has_fault(self) -> bool:
-        """Whether anything but normal or unknown was named."""
-        return any(name not in (STATES[NORMAL].name, UNKNOWN.name) for name in self.shares)
+        """Whether anything was named that is wrong."""
+        return any(name not in FAULTLESS for name in self.shares)
 
 
 @frozen

@@ -4,8 +4,8 @@ from typing import Any
 
 from rclpy.parameter import Parameter
 
+from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.messages import TOPIC, diagnosis_message
-from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
@@ -23,9 +23,7 @@ class FaultClassifierNode(StageNode):
     def __init__(self) -> None:
         super().__init__("fault_classifier", CLASSIFIER_PARAMETERS)
         self._robot = self.robot_described()
-        self._classifier = FaultClassifier(
-            Network.load(str(self.values["weights"])), ClassifierSettings.of(self.values)
-        )
+        self._classifier = FaultClassifier(make_judge(ClassifierSettings.of(self.values)))
         self.offer(TOPIC, DiagnosticMessage)
         self.listen([Input(RESIDUALS, DIAGNOSTICS, guarded(self._take))], self._advance, STAGE_QOS)
         self.add_post_set_parameters_callback(self._retune)

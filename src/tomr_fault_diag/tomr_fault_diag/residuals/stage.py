@@ -148,7 +148,8 @@ class ResidualStage:
             models = [past.power[WHEELS] for past in self._recent]
             missing = "no fresh battery_state"
         least = self._least(unit) * self.settings.bands.total_factor
-        return self._residual(value, models, unit, least, missing, absent)
+        relative = self.settings.bands.total_relative
+        return self._residual(value, models, unit, least, missing, absent, relative=relative)
 
     def _motor(self, wheel: int, measured: Measured, absent: str) -> Residual:
         models = [past.of_unit(measured.unit)[wheel] for past in self._recent]
@@ -173,7 +174,7 @@ class ResidualStage:
             model = models[-1]
             # Against the set direction: "slower than told" is negative whichever way it turns.
             sign = -1.0 if model < 0.0 else 1.0
-            spread = bands.transient * _spread(models)
+            spread = bands.speed_transient * _spread(models)
             band = max(bands.speed, bands.speed_relative * abs(model)) + spread
             missing = _missing(value, model, "no fresh joint_states", absent)
             speeds.append(
@@ -196,9 +197,11 @@ class ResidualStage:
         missing: str,
         absent: str,
         source: str = "cmd_vel",
+        relative: float | None = None,
     ) -> Residual:
         bands, model = self.settings.bands, models[-1]
-        band = max(least, bands.relative * abs(model)) + bands.transient * _spread(models)
+        share = bands.relative if relative is None else relative
+        band = max(least, share * abs(model)) + bands.transient * _spread(models)
         reason = _missing(value, model, missing, absent, source)
         return Residual(rounded(value - model), rounded(band), rounded(model), unit, reason)
 

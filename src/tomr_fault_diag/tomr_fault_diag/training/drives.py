@@ -1,4 +1,8 @@
-"""Random drives to learn from: robots, loads, floors, headings and faults drawn at random."""
+"""Random drives to learn from and to score on: robots, loads, floors, bumps and faults by chance.
+
+A seed makes a drive, whole: the robot as described, how it really is, what it is told to do and
+what befalls it.
+"""
 
 import math
 
@@ -7,21 +11,39 @@ from attrs import evolve, frozen
 
 from tomr_power_model.robot import Motor, Robot
 from tomr_sim_bridge.missions.mission import Mission
-from tomr_sim_bridge.missions.schema import (
-    CirclePhase,
-    PlannedFault,
-    TwistPhase,
-)
+from tomr_sim_bridge.missions.schema import CirclePhase, PlannedFault, TwistPhase
 
 # A drive is healthy, or has one fault: (kind, share of the drives).
-_KINDS: tuple[tuple[str | None, float], ...] = (
+KINDS: tuple[tuple[str | None, float], ...] = (
     (None, 0.25),
-    ("floor_slippery", 0.3),
-    ("control_signal_lost", 0.2),
+    ("floor_slippery", 0.25),
+    ("control_signal_lost", 0.25),
     ("encoder_lost", 0.25),
 )
 _SCALES = (0.7, 1.4)  # of the family of robots, against the reference
-_DEVIATION = 0.03  # of a real robot from its description
+DEVIATION = 0.05  # of a real robot from its description
+PAYLOAD = 0.1  # of its mass, at most, of which the description knows nothing
+_PHASES = 9
+_SHARES = {
+    "straight": 0.25,
+    "across": 0.15,
+    "turning": 0.2,
+    "spin": 0.1,
+    "circle": 0.2,
+    "stop": 0.1,
+}
+
+Piece = TwistPhase | CirclePhase
+
+
+@frozen
+class Bump:
+    """A push on the body: a sill, a cable, somebody's foot."""
+
+    start: float  # s from the start of the drive
+    duration: float  # s
+    force: tuple[float, float]  # N in the world
+    moment: float  # N m about the vertical
 
 
 @frozen
@@ -32,37 +54,54 @@ class Drive:
     plant: Robot
     believed: Robot
     mission: Mission
+    bumps: tuple[Bump, ...] = ()
+
+    @property
+    def length(self) -> float:
+        """Of the drive [s]."""
+        return self.mission.plan(self.believed).duration
+
+    @property
+    def healthy(self) -> "Drive":
+        """The same drive without its fault."""
+        return evolve(self, mission=evolve(self.mission, faults=()))
 
 
-def random_drive(reference: Robot, seed: int) -> Drive:
-    """A drive that depends on nothing but the seed."""
+def random_drive(reference: Robot, seed: int, kind: str | None = "any") -> Drive:
+    """A drive that depends on nothing but the seed, and on the fault where one is asked for.
+
+    `kind`: a fault's id, None for a healthy drive, "any" to draw it, "fault" to draw a fault.
+    """
     random = np.random.default_rng(seed)
     believed = _another_robot(reference, random)
-    phases = _phases(random)
+    phases = _phases(believed, random)
     length = math.fsum(phase.duration for phase in phases)
+    payload = float(random.uniform(0.0, PAYLOAD) * believed.mass) if random.random() < 0.5 else 0.0
     mission = Mission(
         name=f"drive_{seed}",
         description="",
         robot="reference",
         command_rate=float(random.choice([10.0, 20.0, 50.0])),
         repeat=1,
-        payload=0.0,
-        floor_friction=float(random.uniform(0.5, 1.0)),
+        payload=payload,
+        floor_friction=float(random.uniform(0.6, 1.0)),
         stamp_jitter=float(random.choice([0.0, 0.0005, 0.001])),
         seed=seed,
         phases=tuple(phases),
-        faults=_faults(random, length),
+        faults=_faults(_kind(kind, random), random, length),
     )
-    return Drive(seed, _deviating(believed, random), believed, mission)
+    plant = deviating(believed, random)
+    return Drive(
+        seed, plant, believed, mission, bumps(believed, random, int(random.integers(0, 4)), length)
+    )
 
 
 def _another_robot(reference: Robot, random: np.random.Generator) -> Robot:
     def scaled(value: float) -> float:
         return float(value * random.uniform(*_SCALES))
 
-    size = random.uniform(0.8, 1.2)
     mass = scaled(reference.mass)
-    radius = reference.robot_radius * size
+    radius = float(reference.robot_radius * random.uniform(0.8, 1.2))
     motor = reference.motors[0]
     motor = evolve(
         motor,
@@ -74,10 +113,11 @@ def _another_robot(reference: Robot, random: np.random.Generator) -> Robot:
         if wheels[0] is not None:
             alike = {key: scaled(value) for key, value in wheels[0].items()}
             physics[effect] = (alike, alike, alike)
+    sensors, controller = reference.sensors, reference.controller
     return evolve(
         reference,
         wheel_offset=float(random.uniform(-math.pi, math.pi)),
-        robot_radius=float(radius),
+        robot_radius=radius,
         wheel_radius=float(reference.wheel_radius * random.uniform(0.85, 1.2)),
         mass=mass,
         inertia_z=float(mass * radius**2 * random.uniform(0.45, 0.7)),
@@ -88,29 +128,33 @@ def _another_robot(reference: Robot, random: np.random.Generator) -> Robot:
         ),
         motors=(motor, motor, motor),
         controller=evolve(
-            reference.controller,
-            proportional=scaled(reference.controller.proportional),
-            integral=scaled(reference.controller.integral),
-            acceleration_limit=float(random.uniform(1.0, 2.5)),
+            controller,
+            proportional=scaled(controller.proportional),
+            integral=scaled(controller.integral),
+            acceleration_limit=float(random.uniform(0.8, 1.8)),
         ),
         sensors=evolve(
-            reference.sensors, encoder_resolution=float(random.choice([1.5e-4, 4e-4, 8e-4]))
+            sensors,
+            encoder_resolution=float(random.choice([1.5e-4, 4e-4, 8e-4])),
+            current_noise=float(sensors.current_noise * random.uniform(0.5, 2.0)),
+            voltage_noise=float(sensors.voltage_noise * random.uniform(0.5, 2.0)),
         ),
         physics=physics,
     )
 
 
-def _deviating(robot: Robot, random: np.random.Generator) -> Robot:
-    """The real robot: every value a little off its description, wheel by wheel."""
+def deviating(robot: Robot, random: np.random.Generator) -> Robot:
+    """A real robot: every value a little off its description, wheel by wheel."""
 
     def off(value: float) -> float:
-        return float(value * random.uniform(1.0 - _DEVIATION, 1.0 + _DEVIATION))
+        return float(value * random.uniform(1.0 - DEVIATION, 1.0 + DEVIATION))
 
     def motor(nominal: Motor) -> Motor:
         return evolve(
             nominal,
             resistance=off(nominal.resistance),
             torque_constant=off(nominal.torque_constant),
+            rotor_inertia=off(nominal.rotor_inertia),
         )
 
     first, second, third = (motor(nominal) for nominal in robot.motors)
@@ -125,45 +169,73 @@ def _deviating(robot: Robot, random: np.random.Generator) -> Robot:
         robot,
         mass=off(robot.mass),
         inertia_z=off(robot.inertia_z),
+        wheel_inertia=off(robot.wheel_inertia),
         motors=(first, second, third),
         physics=physics,
     )
 
 
-def _phases(random: np.random.Generator) -> list[TwistPhase | CirclePhase]:
-    phases: list[TwistPhase | CirclePhase] = [TwistPhase((0.0, 0.0, 0.0), 1.0)]
-    for _ in range(9):
+def _phases(robot: Robot, random: np.random.Generator) -> list[Piece]:
+    phases: list[Piece] = [TwistPhase((0.0, 0.0, 0.0), 1.0)]
+    for _ in range(_PHASES):
         speed = float(random.uniform(0.1, 0.6))
         heading = float(random.uniform(-math.pi, math.pi))
         duration = float(random.uniform(1.0, 3.0))
-        kind = random.choice(["straight", "turning", "spin", "circle", "pause"], p=_SHARES)
+        kind = random.choice(list(_SHARES), p=list(_SHARES.values()))
+        yaw_rate = float(random.uniform(-1.5, 1.5))
+        if kind == "across":  # along an axle: that wheel need not turn
+            heading = robot.wheel_offset + math.pi / 3.0 * int(random.integers(6))
         vx, vy = speed * math.cos(heading), speed * math.sin(heading)
         if kind == "circle":
-            phases.append(CirclePhase(speed, float(random.uniform(-3.0, 3.0)), duration))
+            phases.append(CirclePhase(speed, 2.0 * yaw_rate, duration))
         elif kind == "spin":
-            phases.append(TwistPhase((0.0, 0.0, float(random.uniform(-1.5, 1.5))), duration))
+            phases.append(TwistPhase((0.0, 0.0, yaw_rate), duration))
         elif kind == "turning":
-            phases.append(TwistPhase((vx, vy, float(random.uniform(-1.0, 1.0))), duration))
-        elif kind == "pause":
+            phases.append(TwistPhase((vx, vy, 0.7 * yaw_rate), duration))
+        elif kind == "stop":
             phases.append(TwistPhase((0.0, 0.0, 0.0), 0.5 * duration))
         else:
             phases.append(TwistPhase((vx, vy, 0.0), duration))
     return phases
 
 
-_SHARES = (0.35, 0.2, 0.1, 0.2, 0.15)
+def _kind(asked: str | None, random: np.random.Generator) -> str | None:
+    names = [name for name, _ in KINDS]
+    share = np.array([share for _, share in KINDS])
+    if asked == "fault":
+        share[names.index(None)] = 0.0
+    drawn = names[int(random.choice(len(names), p=share / share.sum()))]
+    return drawn if asked in ("any", "fault") else asked
 
 
-def _faults(random: np.random.Generator, length: float) -> tuple[PlannedFault, ...]:
-    names = [name for name, _ in _KINDS]
-    kind = names[int(random.choice(len(_KINDS), p=[share for _, share in _KINDS]))]
-    if kind is None:
-        return ()
+def _faults(
+    kind: str | None, random: np.random.Generator, length: float
+) -> tuple[PlannedFault, ...]:
     start = float(random.uniform(0.2, 0.5) * length)
     end = float(random.uniform(0.7, 1.0) * length)
+    slipperiness = float(random.uniform(0.6, 1.0))
+    severity = 1.0 if random.random() < 0.6 else float(random.uniform(0.5, 1.0))
+    wheel = int(random.integers(1, 4))
+    if kind is None:
+        return ()
+    settings: dict[str, float | int] = {"severity": severity, "wheel": wheel}
     if kind == "floor_slippery":
-        settings: dict[str, float | int] = {"severity": float(random.uniform(0.75, 1.0))}
-    else:
-        severity = 1.0 if random.random() < 0.8 else float(random.uniform(0.7, 1.0))
-        settings = {"severity": severity, "wheel": int(random.integers(1, 4))}
+        settings = {"severity": slipperiness}
     return (PlannedFault(kind, start, end, settings),)
+
+
+def bumps(robot: Robot, random: np.random.Generator, count: int, until: float) -> tuple[Bump, ...]:
+    """So many bumps that start before a time [s]."""
+    found = []
+    for _ in range(count):
+        force = robot.mass * float(random.uniform(0.5, 2.5))
+        direction = float(random.uniform(-math.pi, math.pi))
+        found.append(
+            Bump(
+                start=float(random.uniform(0.0, until)),
+                duration=float(random.uniform(0.03, 0.12)),
+                force=(force * math.cos(direction), force * math.sin(direction)),
+                moment=float(random.uniform(-0.5, 0.5) * force * robot.robot_radius),
+            )
+        )
+    return tuple(sorted(found, key=lambda bump: bump.start))

@@ -8,8 +8,16 @@ from typing import Any
 
 from attrs import define, field, frozen
 
-from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STATES, UNKNOWN
-from tomr_fault_diag.training.labels import truth_of
+from tomr_fault_diag.classifier.states import (
+    CONTROL,
+    MOTOR,
+    NORMAL,
+    NOT_OBSERVABLE,
+    SLIP,
+    STATES,
+    UNKNOWN,
+)
+from tomr_fault_diag.training.truth import truth_of
 
 NANOSECONDS = 1_000_000_000
 TIME_TO_NAME = NANOSECONDS  # in which a fault has to be named
@@ -38,7 +46,9 @@ def named_in(message: Any, stamp_ns: int) -> Named | None:
     for status in message.status:
         values = {item.key: str(item.value) for item in status.values}
         if "state" in values:
-            state = values["state"]
+            # At rest nothing can be wrong that anybody could see: as good as normal here.
+            quiet = values["state"] == NOT_OBSERVABLE.name
+            state = NORMAL_STATE if quiet else values["state"]
             share = values.get(f"p {state}")
             evidence = tuple(text for key, text in values.items() if key.startswith("evidence "))
             return Named(

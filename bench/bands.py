@@ -1,0 +1,109 @@
+"""Bands that hold 99.9 % of the residuals of healthy driving.
+
+    .venv/bin/python bench/bands.py                          # the defaults of power_residuals
+    .venv/bin/python bench/bands.py BAG... --robot my.yaml   # of one robot, from its healthy drives
+
+Without recordings: random robots up to 5 % off their description, payloads included, in the planar
+model that trains the classifier, and the shares of residuals outside the shipped and the paper's
+bands. With recordings: a section for robot.yaml.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import yaml
+from attrs import asdict, evolve
+from numpy.typing import NDArray
+
+from tomr_fault_diag.cli.diagnose import STAGE_NODES
+from tomr_fault_diag.diagnosis.offline import diagnose
+from tomr_fault_diag.diagnosis.pipeline import Pipeline
+from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
+from tomr_fault_diag.residuals.calibrated import fit_bands
+from tomr_fault_diag.residuals.frame import ResidualFrame
+from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
+from tomr_fault_diag.training.drives import random_drive
+from tomr_fault_diag.training.labels import spread
+from tomr_fault_diag.training.planar.generate import simulate
+from tomr_power_model.cli import run_main
+from tomr_power_model.recordings import open_recording
+from tomr_power_model.robot import load_robot, read_node_sections, shipped_robot
+
+Array = NDArray[np.float64]
+_FIRST_SEED = 30_000_000
+_KINDS = {
+    "total": slice(0, 1),
+    "motors": slice(1, 4),
+    "speeds": slice(4, 7),
+    "derived": slice(7, 10),
+}
+
+
+def simulated(count: int) -> None:
+    """Fit to healthy simulated drives without bumps, and hold the bands against each other."""
+    reference = shipped_robot("reference")
+    seeds = range(_FIRST_SEED, _FIRST_SEED + count)
+    drives = [evolve(random_drive(reference, seed, None), bumps=()) for seed in seeds]
+    batch = simulate(drives)
+    told = batch.labels == 0
+    told[0] = False
+    residual, _ = batch.compared.residuals(BandSettings())
+    change = spread(batch.compared.modelled)
+    rows = [np.moveaxis(part, 1, -1)[told] for part in (residual, batch.compared.modelled, change)]
+    fitted = fit_bands(*rows)
+    print(yaml.safe_dump({"fitted": rounded(fitted)}, sort_keys=False))
+    for name, bands in (("fitted", fitted), ("shipped", BandSettings()), ("paper", PAPER_BANDS)):
+        _, band = batch.compared.residuals(bands)
+        outside = np.abs(rows[0]) > np.moveaxis(band, 1, -1)[told]
+        shares = ", ".join(
+            f"{kind} {100 * outside[:, s].mean():.2f} %" for kind, s in _KINDS.items()
+        )
+        print(f"outside the {name} bands: {shares}")
+
+
+def recorded(bags: Sequence[Path], robot: str) -> None:
+    """Fit to the residuals of healthy recordings of one robot."""
+    settings = DiagnosisSettings.of(read_node_sections(robot, STAGE_NODES), robot)
+    parts: list[tuple[Array, Array, Array]] = []
+    unit = "W"
+    for bag in bags:
+        pipeline = Pipeline(load_robot(robot), settings)
+        frames: list[ResidualFrame] = []
+        with open_recording(bag) as recording:
+            for _, step in diagnose(recording, pipeline):
+                frames.extend(step.frames)
+        residual = np.array([[item.residual for item in frame.residuals] for frame in frames])
+        modelled = np.array([[item.modelled for item in frame.residuals] for frame in frames])
+        parts.append((residual, modelled, spread(modelled)))
+        unit = next((f.residuals[1].unit for f in frames if not f.residuals[1].stale), unit)
+    first, second, third = (np.concatenate(column) for column in zip(*parts, strict=True))
+    bands = rounded(fit_bands(first, second, third, unit))
+    section = {"power_residuals": {"ros__parameters": {"band": bands}}}
+    print(yaml.safe_dump(section, sort_keys=False))
+
+
+def rounded(bands: BandSettings) -> dict[str, float]:
+    """Numbers to read."""
+    return {name: float(f"{value:.3g}") for name, value in asdict(bands).items()}
+
+
+def _main(arguments: Sequence[str] | None) -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("bags", type=Path, nargs="*", help="healthy recordings of one robot")
+    parser.add_argument("--robot", default="reference", help="shipped name or robot.yaml")
+    parser.add_argument("--drives", type=int, default=300, help="to simulate (default 300)")
+    options = parser.parse_args(arguments)
+    if options.bags:
+        recorded(options.bags, options.robot)
+    else:
+        simulated(options.drives)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(run_main(_main))

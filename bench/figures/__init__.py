@@ -1,0 +1,1 @@
+"""The experiments of Wang 2024, figure by figure; `bench/experiments.py` runs them."""

@@ -1,0 +1,67 @@
+"""The planar model that trains the classifier against MuJoCo, on the same drives.
+
+    .venv/bin/python bench/planar.py [--drives 12]
+
+For healthy drives and each kind of fault, while it is in force: root mean square of the residuals
+in either simulation, and their correlation tick by tick. Sensor noise is drawn apart in the two.
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_fault_diag.training.drives import KINDS, random_drive
+from tomr_fault_diag.training.planar.generate import simulate
+from tomr_fault_diag.training.watch import watch
+from tomr_power_model.cli import run_main
+from tomr_power_model.robot import shipped_robot
+
+Array = NDArray[np.float64]
+_FIRST_SEED = 600_000
+_GROUPS = {"total power": [0], "motor powers": [1, 2, 3], "wheel speeds": [4, 5, 6]}
+
+
+def both(seed: int, kind: str | None) -> tuple[Array, Array]:
+    """Residuals (ticks, 10) in MuJoCo and in the planar model, while the fault is in force."""
+    drive = random_drive(shipped_robot("reference"), seed, kind)
+    watched = watch(drive)
+    planar, _ = simulate([drive]).compared.residuals(BandSettings())
+    frames = [[item.residual for item in frame.residuals] for frame in watched.frames]
+    ticks = watched.first - 1 + np.arange(len(frames))
+    chosen = (ticks < len(planar)) & (watched.faulty if kind else True)
+    return np.array(frames)[chosen], planar[ticks[chosen], :, 0]
+
+
+def _main(arguments: Sequence[str] | None) -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--drives", type=int, default=12, help="of each kind (default 12)")
+    options = parser.parse_args(arguments)
+    kinds = [kind for kind, _ in KINDS]
+    work = [(_FIRST_SEED + number, kind) for kind in kinds for number in range(options.drives)]
+    with ProcessPoolExecutor(os.cpu_count()) as pool:
+        found = list(tqdm(pool.map(both, *zip(*work, strict=True)), total=len(work), unit="drive"))
+    print(f"{'':22}{'residual':14}{'MuJoCo':>9}{'planar':>9}{'correlation':>13}")
+    for kind in kinds:
+        parts = [pair for pair, (_, of) in zip(found, work, strict=True) if of == kind]
+        mujoco, planar = (np.concatenate(side) for side in zip(*parts, strict=True))
+        for name, channels in _GROUPS.items():
+            a, b = mujoco[:, channels].ravel(), planar[:, channels].ravel()
+            known = np.isfinite(a) & np.isfinite(b)
+            sizes = [float(np.sqrt(np.mean(side[known] ** 2))) for side in (a, b)]
+            alike = float(np.corrcoef(a[known], b[known])[0, 1])
+            title = kind or "healthy"
+            print(f"{title:22}{name:14}{sizes[0]:9.3f}{sizes[1]:9.3f}{alike:13.3f}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(run_main(_main))

@@ -1,0 +1,52 @@
+"""Bands calibrated on healthy residuals."""
+
+import numpy as np
+import pytest
+
+from tomr_fault_diag.residuals.calibrated import fit_band, fit_bands
+from tomr_power_model.errors import InputError
+
+COUNT = 20_000
+
+
+def _healthy(seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Residuals of 5 % of the model, 10 % of its change and 0.1 W of noise."""
+    random = np.random.default_rng(seed)
+    modelled = random.uniform(0.0, 10.0, (COUNT, 10))
+    change = random.exponential(1.0, (COUNT, 10))
+    scale = 0.1 + 0.05 * modelled + 0.1 * change
+    return scale * random.standard_normal((COUNT, 10)), modelled, change
+
+
+def test_the_share_asked_for_stays_within() -> None:
+    residual, modelled, change = _healthy()
+    bands = fit_bands(residual, modelled, change, within=0.99)
+    fresh = _healthy(1)
+    band = np.maximum(bands.power, bands.relative * fresh[1]) + bands.transient * fresh[2]
+    inside = (np.abs(fresh[0]) <= band)[:, 1:4].mean()
+    assert inside == pytest.approx(0.99, abs=0.004)
+    assert 0.05 < bands.transient < 0.5
+
+
+def test_more_mismatch_makes_wider_bands() -> None:
+    residual, modelled, change = _healthy()
+    narrow, wide = (fit_band(k * residual, modelled, change, 0.99) for k in (1.0, 3.0))
+    assert narrow is not None
+    assert wide is not None
+    assert wide.least == pytest.approx(3.0 * narrow.least, rel=1e-6)
+    assert wide.relative == pytest.approx(3.0 * narrow.relative, rel=1e-6)
+
+
+def test_currents_and_missing_residuals() -> None:
+    residual, modelled, change = _healthy()
+    residual[:, 0] = np.nan  # no battery_state
+    bands = fit_bands(residual, modelled, change, unit="A")
+    assert bands.current != pytest.approx(0.15)
+    assert bands.power == 1.2
+    assert bands.total_relative == 0.13
+
+
+def test_too_little_is_refused() -> None:
+    residual, modelled, change = (part[:100] for part in _healthy())
+    with pytest.raises(InputError, match="a minute of driving"):
+        fit_bands(residual, modelled, change)

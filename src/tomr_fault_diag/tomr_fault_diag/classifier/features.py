@@ -1,0 +1,124 @@
+"""What the window network sees of a frame: continuous, scaled so that healthy is about 1 or less.
+
+Sixteen numbers a tick, in groups of three by wheel:
+
+    total        residual of the total power / band
+    motors 1-3   residuals of the motors' powers against the command / band
+    encoders 1-3 the same against the encoders
+    slower 1-3   measured - expected wheel speed / band, signed as the wheel turns
+    expected 1-3, measured 1-3   wheel speeds
+
+each as asinh of a scaled value, so that a thousandfold still counts as more. What is unknown is
+"as modelled". By symmetry one network serves all three wheels: for each wheel in turn the other
+two follow in their order around the robot, and all speeds are reversed where it turns backwards.
+"""
+
+import math
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL, ResidualFrame
+
+Array = NDArray[np.float64]
+Real = TypeVar("Real", np.float32, np.float64)
+
+CHANNELS = 16
+WINDOW = 8  # ticks
+INPUTS = CHANNELS * WINDOW
+_FINE = 3.0  # per band
+_SPEED = 0.5  # rad/s
+_RESIDUAL = slice(0, 7)
+_SIGNED = slice(7, CHANNELS)
+_EXPECTED = slice(10, 13)
+_MOTORS, _SPEEDS, _ENCODERS = list(MOTORS), list(SPEEDS), list(ENCODERS)
+
+
+def _turned(wheel: int) -> list[int]:
+    """Channels as seen from a wheel: it comes first in each group of three."""
+    groups = range(1, CHANNELS, 3)
+    return [0, *(start + (wheel + place) % 3 for start in groups for place in range(3))]
+
+
+TURNS = np.array([_turned(wheel) for wheel in range(3)])  # (3, 16)
+SIGNED = np.arange(CHANNELS) >= _SIGNED.start  # channels that turn with the wheels' direction
+
+
+def channels(residual: Array, band: Array, modelled: Array) -> Array:
+    """Channels (..., 16) of residuals, bands and modelled values (..., 10), NaN where unknown."""
+    scaled = np.arcsinh(_FINE * residual / band)
+    scaled[~np.isfinite(scaled)] = 0.0
+    expected = np.nan_to_num(modelled[..., _SPEEDS])
+    way = np.where(expected < 0.0, -1.0, 1.0)
+    measured = expected + np.nan_to_num(residual[..., _SPEEDS]) * way
+    return np.concatenate(
+        [
+            scaled[..., [TOTAL, *_MOTORS, *_ENCODERS]],
+            scaled[..., _SPEEDS] * way,
+            np.arcsinh(expected / _SPEED),
+            np.arcsinh(measured / _SPEED),
+        ],
+        axis=-1,
+    )
+
+
+def channels_of(frame: ResidualFrame) -> Array:
+    """Channels (16,) of one frame, as `channels`; plain floats, ten are too few for numpy."""
+    scaled = [
+        0.0 if item.stale else math.asinh(_FINE * item.residual / item.band)
+        for item in frame.residuals
+    ]
+    values = [scaled[TOTAL], *(scaled[k] for k in _MOTORS), *(scaled[k] for k in _ENCODERS)]
+    expected, measured = [], []
+    for k in _SPEEDS:
+        item = frame.residuals[k]
+        want = 0.0 if math.isnan(item.modelled) else item.modelled
+        way = -1.0 if want < 0.0 else 1.0
+        values.append(scaled[k] * way)
+        expected.append(math.asinh(want / _SPEED))
+        off = 0.0 if math.isnan(item.residual) else item.residual * way
+        measured.append(math.asinh((want + off) / _SPEED))
+    return np.array(values + expected + measured)
+
+
+def by_wheel(window: NDArray[Real]) -> NDArray[Real]:
+    """Inputs (..., 3, WINDOW * 16) as seen from each wheel, of windows (..., WINDOW, 16).
+
+    The newest tick comes last.
+    """
+    seen = window[..., TURNS]  # (..., WINDOW, 3, 16)
+    way = np.where(window[..., -1, _EXPECTED] < 0.0, -1.0, 1.0).astype(window.dtype)  # (..., 3)
+    seen = np.where(SIGNED, seen * way[..., None, :, None], seen)
+    seen = np.moveaxis(seen, -2, -3)
+    return np.ascontiguousarray(seen.reshape(*seen.shape[:-2], INPUTS))
+
+
+def _without_total(window: Array) -> Array:
+    window[..., 0] = 0.0
+    return window
+
+
+def _without_motors(window: Array) -> Array:
+    window[..., 1:7] = 0.0
+    return window
+
+
+def _without_encoders(window: Array) -> Array:
+    window[..., 4:10] = 0.0
+    window[..., 13:16] = window[..., 10:13]
+    return window
+
+
+# What windows look like to a robot that lacks a sensor.
+BLIND = (_without_total, _without_motors, _without_encoders)
+
+__all__ = [
+    "BLIND",
+    "CHANNELS",
+    "INPUTS",
+    "WINDOW",
+    "by_wheel",
+    "channels",
+    "channels_of",
+]

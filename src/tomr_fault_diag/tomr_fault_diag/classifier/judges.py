@@ -1,0 +1,161 @@
+"""The classifiers to choose from, by name: the parameter `classifier`.
+
+A judge looks at one frame after the other and says how likely each state is, and whether it is sure
+enough of the likeliest for that to be named.
+"""
+
+import math
+from collections import deque
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_fault_diag.classifier.belief import CONTROLS, ENCODERS, Belief, six_of
+from tomr_fault_diag.classifier.features import CHANNELS, WINDOW, channels_of
+from tomr_fault_diag.classifier.network import Network
+from tomr_fault_diag.classifier.observability import Unseen
+from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.classifier.states import CONTROL, NORMAL, STATES
+from tomr_fault_diag.classifier.window_network import WindowNetwork
+from tomr_fault_diag.residuals.frame import INPUT_ORDERS, ResidualFrame
+from tomr_power_model.model.ticks import to_ns
+
+Array = NDArray[np.float64]
+
+_SURE = 0.99
+_STRIKING_TICKS = 10  # in which one window must have been so
+_TOO_LONG = to_ns(0.5)  # between two frames that belong to one window
+
+
+@frozen
+class Opinion:
+    """Probabilities of STATES (6,), whether to name the likeliest, and its wheel if it has one."""
+
+    probabilities: Array
+    sure: bool
+    wheel: int | None = None
+
+
+class Judge(Protocol):
+    """One way to tell states from residuals."""
+
+    settings: ClassifierSettings
+
+    def clear(self) -> None:
+        """Forget what was seen."""
+        ...
+
+    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+        """Look at the newest frame, so long after the one before, and what it cannot show."""
+        ...
+
+
+Maker = Callable[[str, ClassifierSettings], Judge]
+JUDGES: dict[str, Maker] = {}
+
+
+def judge(name: str) -> Callable[[Maker], Maker]:
+    """Register a maker; it gets the file of the weights (empty: the shipped ones) and settings."""
+
+    def register(maker: Maker) -> Maker:
+        JUDGES[name] = maker
+        return maker
+
+    return register
+
+
+class WindowJudge:
+    """Continuous residuals of a window, and a belief that gathers what they say.
+
+    A fault is named when the belief is sure of it and one window of the last half second was
+    `striking` by itself: an error of the description says little, but says it for as long as the
+    motion lasts.
+    """
+
+    def __init__(self, network: WindowNetwork, settings: ClassifierSettings) -> None:
+        self.settings = settings
+        self._network = network
+        self._belief = Belief(settings.evidence_weight, settings.caution)
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget what was seen: as if the robot had stood still."""
+        self._window = np.zeros((WINDOW, CHANNELS))
+        self._recent: deque[Array] = deque(maxlen=_STRIKING_TICKS)
+        self._belief.clear()
+
+    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+        """Look at the newest frame."""
+        if elapsed_ns > _TOO_LONG:
+            self._window[:] = 0.0
+        self._window[:-1] = self._window[1:]
+        self._window[-1] = channels_of(frame)
+        likelihoods = self._network.log_likelihoods(self._window)
+        for idle in unseen.wheels:  # what an idle wheel hides it cannot refute either
+            faults = [CONTROLS.start + idle, ENCODERS.start + idle]
+            likelihoods[faults] = np.maximum(likelihoods[faults], likelihoods[NORMAL])
+        self._recent.append(likelihoods - likelihoods[NORMAL])
+        shares = self._belief.update(likelihoods)
+        six, best = six_of(shares), int(np.argmax(shares))
+        leading = int(np.argmax(six))
+        striking = any(window[best] > self.settings.striking for window in reversed(self._recent))
+        concerned = best - CONTROLS.start if leading == CONTROL else STATES[leading].wheel
+        return Opinion(six, bool(six[leading] > _SURE and striking), concerned)
+
+
+class CodeJudge:
+    """The paper's network on three-level codes, its probabilities smoothed in time.
+
+    A first-order filter; a state that leads for `confirm_time` is named.
+    """
+
+    def __init__(self, network: Network, settings: ClassifierSettings) -> None:
+        self.settings = settings
+        order = list(INPUT_ORDERS[settings.input_order])
+        # Few of the 3^10 inputs occur, and most of them again and again.
+        self._answer = lru_cache(maxsize=4096)(
+            lambda codes: network.probabilities(np.array(codes, dtype=np.float64)[order])
+        )
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget what was seen."""
+        self._smoothed: Array | None = None
+        self._leading = -1
+        self._led = 0
+
+    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+        """Look at the newest frame."""
+        now = self._answer(frame.codes)
+        if self._smoothed is None or not elapsed_ns:
+            self._smoothed = now
+        else:
+            kept = math.exp(-elapsed_ns / max(self.settings.filter_time, 1))
+            self._smoothed = kept * self._smoothed + (1.0 - kept) * now
+        leading = int(np.argmax(self._smoothed))
+        self._led = self._led + elapsed_ns if leading == self._leading else 0
+        self._leading = leading
+        return Opinion(
+            self._smoothed, self._led >= self.settings.confirm_time, STATES[leading].wheel
+        )
+
+
+@judge("window")
+def window_judge(weights: str, settings: ClassifierSettings) -> Judge:
+    """Ours."""
+    return WindowJudge(WindowNetwork.load(weights or None), settings)
+
+
+@judge("wang2024")
+def code_judge(weights: str, settings: ClassifierSettings) -> Judge:
+    """The paper's."""
+    return CodeJudge(Network.load(weights or None), settings)
+
+
+def make_judge(settings: ClassifierSettings) -> Judge:
+    """The classifier that the settings ask for; raises InputError for weights that do not fit."""
+    return JUDGES[settings.classifier](settings.weights, settings)

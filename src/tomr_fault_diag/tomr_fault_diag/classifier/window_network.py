@@ -1,0 +1,91 @@
+"""The window network: continuous residuals of the last 0.4 s, one wheel's view at a time.
+
+    h = relu(W2 relu(W1 x_w + b1) + b2),  (n, s, c, m)_w = W3 h + b3
+
+for the view x_w of each wheel w; softmax over mean n, mean s, c_1..3, m_1..3: normal, slip, signal
+of wheel w lost, encoder of wheel w lost. The same network serves the three wheels, so what it has
+learned of one holds for all.
+"""
+
+from functools import cached_property
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_fault_diag.classifier.belief import HYPOTHESES
+from tomr_fault_diag.classifier.features import INPUTS, by_wheel
+from tomr_power_model.errors import InputError
+
+Array = NDArray[np.float64]
+
+SHIPPED = "window.npz"
+_VIEWS = 4  # outputs of one view
+
+
+@frozen
+class WindowNetwork:
+    """Three layers, and how often each hypothesis came in training."""
+
+    weight_1: Array  # (h1, INPUTS)
+    bias_1: Array  # (h1,)
+    weight_2: Array  # (h2, h1)
+    bias_2: Array  # (h2,)
+    weight_3: Array  # (4, h2)
+    bias_3: Array  # (4,)
+    prior: Array  # (8,)
+
+    @classmethod
+    def load(cls, path: Path | str | None = None) -> Self:
+        """Weights of a file, or the shipped ones; raises InputError if they do not fit."""
+        if path:
+            return cls._read(Path(path))
+        with as_file(files("tomr_fault_diag").joinpath("weights").joinpath(SHIPPED)) as shipped:
+            return cls._read(shipped)
+
+    @classmethod
+    def _read(cls, path: Path) -> Self:
+        names = [field.name for field in cls.__attrs_attrs__]
+        try:
+            with np.load(path) as stored:
+                found = {name: np.asarray(stored[name], np.float64) for name in names}
+        except (OSError, ValueError, KeyError, EOFError) as error:
+            raise InputError(
+                f"{path}: no weights of the window network ({error}): train it again, or set "
+                "classifier to the kind that they were trained for"
+            ) from None
+        first, second = found["bias_1"].size, found["bias_2"].size
+        shapes = {
+            "weight_1": (first, INPUTS), "bias_1": (first,), "weight_2": (second, first),
+            "bias_2": (second,), "weight_3": (_VIEWS, second), "bias_3": (_VIEWS,),
+            "prior": (HYPOTHESES,),
+        }  # fmt: skip
+        for name, shape in shapes.items():
+            if found[name].shape != shape or not np.isfinite(found[name]).all():
+                raise InputError(
+                    f"{path}: {name} has shape {found[name].shape}, needs finite numbers of "
+                    f"shape {shape}: train it again"
+                )
+        return cls(**found)
+
+    def scores(self, views: Array) -> Array:
+        """Logits (..., 8) of views (..., 3, INPUTS)."""
+        hidden = np.maximum(views @ self.weight_1.T + self.bias_1, 0.0)
+        hidden = np.maximum(hidden @ self.weight_2.T + self.bias_2, 0.0)
+        out = hidden @ self.weight_3.T + self.bias_3
+        return np.concatenate([out[..., :2].mean(axis=-2), out[..., 2], out[..., 3]], axis=-1)
+
+    def scores_of(self, windows: Array) -> Array:
+        """Logits (..., 8) of windows (..., WINDOW, 16)."""
+        return self.scores(by_wheel(windows))
+
+    def log_likelihoods(self, window: Array) -> Array:
+        """Log-likelihoods (8,), up to a constant, of a window (WINDOW, 16)."""
+        return np.asarray(self.scores_of(window) - self._log_prior)
+
+    @cached_property
+    def _log_prior(self) -> Array:
+        return np.asarray(np.log(self.prior))

@@ -1,0 +1,1 @@
+"""A fast planar model of many robots at once: drives to train on, by the thousand."""
