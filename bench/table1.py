@@ -20,6 +20,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from attrs import frozen
+from figures.simulated import PAPER_BANDS
 from numpy.typing import NDArray
 from tqdm import tqdm
 from wang2024 import record
@@ -43,8 +44,6 @@ TABLE: dict[str, tuple[int, ...]] = {
     "motor system fault 3": (1, 0, 0, 1, 0, 0, -1, 0, 0, 1),
 }
 DISPUTED = slice(4, 10)
-# The paper's band is 5 % alone; a floor of three times the noise of a tick's mean is added.
-BANDS: dict[str, object] = {"band.power": 0.25, "band.transient": 0.5, "band.speed": 0.3}
 
 
 @frozen
@@ -68,7 +67,7 @@ CASES = (
 
 def codes_of(bag: Path, case: Case) -> Codes:
     """Codes (n, 10) in the order of our frame, of the ticks in which the fault shows."""
-    pipeline = Pipeline(load_robot("reference"), DiagnosisSettings.of(BANDS, "bench"))
+    pipeline = Pipeline(load_robot("reference"), DiagnosisSettings.of(PAPER_BANDS, "bench"))
     found = []
     with open_recording(bag) as recording:
         for _, step in diagnose(recording, pipeline):

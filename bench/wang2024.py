@@ -20,13 +20,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
-from plants import every_value
 from tqdm import tqdm
 
 from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, TOTAL, ResidualFrame
+from tomr_fault_diag.training.drives import every_value
 from tomr_power_model.cli import run_main
 from tomr_power_model.messages.bag import bag_message
 from tomr_power_model.model.scores import accuracy, nrmse

@@ -14,7 +14,7 @@ from figures.harmonics import HIGHEST, Harmonics, harmonics
 from figures.page import MEASURED, MUTED, PHYSICAL, WANG2024, page, plain, titled
 from figures.result import Result
 from figures.simulated import PHYSICAL as PHYSICAL_MODEL
-from figures.simulated import ROBOT, driven, played, reference
+from figures.simulated import ROBOT, driven, plain_mission, played, reference
 from tomr_power_model.calibration.problem import modelled_power
 from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.wang2024 import Coefficients
@@ -78,19 +78,7 @@ def _every_heading() -> Mission:
     for heading in np.radians(HEADINGS):
         twist = (_SPEED * math.cos(heading), _SPEED * math.sin(heading), 0.0)
         phases.append(TwistPhase(twist, _HOLD))
-    return Mission(
-        name="every_heading",
-        description="",
-        robot=ROBOT,
-        command_rate=20.0,
-        repeat=1,
-        payload=0.0,
-        floor_friction=0.0,
-        stamp_jitter=0.0,
-        seed=0,
-        phases=tuple(phases),
-        faults=(),
-    )
+    return plain_mission("every_heading", phases)
 
 
 def _result(title: str, floors: Mapping[str, Curves], standing: float) -> Result:

@@ -21,7 +21,7 @@ from tqdm import tqdm
 
 from figures.page import DERIVED, INK, MUTED, PHYSICAL, WANG2024, page, plain, titled
 from figures.result import Result
-from figures.simulated import ROBOT, driven, played, reference
+from figures.simulated import driven, plain_mission, played, reference
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.physics.model import PhysicalModel, PowerModel, WheelMotion
@@ -164,22 +164,9 @@ def _driven(robot: Robot, positions: Sequence[Position]) -> Array:
 
 
 def _mission() -> Mission:
-    return Mission(
-        name="mass_center",
-        description="",
-        robot=ROBOT,
-        command_rate=20.0,
-        repeat=1,
-        payload=0.0,
-        floor_friction=0.0,
-        stamp_jitter=0.0,
-        seed=0,
-        phases=(
-            TwistPhase((0.0, _SPEED, 0.0), _COUNTED[0][1]),
-            CirclePhase(_SPEED, 2.0 * math.pi / _TURN, _COUNTED[1][1] - _COUNTED[0][1]),
-        ),
-        faults=(),
-    )
+    along = TwistPhase((0.0, _SPEED, 0.0), _COUNTED[0][1])
+    around = CirclePhase(_SPEED, 2.0 * math.pi / _TURN, _COUNTED[1][1] - _COUNTED[0][1])
+    return plain_mission("mass_center", (along, around))
 
 
 def _steady(make: Callable[[Robot], PowerModel], robot: Robot) -> tuple[float, float]:

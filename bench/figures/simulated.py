@@ -16,6 +16,7 @@ from tomr_power_model.messages.bag import bag_message
 from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.robot import Robot, load_robot
 from tomr_sim_bridge.missions import Mission, drive, start_mission
+from tomr_sim_bridge.missions.schema import CirclePhase, TwistPhase
 from tomr_sim_bridge.plant.samples import NANOSECONDS, build
 
 Array = NDArray[np.float64]
@@ -37,6 +38,23 @@ PAPER_BANDS: Mapping[str, object] = {
 COLUMNS = ("motor 1", "motor 2", "motor 3", "motors", "robot")
 _PATIENCE = 2.0  # s before a progress bar shows
 _START_NS = 1_700_000_000 * NANOSECONDS
+
+
+def plain_mission(name: str, phases: Sequence[TwistPhase | CirclePhase]) -> Mission:
+    """A drive of the robot as described, without load, faults or jitter."""
+    return Mission(
+        name=name,
+        description="",
+        robot=ROBOT,
+        command_rate=20.0,
+        repeat=1,
+        payload=0.0,
+        floor_friction=0.0,
+        stamp_jitter=0.0,
+        seed=0,
+        phases=tuple(phases),
+        faults=(),
+    )
 
 
 @frozen

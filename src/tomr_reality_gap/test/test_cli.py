@@ -4,16 +4,17 @@ import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
 
 import pytest
-from attrs import evolve
+from attrs import asdict, evolve
 
 from tomr_power_model.errors import InputError
 from tomr_reality_gap.cli import main
 from tomr_reality_gap.explanation import Explanation
+from tomr_reality_gap.request import Request
 
-Requests = list[SimpleNamespace]
+Requests = list[Request]
 Answer = Callable[[Explanation | InputError], Requests]
 
 
@@ -24,9 +25,7 @@ def answer(monkeypatch: pytest.MonkeyPatch) -> Answer:
     def stand_in(result: Explanation | InputError) -> Requests:
         asked: Requests = []
 
-        def explain(
-            request: SimpleNamespace, progress: Callable[[str, float], None]
-        ) -> Explanation:
+        def explain(request: Request, progress: Callable[[str, float], None]) -> Explanation:
             asked.append(request)
             for part in (0.0, 0.5, 1.0):
                 progress("fitting", part)
@@ -35,7 +34,7 @@ def answer(monkeypatch: pytest.MonkeyPatch) -> Answer:
             return result
 
         core = ModuleType("tomr_reality_gap.explain")
-        core.__dict__.update(Request=SimpleNamespace, explain=explain)
+        core.__dict__.update(explain=explain)
         monkeypatch.setitem(sys.modules, "tomr_reality_gap.explain", core)
         return asked
 
@@ -73,7 +72,7 @@ def test_explain_writes_the_three_files(
     arguments += ["--holdout", f"{bags}/tour2", "--sim", f"{bags}/simulated"]
     arguments += ["--tolerance", "0.01", "--tolerance", "robot.mass=0.05"]
     assert main([*arguments, "--out", str(out)]) == 0
-    assert vars(asked[0]) == {
+    assert asdict(asked[0]) == {
         "robot": "my.yaml",
         "real": (bags / "tour1", bags / "tour3"),
         "sim": bags / "simulated",

@@ -6,7 +6,8 @@ import pytest
 
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import load_robot
-from tomr_reality_gap.explain import Request, explain
+from tomr_reality_gap.explain import explain
+from tomr_reality_gap.request import Request
 
 BAGS = Path(__file__).parents[3] / "bags"
 SQUARE, CIRCLE = BAGS / "square", BAGS / "circle_encoder_lost"

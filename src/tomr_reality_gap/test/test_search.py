@@ -9,7 +9,7 @@ from tomr_power_model.robot import Robot, read_description
 from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.fit.linear import Gram, evidence
 from tomr_reality_gap.fit.noise import rows_of
-from tomr_reality_gap.fit.search import search
+from tomr_reality_gap.fit.search import Found, search
 from tomr_reality_gap.fit.study import Model, Study
 from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
 from tomr_reality_gap.hypotheses.knobs import Turned, turned
@@ -34,10 +34,11 @@ def _base(robot: Robot) -> Turned:
     return turned(dict(read_description("reference")), robot.wheel_names, "reference")
 
 
-def _searched(made: Forward, real: Robot):  # type: ignore[no-untyped-def]
-    """Record `real` with noise, and search with the description of the reference robot."""
+def searched(
+    made: Forward, value: np.ndarray, tried: tuple[str, ...] = TRIED
+) -> tuple[Study, Found]:
+    """Record values with noise, and search with the description of the reference robot."""
     random = np.random.default_rng(5)
-    value = made.predict([real])[0]
     channels = tuple(
         evolve(c, value=value[part] + NOISE[c.kind] * random.standard_normal(len(c.time)))
         for c, part in zip(made.channels, rows_of(made.channels), strict=True)
@@ -47,10 +48,14 @@ def _searched(made: Forward, real: Robot):  # type: ignore[no-untyped-def]
     scales = scales_of(made.robot, run["speed"], run["power"], run["copper"], 30.0)
     knobs = nuisances(base, wheels, 0.02)
     candidates = [
-        item for item in catalogue(base, wheels, scales, 0.02) if item.effect.startswith(TRIED)
+        item for item in catalogue(base, wheels, scales, 0.02) if item.effect.startswith(tried)
     ]
     study = Study((evolve(made, channels=channels),))
-    return search(study, Model(base, knobs, (0.0,) * len(knobs)), candidates)
+    return study, search(study, Model(base, knobs, (0.0,) * len(knobs)), candidates)
+
+
+def _found(made: Forward, real: Robot, tried: tuple[str, ...] = TRIED) -> Found:
+    return searched(made, made.predict([real])[0], tried)[1]
 
 
 def test_a_concealed_friction_is_named_with_its_wheel_and_size(
@@ -61,7 +66,7 @@ def test_a_concealed_friction_is_named_with_its_wheel_and_size(
     real = evolve(
         robot, mass=1.01 * robot.mass, physics={**robot.physics, "friction.asymmetric": concealed}
     )
-    found = _searched(forward, real).best
+    found = _found(forward, real).best
     assert [item.name for item in found.model.hypotheses] == [
         "friction.asymmetric at wheel_2_joint"
     ]
@@ -77,4 +82,22 @@ def test_deviations_within_the_tolerance_are_no_finding(forward: Forward) -> Non
         for motor, scale in zip(robot.motors, (1.015, 0.99, 0.985), strict=True)
     )
     real = evolve(robot, mass=0.985 * robot.mass, motors=motors)
-    assert not _searched(forward, real).best.model.hypotheses
+    assert not _found(forward, real).best.model.hypotheses
+
+
+def test_two_wrongs_that_hide_each_other_are_found_together(forward: Forward) -> None:  # noqa: F811
+    """Rollers that drag, behind a Coulomb friction that is stated too large."""
+    robot = forward.robot
+    coulomb = robot.effect("friction.coulomb")
+    assert coulomb is not None
+    physics = {
+        **robot.physics,
+        "friction.coulomb": ({"torque": 0.6 * coulomb["torque"]},) * 3,
+        "contact.roller_drag": ({"coefficient": 0.02, "slip": 0.0},) * 3,
+    }
+    tried = ("contact.roller_drag", "parameter.physics.friction.coulomb", "friction.quadratic")
+    best = _found(forward, evolve(robot, physics=physics), tried).best
+    assert best.model.names == {
+        "contact.roller_drag at all_wheels",
+        "parameter.physics.friction.coulomb.torque at all_wheels",
+    }

@@ -1,27 +1,12 @@
 """What the commands are given: recordings, a description and how far it is believed."""
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-
-from attrs import frozen
 
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import shipped_robots
-
-DEFAULT_TOLERANCE = 0.02
-
-
-@frozen
-class Inputs:
-    """One robot, its recordings, and how far its description may be off (relative)."""
-
-    robot: str
-    real: tuple[Path, ...]
-    sim: Path | None
-    holdout: tuple[Path, ...]
-    tolerance: float
-    tolerances: Mapping[str, float]
+from tomr_reality_gap.request import DEFAULT_TOLERANCE, Request
 
 
 def add_inputs(parser: argparse.ArgumentParser) -> None:
@@ -66,7 +51,7 @@ def add_quiet(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
 
 
-def inputs_of(options: argparse.Namespace) -> Inputs:
+def inputs_of(options: argparse.Namespace) -> Request:
     """The inputs. Raises InputError for what cannot be meant."""
     tolerance, tolerances = tolerances_of(options.tolerance)
     seen: dict[Path, str] = {}
@@ -79,7 +64,7 @@ def inputs_of(options: argparse.Namespace) -> Inputs:
         first = seen.setdefault(path.resolve(), option)
         if first != option:
             raise InputError(f"{option} {path}: it is given as {first}, too: give it once")
-    return Inputs(
+    return Request(
         robot=options.robot,
         real=tuple(dict.fromkeys(options.real)),
         sim=options.sim,

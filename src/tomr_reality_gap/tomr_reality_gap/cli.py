@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK, run_main
 from tomr_power_model.errors import InputError
-from tomr_reality_gap.arguments import Inputs, add_inputs, add_quiet, inputs_of
+from tomr_reality_gap.arguments import add_inputs, add_quiet, inputs_of
 from tomr_reality_gap.fleet.command import add_fleet
 from tomr_reality_gap.progress import Progress, progress_bar
+from tomr_reality_gap.request import Request
 
 if TYPE_CHECKING:  # --help does without what takes a second to import
     from tomr_reality_gap.explanation import Explanation
@@ -104,17 +105,9 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _explanation(inputs: Inputs, progress: Progress) -> "Explanation":
-    from tomr_reality_gap.explain import Request, explain
+def _explanation(request: Request, progress: Progress) -> "Explanation":
+    from tomr_reality_gap.explain import explain
 
-    request = Request(
-        robot=inputs.robot,
-        real=inputs.real,
-        sim=inputs.sim,
-        holdout=inputs.holdout,
-        tolerance=inputs.tolerance,
-        tolerances=inputs.tolerances,
-    )
     return explain(request, progress)
 
 

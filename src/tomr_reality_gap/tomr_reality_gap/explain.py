@@ -1,10 +1,10 @@
 """From recordings to an explanation: align, compare, name, model, show."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from attrs import evolve, field, frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.calibration.checks import refuse_little_motion
@@ -18,12 +18,13 @@ from tomr_reality_gap.alignment.steady import steadied
 from tomr_reality_gap.explanation import Explanation
 from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.fit.prune import second_thoughts
-from tomr_reality_gap.fit.search import Found, search
+from tomr_reality_gap.fit.search import search
 from tomr_reality_gap.fit.study import Model, Study
 from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
 from tomr_reality_gap.hypotheses.knobs import Turned, turned
 from tomr_reality_gap.hypotheses.scales import Scales, scales_of
 from tomr_reality_gap.mismatch.orders import ripple_orders
+from tomr_reality_gap.request import Request
 from tomr_reality_gap.verdict import Evidence, explanation_of
 
 Array = NDArray[np.float64]
@@ -31,18 +32,6 @@ Progress = Callable[[str, float], None]
 
 _WINDOW = 0.005  # s, over which power sensors average
 _SHORTEST = 10.0  # s
-
-
-@frozen
-class Request:
-    """What is to be explained."""
-
-    robot: Path | str  # robot.yaml, or the name of a shipped one
-    real: tuple[Path, ...]
-    sim: Path | None = None
-    holdout: tuple[Path, ...] = ()
-    tolerance: float = 0.02  # of all values, relative
-    tolerances: Mapping[str, float] = field(factory=dict)  # of single ones, by key
 
 
 @frozen
@@ -251,6 +240,3 @@ def _orders(study: Study, runs: list[dict[str, Array]]) -> tuple[float, ...]:
             speeds.append(np.interp(channel.time - 0.5 * channel.span, middle, own))
         found += ripple_orders(item.recorded, item.channels, residuals, speeds)
     return tuple(dict.fromkeys(found))
-
-
-__all__ = ["Explanation", "Found", "Request", "explain"]

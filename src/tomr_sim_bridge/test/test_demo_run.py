@@ -88,20 +88,19 @@ def test_processes_end_when_the_demo_is_killed(
 ) -> None:
     script = f"""
 import signal
-import time
 from pathlib import Path
 from tomr_sim_bridge.demo.processes import Children
 with Children(Path({str(tmp_path)!r})) as children:
     for name in "ab":
         children.start(name, {SLEEP!r})
-    while not all("up" in children.named(name).last_lines() for name in "ab"):
-        time.sleep(0.01)
     print("pids", *(children.named(name).popen.pid for name in "ab"), flush=True)
     signal.pause()
 """
     parent = spawn([sys.executable, "-c", script])
     output = parent.wait_for_output("pids")
     pids = [int(word) for word in output.partition("pids")[2].split()]
+    logs = [tmp_path / f"{name}.log" for name in "ab"]
+    wait_until(lambda: all("up" in log.read_text() for log in logs), "both processes to run")
     parent.signal(signal.SIGKILL)
     wait_until(lambda: not any(is_alive(pid) for pid in pids), "the end of the processes")
     assert len(pids) == 2

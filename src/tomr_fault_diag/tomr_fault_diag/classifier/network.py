@@ -1,6 +1,5 @@
 """The paper's network: ten inputs, thirty ReLU, six softmax outputs (Wang 2024, Fig. 11)."""
 
-from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Self
 
@@ -9,8 +8,8 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.states import STATES
+from tomr_fault_diag.classifier.stored import Stored
 from tomr_fault_diag.residuals.frame import RESIDUALS
-from tomr_power_model.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -21,6 +20,7 @@ _SHAPES = {
     "output_weight": (len(STATES), 30),
     "output_bias": (len(STATES),),
 }
+_STORED = Stored(SHIPPED, "a network", tuple(_SHAPES), lambda found: _SHAPES)
 
 
 @frozen
@@ -35,25 +35,7 @@ class Network:
     @classmethod
     def load(cls, path: Path | str | None = None) -> Self:
         """Weights of a file, or the shipped ones; raises InputError if they do not fit."""
-        if path:
-            return cls._read(Path(path))
-        with as_file(files("tomr_fault_diag").joinpath("weights").joinpath(SHIPPED)) as shipped:
-            return cls._read(shipped)
-
-    @classmethod
-    def _read(cls, path: Path) -> Self:
-        try:
-            with np.load(path) as stored:
-                weights = {name: np.asarray(stored[name], np.float64) for name in _SHAPES}
-        except (OSError, ValueError, KeyError, EOFError) as error:
-            raise InputError(f"{path}: no weights of a network ({error}): train it again") from None
-        for name, shape in _SHAPES.items():
-            if weights[name].shape != shape or not np.isfinite(weights[name]).all():
-                raise InputError(
-                    f"{path}: {name} has shape {weights[name].shape}, needs finite numbers of "
-                    f"shape {shape}: train it again"
-                )
-        return cls(**weights)
+        return cls(**_STORED.load(path))
 
     def probabilities(self, inputs: Array) -> Array:
         """Probabilities of the states (..., 6) from inputs (..., 10)."""

@@ -7,8 +7,8 @@ of wheel w lost, encoder of wheel w lost. The same network serves the three whee
 learned of one holds for all.
 """
 
+from collections.abc import Mapping
 from functools import cached_property
-from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Self
 
@@ -18,12 +18,32 @@ from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.belief import HYPOTHESES
 from tomr_fault_diag.classifier.features import INPUTS, by_wheel
-from tomr_power_model.errors import InputError
+from tomr_fault_diag.classifier.stored import Shapes, Stored
 
 Array = NDArray[np.float64]
 
 SHIPPED = "window.npz"
 _VIEWS = 4  # outputs of one view
+_NAMES = ("weight_1", "bias_1", "weight_2", "bias_2", "weight_3", "bias_3", "prior")
+
+
+def _shapes(found: Mapping[str, Array]) -> Shapes:
+    """Layers that fit onto each other."""
+    first, second = found["bias_1"].size, found["bias_2"].size
+    return {
+        "weight_1": (first, INPUTS), "bias_1": (first,), "weight_2": (second, first),
+        "bias_2": (second,), "weight_3": (_VIEWS, second), "bias_3": (_VIEWS,),
+        "prior": (HYPOTHESES,),
+    }  # fmt: skip
+
+
+_STORED = Stored(
+    SHIPPED,
+    "the window network",
+    _NAMES,
+    _shapes,
+    "train it again, or set classifier to the kind that they were trained for",
+)
 
 
 @frozen
@@ -41,35 +61,7 @@ class WindowNetwork:
     @classmethod
     def load(cls, path: Path | str | None = None) -> Self:
         """Weights of a file, or the shipped ones; raises InputError if they do not fit."""
-        if path:
-            return cls._read(Path(path))
-        with as_file(files("tomr_fault_diag").joinpath("weights").joinpath(SHIPPED)) as shipped:
-            return cls._read(shipped)
-
-    @classmethod
-    def _read(cls, path: Path) -> Self:
-        names = [field.name for field in cls.__attrs_attrs__]
-        try:
-            with np.load(path) as stored:
-                found = {name: np.asarray(stored[name], np.float64) for name in names}
-        except (OSError, ValueError, KeyError, EOFError) as error:
-            raise InputError(
-                f"{path}: no weights of the window network ({error}): train it again, or set "
-                "classifier to the kind that they were trained for"
-            ) from None
-        first, second = found["bias_1"].size, found["bias_2"].size
-        shapes = {
-            "weight_1": (first, INPUTS), "bias_1": (first,), "weight_2": (second, first),
-            "bias_2": (second,), "weight_3": (_VIEWS, second), "bias_3": (_VIEWS,),
-            "prior": (HYPOTHESES,),
-        }  # fmt: skip
-        for name, shape in shapes.items():
-            if found[name].shape != shape or not np.isfinite(found[name]).all():
-                raise InputError(
-                    f"{path}: {name} has shape {found[name].shape}, needs finite numbers of "
-                    f"shape {shape}: train it again"
-                )
-        return cls(**found)
+        return cls(**_STORED.load(path))
 
     def scores(self, views: Array) -> Array:
         """Logits (..., 8) of views (..., 3, INPUTS)."""

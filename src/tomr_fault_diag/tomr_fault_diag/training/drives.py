@@ -5,6 +5,7 @@ what befalls it.
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from attrs import evolve, frozen
@@ -143,11 +144,8 @@ def _another_robot(reference: Robot, random: np.random.Generator) -> Robot:
     )
 
 
-def deviating(robot: Robot, random: np.random.Generator) -> Robot:
-    """A real robot: every value a little off its description, wheel by wheel."""
-
-    def off(value: float) -> float:
-        return float(value * random.uniform(1.0 - DEVIATION, 1.0 + DEVIATION))
+def every_value(robot: Robot, off: Callable[[float], float]) -> Robot:
+    """A robot with every value of its body, motors and effects passed through `off`."""
 
     def motor(nominal: Motor) -> Motor:
         return evolve(
@@ -172,6 +170,13 @@ def deviating(robot: Robot, random: np.random.Generator) -> Robot:
         wheel_inertia=off(robot.wheel_inertia),
         motors=(first, second, third),
         physics=physics,
+    )
+
+
+def deviating(robot: Robot, random: np.random.Generator) -> Robot:
+    """A real robot: every value a little off its description, wheel by wheel."""
+    return every_value(
+        robot, lambda value: float(value * random.uniform(1.0 - DEVIATION, 1.0 + DEVIATION))
     )
 
 

@@ -263,19 +263,27 @@ def refine(
     """Gauss-Newton on each model; nuisances keep the derivatives of `columns`."""
     if not models:
         return []
-    fixed = columns.matrix[:, : columns.instruments.stop] * noise.weight[:, None]
-    timing = columns.instruments.stop - columns.instruments.start
-    states = [(model, np.zeros(timing)) for model in models]
+    still = np.zeros(columns.instruments.stop - columns.instruments.start)
+    states = [(model, still) for model in models]
     for _ in range(_STEPS):
-        points = _points(study, [model for model, _ in states], tick)
-        states = [
-            _step(study, model, turned, point, columns, fixed, noise)
-            for (model, turned), point in zip(states, points, strict=True)
-        ]
+        places = _places(study, states, columns, noise, tick)
+        states = [_step(at, model, columns) for at, (model, _) in zip(places, states, strict=True)]
+    places = _places(study, states, columns, noise, tick)
+    return [_assess(at, *state) for at, state in zip(places, states, strict=True)]
+
+
+def _places(
+    study: Study,
+    states: Sequence[tuple[Model, Array]],
+    columns: Columns,
+    noise: Noise,
+    tick: Tick,
+) -> "list[_Equations]":
+    """The equations of several models, simulated together."""
     points = _points(study, [model for model, _ in states], tick)
     return [
-        _assess(study, model, turned, point, columns, fixed, noise)
-        for (model, turned), point in zip(states, points, strict=True)
+        _equations(study, model, instruments, point, columns, noise)
+        for (model, instruments), point in zip(states, points, strict=True)
     ]
 
 
@@ -306,29 +314,39 @@ def _points(study: Study, models: Sequence[Model], tick: Tick) -> list[tuple[Arr
     return found
 
 
-def _system(model: Model, own: Array, fixed: Array, noise: Noise) -> Array:
-    return np.concatenate([fixed, own * noise.weight[:, None]], axis=1)
+@frozen
+class _Equations:
+    """Normal equations of a model at one point, beliefs included."""
+
+    turns: Array  # of everything [spreads]
+    value: Array  # simulated, instruments included
+    residual: Array  # whitened
+    slope: Array  # of the log posterior by the turns
+    factor: tuple[Array, bool]  # Cholesky factor of I + G
 
 
-def _step(
+def _equations(
     study: Study,
     model: Model,
-    timing: Array,
+    instruments: Array,
     point: tuple[Array, Array],
     columns: Columns,
-    fixed: Array,
     noise: Noise,
-) -> tuple[Model, Array]:
+) -> _Equations:
     value, own = point
-    turns = _turns(model, timing)
-    matrix = _system(model, own, fixed, noise)
-    shifted = value + columns.matrix[:, columns.instruments] @ timing
+    turns = _turns(model, instruments)
+    fixed = columns.matrix[:, : columns.instruments.stop]
+    matrix = np.concatenate([fixed, own], axis=1) * noise.weight[:, None]
+    shifted = value + columns.matrix[:, columns.instruments] @ instruments
     residual = (study.value - shifted) * noise.weight
-    gram = matrix.T @ matrix + np.eye(matrix.shape[1])
-    change = cho_solve(cho_factor(gram, lower=True), matrix.T @ residual - turns)
-    change = np.clip(change, -_LARGEST_STEP, _LARGEST_STEP)
-    turns = turns + change
-    return _moved(model, turns, columns)
+    factor = cho_factor(matrix.T @ matrix + np.eye(matrix.shape[1]), lower=True)
+    return _Equations(turns, shifted, residual, matrix.T @ residual - turns, factor)
+
+
+def _step(at: _Equations, model: Model, columns: Columns) -> tuple[Model, Array]:
+    """One step of Gauss-Newton: the model, and the turns of the instruments."""
+    change = np.clip(cho_solve(at.factor, at.slope), -_LARGEST_STEP, _LARGEST_STEP)
+    return _moved(model, at.turns + change, columns)
 
 
 def _moved(model: Model, turns: Array, columns: Columns) -> tuple[Model, Array]:
@@ -339,27 +357,13 @@ def _moved(model: Model, turns: Array, columns: Columns) -> tuple[Model, Array]:
     return model.moved(nuisance, own), turns[first:last]
 
 
-def _assess(
-    study: Study,
-    model: Model,
-    timing: Array,
-    point: tuple[Array, Array],
-    columns: Columns,
-    fixed: Array,
-    noise: Noise,
-) -> Fitted:
-    value, own = point
-    shifted = value + columns.matrix[:, columns.instruments] @ timing
-    residual = (study.value - shifted) * noise.weight
-    matrix = _system(model, own, fixed, noise)
-    factor = cho_factor(matrix.T @ matrix + np.eye(matrix.shape[1]), lower=True)
-    turns = _turns(model, timing)
-    chi2 = float(residual @ residual)
+def _assess(at: _Equations, model: Model, instruments: Array) -> Fitted:
+    chi2 = float(at.residual @ at.residual)
     evidence = (
         -0.5 * chi2
-        - 0.5 * float(turns @ turns)
-        - float(np.log(np.diag(factor[0])).sum())
+        - 0.5 * float(at.turns @ at.turns)
+        - float(np.log(np.diag(at.factor[0])).sum())
         + sum(item.weight for item in model.hypotheses)
     )
-    covariance = cho_solve(factor, np.eye(len(turns)))
-    return Fitted(model, evidence, chi2, timing, covariance, shifted)
+    covariance = cho_solve(at.factor, np.eye(len(at.turns)))
+    return Fitted(model, evidence, chi2, instruments, covariance, at.value)

@@ -7,7 +7,7 @@ from pathlib import Path
 from attrs import evolve, frozen
 
 from tomr_power_model.errors import InputError
-from tomr_reality_gap.arguments import Inputs
+from tomr_reality_gap.request import Request
 
 ROBOT, REAL, SIM, HOLDOUT = "robot.yaml", "real", "sim", "real_holdout"
 
@@ -17,7 +17,7 @@ class Case:
     """One robot with its recordings; the name is that of its folder of results."""
 
     name: str
-    inputs: Inputs
+    inputs: Request
 
 
 @frozen
@@ -73,7 +73,7 @@ def _case(folder: Path, believed: Believed) -> Case:
     if not own.is_file() and believed.robot is None:
         raise InputError(f"{folder}: no {ROBOT} in it: add it, or give --robot for all")
     sim = folder / SIM
-    inputs = Inputs(
+    inputs = Request(
         robot=str(own) if own.is_file() else str(believed.robot),
         real=_recordings(folder),
         sim=sim if sim.exists() else None,

@@ -46,21 +46,13 @@ class Outcome:
 def explain_case(case: Case) -> Outcome:
     """Explain one case; bad input becomes an outcome, so that the others go on."""
     # What a worker needs and the command does not.
-    from tomr_reality_gap.explain import Request, explain
+    from tomr_reality_gap.explain import explain
     from tomr_reality_gap.report.write import report_files
 
     start = time.monotonic()
     inputs = case.inputs
     try:
-        request = Request(
-            robot=inputs.robot,
-            real=inputs.real,
-            sim=inputs.sim,
-            holdout=inputs.holdout,
-            tolerance=inputs.tolerance,
-            tolerances=inputs.tolerances,
-        )
-        explanation = explain(request, lambda stage, part: None)
+        explanation = explain(inputs, lambda stage, part: None)
         texts = report_files(explanation, f"{case.name}: {Path(inputs.robot).name}")
     except InputError as error:
         return Outcome(case.name, BAD_INPUT, str(error), time.monotonic() - start)

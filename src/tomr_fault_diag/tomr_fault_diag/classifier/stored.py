@@ -1,0 +1,48 @@
+"""Weights as arrays by name, from a file or from those that are shipped."""
+
+from collections.abc import Callable, Mapping
+from importlib.resources import as_file, files
+from pathlib import Path
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_power_model.errors import InputError
+
+Array = NDArray[np.float64]
+Shapes = Mapping[str, tuple[int, ...]]
+
+
+@frozen
+class Stored:
+    """How the weights of one kind of network are stored."""
+
+    shipped: str  # file name
+    network: str  # in words
+    names: tuple[str, ...]
+    shapes: Callable[[Mapping[str, Array]], Shapes]  # that the arrays must have together
+    remedy: str = "train it again"
+
+    def load(self, path: Path | str | None) -> dict[str, Array]:
+        """Arrays of a file, or the shipped ones; raises InputError if they do not fit."""
+        if path:
+            return self._read(Path(path))
+        with as_file(files("tomr_fault_diag").joinpath("weights").joinpath(self.shipped)) as file:
+            return self._read(file)
+
+    def _read(self, path: Path) -> dict[str, Array]:
+        try:
+            with np.load(path) as stored:
+                found = {name: np.asarray(stored[name], np.float64) for name in self.names}
+        except (OSError, ValueError, KeyError, EOFError) as error:
+            raise InputError(
+                f"{path}: no weights of {self.network} ({error}): {self.remedy}"
+            ) from None
+        for name, shape in self.shapes(found).items():
+            if found[name].shape != shape or not np.isfinite(found[name]).all():
+                raise InputError(
+                    f"{path}: {name} has shape {found[name].shape}, needs finite numbers of "
+                    f"shape {shape}: train it again"
+                )
+        return found
