@@ -9,6 +9,8 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.model.even_stamps import EvenStamps
+
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 UNKNOWN: Triple = (float("nan"), float("nan"), float("nan"))
@@ -35,7 +37,8 @@ class EncoderWindow:
     """Keeps the samples of the last moments and fits a motion of constant acceleration to them.
 
     Least squares over the samples in (t - span, t]: positions by p + v s + a s^2 / 2, or, where a
-    robot gives no positions, velocities by v + a s; evaluated at t - period / 2.
+    robot gives no positions, velocities by v + a s; evaluated at t - period / 2. Stamps that only
+    jitter are put on their grid first.
     """
 
     def __init__(self, span_ns: int, period_ns: int, stale_ns: int) -> None:
@@ -43,22 +46,24 @@ class EncoderWindow:
         self._period = period_ns
         self._stale = stale_ns
         self._samples: deque[EncoderSample] = deque()
+        self._stamps = EvenStamps()
 
     def clear(self) -> None:
         """Forget all samples."""
         self._samples.clear()
+        self._stamps = EvenStamps()
 
     def add(self, sample: EncoderSample) -> None:
         """Take a sample newer than those before."""
         self._samples.append(sample)
+        self._stamps.add(sample.stamp_ns, sample.position)
 
     def at(self, tick_ns: int) -> WheelEstimate:
         """Estimate for the window that ends at a tick; NaN if its samples are missing or stale."""
         samples = self._until(tick_ns)
         if len(samples) < 2:
             return WheelEstimate(np.full(3, np.nan), np.full(3, np.nan))
-        middle = tick_ns - self._period // 2
-        times = tuple(sample.stamp_ns - middle for sample in samples)
+        times = self._times(samples, tick_ns - self._period // 2)
         positions = np.array([sample.position for sample in samples])
         if len(samples) > 2 and not np.isnan(positions).any():
             return _from_positions(times, positions)
@@ -72,7 +77,7 @@ class EncoderWindow:
         for wheel in range(3):
             told = [s for s in samples if not np.isnan(s.position[wheel])]
             if len(told) > 2:
-                times = tuple(sample.stamp_ns - middle for sample in told)
+                times = self._times(told, middle)
                 turned = np.array([s.position[wheel] for s in told]) - told[0].position[wheel]
                 found[wheel] = told[0].position[wheel] + _weights(times, 2)[0] @ turned
         return found
@@ -92,6 +97,11 @@ class EncoderWindow:
             return []
         window.reverse()
         return window
+
+    def _times(self, samples: Sequence[EncoderSample], middle: int) -> tuple[int, ...]:
+        """When samples were taken, against the middle of the window [ns]."""
+        taken = self._stamps.times([sample.stamp_ns for sample in samples])
+        return tuple(time - middle for time in taken)
 
     @staticmethod
     def _mixed(
