@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_fault_diag.classifier.belief import Belief, six_of
+from tomr_fault_diag.classifier.belief import CONTROLS, Belief, six_of
 from tomr_fault_diag.classifier.features import (
     BLIND,
     INPUTS,
@@ -18,8 +18,9 @@ from tomr_fault_diag.classifier.features import (
     channels,
     channels_of,
 )
-from tomr_fault_diag.classifier.judges import make_judge
+from tomr_fault_diag.classifier.judges import WindowJudge, make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message
+from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NOT_OBSERVABLE, STATES
@@ -130,6 +131,32 @@ def test_silence_leaves_a_belief_as_it_is() -> None:
     for _ in range(200):  # ten seconds in which nothing can be told apart
         belief.update(np.zeros(8))
     assert belief.shares[6] > 0.97
+
+
+class Saying:
+    """A network that says the same of every window."""
+
+    def __init__(self) -> None:
+        self.likelihoods = np.zeros(8)
+
+    def log_likelihoods(self, window: np.ndarray) -> np.ndarray:
+        return self.likelihoods.copy()
+
+
+@pytest.mark.parametrize(("idle", "state"), [((), 0), ((0,), 0), ((2,), CONTROL)])
+def test_an_idle_wheel_does_not_refute_its_fault(idle: tuple[int, ...], state: int) -> None:
+    """The signal of wheel 3 is lost; then five seconds that look normal, wheel 3 idle or not."""
+    network = Saying()
+    judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]
+    network.likelihoods[:] = -30.0
+    network.likelihoods[CONTROLS.start + 2] = 0.0
+    for tick in range(20):
+        judge.judge(frame(tick), 50 * MS, Unseen())
+    network.likelihoods[:] = -3.0
+    network.likelihoods[0] = 0.0
+    for tick in range(100):
+        opinion = judge.judge(frame(20 + tick), 50 * MS, Unseen(idle))
+    assert int(np.argmax(opinion.probabilities)) == state
 
 
 def test_a_lost_encoder_is_named_within_half_a_second() -> None:

@@ -139,6 +139,18 @@ def test_windings_heat_up(make_robot: MakeRobot) -> None:
     assert resistance == pytest.approx(0.8 / (1.0 - 0.8 * 0.00393 * 10.0 * 4.0), rel=1e-3)
 
 
+def test_windings_that_start_warm_cool_down_at_rest(make_robot: MakeRobot) -> None:
+    heating = "electrical.winding_heating"
+    values = {"thermal_resistance": 10.0, "time_constant": 2.0, "initial": 50.0}
+    robot = make_robot(named(heating, **values))
+    effect = next(effect for effect in make_effects(robot) if effect.effect_id == heating)
+    drivers = DriverPower(0.005, np.zeros(3), np.zeros(3), np.zeros(3), np.full(3, 0.8))
+    for _ in range(400):  # 2 s: one time constant
+        effect.bill(drivers)
+    expected = 0.8 * (1.0 + 0.00393 * 50.0 * math.exp(-1.0))
+    assert drivers.resistance == pytest.approx(np.full(3, expected), rel=1e-4)
+
+
 def test_supply_sags_under_load(make_robot: MakeRobot, drive: Callable) -> None:
     robot = make_robot(named("electrical.supply_sag", resistance=0.5), ideal=True)
     run = drive(Simulation(robot), 0.5)

@@ -11,14 +11,14 @@ COPPER_TEMPERATURE_COEFFICIENT = 0.00393  # 1/K
 
 @plant_effect("electrical.winding_heating")
 class WindingHeating(PlantEffect):
-    """Winding resistance grows with a temperature rise that copper loss feeds [K]."""
+    """Winding resistance grows with a temperature rise [K] that copper loss feeds."""
 
     def __init__(self, robot: Robot) -> None:
         super().__init__(robot)
         self._thermal_resistance = self.values("thermal_resistance")
         self._time_constant = self.values("time_constant", absent=1.0)
         self._cold = np.array([motor.resistance for motor in robot.motors])
-        self._rise = np.zeros_like(self._cold)
+        self._rise = self.values("initial")
 
     def bill(self, drivers: DriverPower) -> None:
         copper = drivers.current**2 * drivers.resistance
