@@ -12,12 +12,11 @@ from tqdm import tqdm
 
 from tomr_power_model.calibration.calibrate import (
     Result,
-    Skips,
     Timing,
     align,
     calibrate,
-    names_of,
     read_all,
+    skips_of,
 )
 from tomr_power_model.calibration.checks import refuse_faults, refuse_little_motion
 from tomr_power_model.calibration.fitted import fitted_text
@@ -107,23 +106,6 @@ def _numbers(given: Sequence[str], option: str) -> dict[str, float]:
     return found
 
 
-def _skips(given: Sequence[str], bags: Sequence[Path]) -> Skips:
-    """NAME=FROM:TO options."""
-    found: dict[str, list[tuple[float, float]]] = {}
-    names = names_of(bags)
-    for text in given:
-        name, _, interval = text.rpartition("=")
-        start, _, end = interval.partition(":")
-        try:
-            limits = float(start), float(end)
-        except ValueError:
-            raise InputError(f"--skip {text}: give BAG=FROM:TO in seconds") from None
-        if name not in names:
-            raise InputError(f"--skip {text}: no recording {name}: {', '.join(names)} are given")
-        found.setdefault(name, []).append(limits)
-    return found
-
-
 @contextmanager
 def _bar(title: str, total: int | None, unit: str) -> Iterator[Callable[[], None]]:
     with tqdm(total=total, desc=title, unit=unit, disable=None, leave=False, delay=1.0) as bar:
@@ -175,7 +157,7 @@ def _calibrate(arguments: Sequence[str] | None) -> int:
 def _recorded(options: argparse.Namespace, robot: Robot) -> tuple[Recorded, ...]:
     """The recordings, those to fit before those held out, all found to be healthy."""
     bags = [*options.bags, *options.holdout]
-    skips = _skips(options.skip, bags)
+    skips = skips_of(options.skip, bags)
     with _bar("reading", len(bags), "bag") as tick:
         recorded = read_all(bags, robot, options.namespace, skips, tick)
     refuse_little_motion(recorded[: len(options.bags)], robot)

@@ -8,6 +8,7 @@ from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
+from tomr_reality_gap.alignment.commands import shift_between
 from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.alignment.steady import steadied, steady
 
@@ -108,3 +109,13 @@ def test_jittered_recordings_are_told_from_steady_ones() -> None:
     even, changed = steadied(evolve(recorded, encoder_time=recorded.encoder_time + jitter))
     assert changed
     assert np.abs(even.encoder_time - recorded.encoder_time).max() < 1e-4
+
+
+def test_the_shift_between_recordings_of_the_same_commands(forward: Forward) -> None:
+    later = evolve(forward.recorded, command_time=forward.recorded.command_time + 0.7)
+    assert shift_between(forward.recorded, later) == pytest.approx(0.7, abs=1e-6)
+
+
+def test_other_commands_are_no_simulation_of_a_recording(forward: Forward) -> None:
+    other = evolve(forward.recorded, command=forward.recorded.command[::-1])
+    assert shift_between(forward.recorded, other) is None

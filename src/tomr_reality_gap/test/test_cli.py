@@ -71,6 +71,7 @@ def test_explain_writes_the_three_files(
     arguments = ["explain", "--robot", "my.yaml", "--real", f"{bags}/tour1", f"{bags}/tour3"]
     arguments += ["--holdout", f"{bags}/tour2", "--sim", f"{bags}/simulated"]
     arguments += ["--tolerance", "0.01", "--tolerance", "robot.mass=0.05"]
+    arguments += ["--skip", "tour2=8:14.5"]
     assert main([*arguments, "--out", str(out)]) == 0
     assert asdict(asked[0]) == {
         "robot": "my.yaml",
@@ -79,6 +80,7 @@ def test_explain_writes_the_three_files(
         "holdout": (bags / "tour2",),
         "tolerance": 0.01,
         "tolerances": {"robot.mass": 0.05},
+        "skips": {"tour2": [(8.0, 14.5)]},
     }
     assert {path.name for path in out.iterdir()} == {
         "report.json",
@@ -158,6 +160,8 @@ def test_bad_recording_is_one_line_and_exit_code_2(
         (["--real", "tour1", "--tolerance", "-0.1"], "a share from 0"),
         (["--real", "tour1", "--tolerance", "robot.mass=2"], "a share from 0"),
         (["--real", "tour1", "--tolerance", "0.1", "--tolerance", "0.2"], "given twice"),
+        (["--real", "tour1", "--skip", "tour9=1:2"], "no recording tour9: tour1 are given"),
+        (["--real", "tour1", "--skip", "tour1=late"], "give BAG=FROM:TO in seconds"),
     ],
 )
 def test_what_cannot_be_meant_is_one_line_and_exit_code_2(

@@ -31,6 +31,7 @@ def test_another_robots_recording_is_refused(tmp_path: Path) -> None:
         explain(Request(other, (SQUARE,)))
 
 
-def test_a_robot_that_tells_currents_only_is_refused() -> None:
-    with pytest.raises(InputError, match="motor_current"):
+def test_wheels_that_stand_elsewhere_belong_to_another_robot() -> None:
+    """The wheels have the names of the description, and answer to other headings."""
+    with pytest.raises(InputError, match=r"this robot\.yaml belongs to another robot"):
         explain(Request("robotino_v2", (SQUARE,)))

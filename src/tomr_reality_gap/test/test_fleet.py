@@ -110,6 +110,15 @@ def test_overview_begins_with_what_needs_to_be_seen(results: list[Outcome]) -> N
     assert "friction.stribeck 2 a , b" in page.rows[-1]
 
 
+def test_effects_are_told_by_how_many_robots_have_them(results: list[Outcome]) -> None:
+    """One has a payload besides, which comes first by its name; the friction does by its number."""
+    (found,) = results[2].findings
+    results[2] = evolve(results[2], findings=(evolve(found, effect="body.payload_mass"), found))
+    rows = Links(overview_page(results)).rows
+    assert [row.split()[-3:] for row in rows[-1:]] == [["body.payload_mass", "1", "a"]]
+    assert "friction.stribeck 2 a , b" in rows[-2]
+
+
 def test_fleet_writes_reports_and_overview_and_tells_of_bad_input(
     cases: Path,
     results: list[Outcome],
@@ -131,6 +140,8 @@ def test_fleet_writes_reports_and_overview_and_tells_of_bad_input(
     assert {path.name for path in (out / "c").iterdir()} == {"report.json", "report.html"}
     overview = json.loads((out / "overview.json").read_text())
     assert overview["a"]["holdout"] == {"nrmse_before": 0.9, "nrmse_after": 0.1}
+    assert overview["a"]["unexplained_share"] == 0.06
+    assert overview["a"]["findings"][0]["where"] == ["wheel_2_joint"]
     assert overview["d"]["verdict"] == "bad input"
     said = capsys.readouterr()
     assert said.out.startswith("5 cases: 1 failed, 1 bad input, 2 mismatch, 1 match\n")

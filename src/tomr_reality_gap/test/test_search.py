@@ -9,11 +9,12 @@ from tomr_power_model.robot import Robot, read_description
 from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.fit.linear import Gram, evidence
 from tomr_reality_gap.fit.noise import rows_of
+from tomr_reality_gap.fit.probed import probed
 from tomr_reality_gap.fit.search import Found, search
 from tomr_reality_gap.fit.study import Model, Study
 from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
 from tomr_reality_gap.hypotheses.knobs import Turned, turned
-from tomr_reality_gap.hypotheses.scales import scales_of
+from tomr_reality_gap.hypotheses.scales import grips_of, scales_of
 
 from .test_alignment import forward  # noqa: F401 -- the fixture
 
@@ -46,12 +47,14 @@ def searched(
     base, wheels = _base(made.robot), made.robot.wheel_names
     run = made.run(base.robot)
     scales = scales_of(made.robot, run["speed"], run["power"], run["copper"], 30.0)
+    scales = evolve(scales, grips=grips_of(made.robot, run["speed"], made.timeline.period))
     knobs = nuisances(base, wheels, 0.02)
     candidates = [
         item for item in catalogue(base, wheels, scales, 0.02) if item.effect.startswith(tried)
     ]
     study = Study((evolve(made, channels=channels),))
-    return study, search(study, Model(base, knobs, (0.0,) * len(knobs)), candidates)
+    nameless = probed(study, base.robot, scales.torque)
+    return study, search(study, Model(base, knobs, (0.0,) * len(knobs)), candidates, nameless)
 
 
 def _found(made: Forward, real: Robot, tried: tuple[str, ...] = TRIED) -> Found:
@@ -101,3 +104,15 @@ def test_two_wrongs_that_hide_each_other_are_found_together(forward: Forward) ->
         "contact.roller_drag at all_wheels",
         "parameter.physics.friction.coulomb.torque at all_wheels",
     }
+
+
+def test_a_wheel_that_slides_is_named_with_its_grip(forward: Forward) -> None:  # noqa: F811
+    """Far from where nothing slides: no derivative there tells of it."""
+    robot = forward.robot
+    slips = (None, {"friction": 0.2}, None)
+    real = evolve(robot, physics={**robot.physics, "contact.slip": slips})
+    tried = ("contact.slip", "friction.viscous")
+    best = _found(forward, real, tried).best
+    assert [item.name for item in best.model.hypotheses] == ["contact.slip at wheel_2_joint"]
+    knob, turn = best.model.own[0], best.model.turns[0][0]
+    assert best.model.hypotheses[0].start[knob.keys[0]] + turn == pytest.approx(0.2, abs=0.004)

@@ -4,6 +4,8 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from attrs import evolve
+
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import shipped_robots
 from tomr_reality_gap.request import DEFAULT_TOLERANCE, Request
@@ -31,6 +33,13 @@ def add_inputs(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="BAG",
         help="real recordings that are scored only",
+    )
+    add(
+        "--skip",
+        action="append",
+        default=[],
+        metavar="BAG=FROM:TO",
+        help="leave out what was measured then [s]; repeatable",
     )
     add_tolerance(parser)
 
@@ -64,7 +73,7 @@ def inputs_of(options: argparse.Namespace) -> Request:
         first = seen.setdefault(path.resolve(), option)
         if first != option:
             raise InputError(f"{option} {path}: it is given as {first}, too: give it once")
-    return Request(
+    request = Request(
         robot=options.robot,
         real=tuple(dict.fromkeys(options.real)),
         sim=options.sim,
@@ -72,6 +81,12 @@ def inputs_of(options: argparse.Namespace) -> Request:
         tolerance=tolerance,
         tolerances=tolerances,
     )
+    if not options.skip:
+        return request
+    # What fits takes a second to import: --help does without.
+    from tomr_power_model.calibration.calibrate import skips_of
+
+    return evolve(request, skips=skips_of(options.skip, request.recordings))
 
 
 def tolerances_of(given: Sequence[str]) -> tuple[float, dict[str, float]]:

@@ -44,12 +44,16 @@ class Rival:
 
 @frozen
 class Score:
-    """Errors on held-out data; NRMSE as in the contract."""
+    """Errors on held-out data; NRMSE as in the contract.
+
+    Of power, or of current where a robot tells no more: `quantity` says which, with its unit.
+    """
 
     nrmse_before: float
     nrmse_after: float
     accuracy_before: float  # 1 - sum|P - P_model| / sum|P|
     accuracy_after: float
+    quantity: str = "power [W]"
 
 
 @frozen

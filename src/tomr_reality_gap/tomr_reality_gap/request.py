@@ -1,6 +1,6 @@
 """What is to be explained."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from attrs import field, frozen
@@ -18,3 +18,9 @@ class Request:
     holdout: tuple[Path, ...] = ()
     tolerance: float = DEFAULT_TOLERANCE  # of all values
     tolerances: Mapping[str, float] = field(factory=dict)  # of single ones, by key
+    skips: Mapping[str, Sequence[tuple[float, float]]] = field(factory=dict)  # s, by recording
+
+    @property
+    def recordings(self) -> tuple[Path, ...]:
+        """All of them."""
+        return (*self.real, *self.holdout, *((self.sim,) if self.sim else ()))

@@ -4,14 +4,16 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve
 from numpy.typing import NDArray
 
 from tomr_power_model.calibration.beliefs import drive_for
 from tomr_power_model.calibration.fitted import fitted_text
-from tomr_power_model.robot import Robot
+from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.evidence import Evidence, smallest
 from tomr_reality_gap.explanation import (
+    Comparison,
     Estimate,
     Explanation,
     Finding,
@@ -19,14 +21,19 @@ from tomr_reality_gap.explanation import (
     Rival,
     Score,
 )
-from tomr_reality_gap.fit.leftover import Leftover, leftovers, names, still_needed
-from tomr_reality_gap.fit.linear import Gram, solve
+from tomr_reality_gap.fit.leftover import (
+    Leftover,
+    leftovers,
+    names,
+    still_needed,
+    without_needless,
+)
 from tomr_reality_gap.fit.noise import rows_of
-from tomr_reality_gap.fit.search import Fitted, Found, finding_cost
-from tomr_reality_gap.fit.study import Columns, Model, Study, columns_at
-from tomr_reality_gap.hypotheses.knobs import NEUTRAL, Hypothesis, Knob, Turned
-from tomr_reality_gap.hypotheses.scales import Scales
-from tomr_reality_gap.mismatch.compare import comparison, score_of
+from tomr_reality_gap.fit.refine import Fitted
+from tomr_reality_gap.fit.search import finding_cost
+from tomr_reality_gap.fit.study import Model, columns_at
+from tomr_reality_gap.hypotheses.knobs import NEUTRAL, Hypothesis, bounds_of
+from tomr_reality_gap.mismatch.compare import comparison, score_of, simulated
 from tomr_reality_gap.mismatch.locate import located, maps_of, variables_at
 from tomr_reality_gap.suggest import suggested
 
@@ -36,26 +43,13 @@ _RIVAL = 5.0  # log odds within which data do not tell two explanations apart
 _UNKNOWN_COST = 60.0  # log evidence that an effect without a name must bring
 _UNKNOWN_SHARE = 0.12  # of what all named findings bring: the simulator is not exact either
 _WIDE = 1.96
-_INEXACT = 0.01  # of a value
+_INEXACT = 0.02  # of a value
 _UNSURE = 0.03  # of the spread of power: error of the simulator itself
 _MUCH = 0.3  # of the mismatch left: what was named is not the whole story
+_GROSS = 10.0  # times the noise: no match, even if nothing is named; slow noise reaches 1
 _DOUBTED = 0.45  # confidence of a finding that leaves so much
 _TEMPER = 3.0  # odds are trusted to their third root: the noise model is not exact
 _SURE = 0.97
-_LISTED = 12  # smallest sizes that are told
-
-
-@frozen
-class Evidence:
-    """All that a verdict rests on."""
-
-    study: Study
-    found: Found
-    base: Turned
-    robot: Robot  # as described
-    source: str  # robot.yaml
-    scales: Scales
-    candidates: tuple[Hypothesis, ...]
 
 
 def explanation_of(
@@ -63,64 +57,103 @@ def explanation_of(
 ) -> Explanation:
     """The whole explanation."""
     study, found = evidence.study, evidence.found
-    best = found.best
-    columns = columns_at(study, best.model, ())
-    explained = best.model.described.robot
-    left = leftovers(study, best, columns, found, explained, evidence.scales.torque)
-    unknown = _unknown(best, found, left)
-    needed = [True] * len(best.model.hypotheses)
+    columns = columns_at(study, found.best.model, ())
+    left = leftovers(study, found.best, columns, found, evidence.nameless)
+    unknown = _unknown(evidence, left)
+    needed = [True] * len(found.best.model.hypotheses)
     if unknown is not None:
-        needed = still_needed(study, best, columns, found, unknown)
-    model = best.model
-    for number in reversed([place for place, wanted in enumerate(needed) if not wanted]):
-        model = model.without(number)
-    explained = model.described.robot
-    comparisons = [
-        comparison(item, evidence.base.robot, explained, False) for item in study.forwards
-    ] + [comparison(item, evidence.base.robot, explained, True) for item in held]
-    score = score_of([item for item in comparisons if item.held_out])
-    share = _shares(evidence)
-    variables = _variables(evidence)
-    findings = [
-        _finding(evidence, number, share, score, variables)
-        for number, wanted in enumerate(needed)
-        if wanted
-    ]
-    unexplained, size = 0.0, 0.0
-    if findings:
-        unexplained, size = _unexplained(evidence, study.predict([explained])[0])
-    if unexplained > _MUCH and size > 1.0 and unknown is None and left:
-        # Too much is left for what was named, even if no family of torques explains it either.
+        needed = still_needed(study, found.best, columns, found, unknown, evidence.simulated[1:])
+    model = _kept(found.best.model, needed)
+    after = evidence.simulated[1]
+    if unknown is not None and not all(needed):
+        after = study.predict([model.described.robot])[0]
+        unknown = without_needless(study, after, columns, needed, found, evidence.nameless, unknown)
+    unexplained, size = _unexplained(evidence, after)
+    doubted = unexplained > _MUCH and size > (1.0 if model.hypotheses else _GROSS)
+    if doubted and unknown is None and left:
+        # Too much is left for what was named, or for a match, even if no family of torques
+        # explains it either.
         unknown = left[0]
-        findings = [evolve(item, confidence=min(item.confidence, _DOUBTED)) for item in findings]
+    comparisons = _comparisons(evidence, model, unknown, after, held)
+    score = score_of([item for item in comparisons if item.held_out])
+    variables = _variables(evidence)
+    findings = _findings(evidence, needed, doubted, score, variables)
     if unknown is not None:
         findings.append(_unnamed(evidence, unknown, score, variables))
-    verdict = "mismatch" if findings else "match"
     return Explanation(
-        verdict=verdict,
+        verdict="mismatch" if findings else "match",
         sentence=_sentence(findings),
         findings=tuple(findings),
-        unexplained_share=max(unexplained, float(bool(unknown) and not model.hypotheses)),
-        comparisons=tuple(comparisons),
+        unexplained_share=(unexplained if model.hypotheses else float(bool(unknown))),
+        comparisons=comparisons,
         maps=_maps(evidence, variables),
         alignment=_alignment(evidence),
-        smallest=_smallest(evidence) if not findings else (),
+        smallest=smallest(evidence) if not findings else (),
         whiteness=_whiteness(evidence),
         score=score,
-        explained=_described(evidence, model) if model.hypotheses else "",
+        explained=_described(evidence, _for_users(evidence, model)) if model.hypotheses else "",
         suggested=suggested(findings),
         notes=notes,
     )
 
 
-def _unknown(best: Fitted, found: Found, left: Sequence[Leftover]) -> Leftover | None:
+def _kept(model: Model, needed: Sequence[bool]) -> Model:
+    for number in reversed([place for place, wanted in enumerate(needed) if not wanted]):
+        model = model.without(number)
+    return model
+
+
+def _findings(
+    evidence: Evidence,
+    needed: Sequence[bool],
+    doubted: bool,
+    score: Score | None,
+    variables: Mapping[str, Array],
+) -> list[Finding]:
+    share = _shares(evidence)
+    found = [
+        _finding(evidence, number, share, score, variables)
+        for number, wanted in enumerate(needed)
+        if wanted
+    ]
+    if doubted:
+        return [evolve(item, confidence=min(item.confidence, _DOUBTED)) for item in found]
+    return found
+
+
+def _comparisons(
+    evidence: Evidence,
+    model: Model,
+    unknown: Leftover | None,
+    after: Array,
+    held: Sequence[Forward],
+) -> tuple[Comparison, ...]:
+    """All recordings before and after, with what the effect without a name amounts to."""
+    described, explained = evidence.base.robot, model.described.robot
+    besides = unknown.torque if unknown is not None else None
+    found, at = [], 0
+    for item, run in zip(evidence.study.forwards, evidence.runs, strict=True):
+        part = slice(at, at := at + sum(len(channel.time) for channel in item.channels))
+        values: Array = np.stack([evidence.simulated[0][part], after[part]])
+        if besides is not None:
+            values, run = simulated(item, described, explained, besides)
+        found.append(comparison(item, values, run, False))
+    for item in held:
+        found.append(comparison(item, *simulated(item, described, explained, besides), True))
+    return tuple(found)
+
+
+def _unknown(evidence: Evidence, left: Sequence[Leftover]) -> Leftover | None:
     """The family that stands for an effect without a name, if something is left."""
-    if not left:
+    found, mirror = evidence.found, evidence.mirror
+    named = found.best.evidence - found.without.evidence
+    if not left or left[0].evidence <= max(
+        _UNKNOWN_COST, finding_cost(evidence.study), _UNKNOWN_SHARE * named
+    ):
         return None
-    named = best.evidence - found.without.evidence
-    if left[0].evidence > max(_UNKNOWN_COST, _UNKNOWN_SHARE * named):
-        return left[0]
-    return None
+    if mirror is not None and mirror.shows(left[0], found.best.model, evidence.nameless):
+        return None
+    return left[0]
 
 
 def _finding(
@@ -132,18 +165,17 @@ def _finding(
 ) -> Finding:
     found = evidence.found
     best = found.best
-    hypothesis, turns = best.model.hypotheses[number], best.model.turns[number]
+    hypothesis = best.model.hypotheses[number]
     first = sum(len(item.knobs) for item in best.model.hypotheses[:number])
     sigma = best.own_sigma[first : first + len(hypothesis.knobs)]
     study = evidence.study
-    without = study.predict([best.model.without(number).described.robot])[0]
-    change = study.predict([best.model.described.robot])[0] - without
+    change = evidence.simulated[1] - evidence.simulated[2 + number]
     group = found.alternatives[number] if number < len(found.alternatives) else ()
-    rivals, confidence = _rivals(hypothesis, group)
+    rivals, confidence = _rivals(number, group)
     return Finding(
         effect=hypothesis.effect,
         where=hypothesis.where,
-        parameters=_parameters(evidence, hypothesis, turns, sigma),
+        parameters=_parameters(evidence, number, sigma),
         located=located(study.channels, change, found.noise.weight, share[number], variables),
         holdout=score,
         rivals=rivals,
@@ -152,17 +184,18 @@ def _finding(
     )
 
 
-def _parameters(
-    evidence: Evidence, hypothesis: Hypothesis, turns: Sequence[float], sigma: Array
-) -> dict[str, Estimate]:
+def _parameters(evidence: Evidence, number: int, sigma: Array) -> dict[str, Estimate]:
     """Values with their intervals; of a wrong parameter what it is, tolerance included."""
     best = evidence.found.best
+    hypothesis, turns = best.model.hypotheses[number], best.model.turns[number]
+    shared = evidence.shared[number] if evidence.shared else (0.0,) * len(turns)
     nuisance = {
         knob.keys[0]: turn
         for knob, turn in zip(best.model.nuisances, best.model.nuisance_turns, strict=True)
     }
     found = {}
-    for knob, turn, width in zip(hypothesis.knobs, turns, sigma, strict=True):
+    for knob, whole, theirs, width in zip(hypothesis.knobs, turns, shared, sigma, strict=True):
+        turn = whole - theirs
         starts = []
         for key in knob.keys:
             leaf = key.rpartition(".")[2]
@@ -170,20 +203,24 @@ def _parameters(
             starts.append(float(start if start is not None else NEUTRAL.get(leaf, 0.0)))  # type: ignore[arg-type]
             starts[-1] += nuisance.get(key, 0.0) if key not in hypothesis.start else 0.0
         value = sum(starts) / len(starts) + turn
-        # The simulator is not exact either: that part of a value is never known.
-        half = _WIDE * math.hypot(float(width), _INEXACT * abs(turn))
+        # The simulator is not exact either: that part of a value is never known, nor all of what
+        # the user's simulation shows of it.
+        half = _WIDE * math.hypot(float(width), _INEXACT * turn, 0.5 * theirs)
         if knob.unit == "rad":
             value = math.remainder(value, 2.0 * math.pi)
-        found[knob.name] = Estimate(value, value - half, value + half, knob.unit)
+        lowest, highest = bounds_of(knob.keys[0])
+        found[knob.name] = Estimate(
+            value, max(value - half, lowest), min(value + half, highest), knob.unit
+        )
     return found
 
 
-def _rivals(hypothesis: Hypothesis, group: Sequence[Fitted]) -> tuple[tuple[Rival, ...], float]:
+def _rivals(number: int, group: Sequence[Fitted]) -> tuple[tuple[Rival, ...], float]:
     """Who explains it as well, and how much of the belief they and the finding hold together."""
     odds = {}
     for item in group[1:]:  # the first is the finding itself, judged by the same noise
-        other = item.model.hypotheses[-1]
-        if other.name != hypothesis.name:
+        other = item.model.hypotheses[number]
+        if other.name != group[0].model.hypotheses[number].name:
             odds[other.name] = (item.evidence - group[0].evidence, other)
     close = [pair for pair in odds.values() if pair[0] > -_RIVAL]
     rest = sum(
@@ -233,8 +270,10 @@ def _unnamed(
 
 def _variables(evidence: Evidence) -> Mapping[str, Array]:
     """Variables at all samples of all recordings."""
-    robot = evidence.found.best.model.described.robot
-    parts = [variables_at(item, item.run(robot), item.channels) for item in evidence.study.forwards]
+    parts = [
+        variables_at(item, run, item.channels)
+        for item, run in zip(evidence.study.forwards, evidence.runs, strict=True)
+    ]
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
@@ -247,7 +286,7 @@ def _shares(evidence: Evidence) -> list[float]:
     floor = min(best.chi2, float(len(study.value)))
     energies = []
     for number in range(len(best.model.hypotheses)):
-        value = study.predict([best.model.without(number).described.robot])[0]
+        value = evidence.simulated[2 + number]
         energies.append(float((((study.value - value) * weight) ** 2).sum()) - best.chi2)
     total = max(sum(energies), 1e-9)
     explained = max(0.0, min(1.0, (before - best.chi2) / max(before - floor, 1e-9)))
@@ -266,34 +305,37 @@ def _share_of(evidence: Evidence, unknown: Leftover) -> float:
 
 
 def _unexplained(evidence: Evidence, after: Array) -> tuple[float, float]:
-    """Part of the power's mismatch that is left, beyond noise and what the simulator is unsure of;
-    and how much that is, noise being 1.
+    """Part of the mismatch of power and speed that is left, beyond noise and what the simulator is
+    unsure of; and how much that is in power, noise being 1.
 
     Noise is what differs from one sample to the next: unlike the noise of the fit it knows nothing
     of slow mismatches that no hypothesis explains.
     """
     study = evidence.study
-    before = study.predict([evidence.base.robot])[0]
-    first, left = 0.0, 0.0
+    before = evidence.simulated[0]
+    first, left, drawn = 0.0, 0.0, 0.0
     for channel, part in zip(study.channels, rows_of(study.channels), strict=True):
-        if channel.kind not in ("power", "total"):
+        if channel.kind not in (*DRAWN_KINDS, "speed"):
             continue
         value = channel.value
         residuals = value - before[part], value - after[part]
         steps = np.abs(np.diff(residuals[1]))
         noise = (1.4826 * float(np.median(steps))) ** 2 / 2.0
         noise = max(noise, 0.5 * float(np.mean(np.minimum(steps, 5.0 * np.median(steps)) ** 2)))
+        noise = max(noise, channel.quantum**2 / 12.0)
         known = noise + (_UNSURE * float(np.std(value))) ** 2
         first += max(float(np.mean(residuals[0] ** 2)) - known, 0.0) / known
-        left += max(float(np.mean(residuals[1] ** 2)) - known, 0.0) / known
-    count = sum(channel.kind in ("power", "total") for channel in study.channels)
+        rest = max(float(np.mean(residuals[1] ** 2)) - known, 0.0) / known
+        left += rest
+        drawn += rest if channel.kind in DRAWN_KINDS else 0.0
+    count = sum(channel.kind in DRAWN_KINDS for channel in study.channels)
     share = min(1.0, left / first) if first > 0.0 else 0.0
-    return share, left / max(count, 1)
+    return share, drawn / max(count, 1)
 
 
 def _maps(evidence: Evidence, variables: Mapping[str, Array]) -> tuple[Map, ...]:
     study, found = evidence.study, evidence.found
-    before = study.value - study.predict([evidence.base.robot])[0]
+    before = study.value - evidence.simulated[0]
     after = study.value - found.best.value
     return maps_of(study.channels, before, after, found.noise.sigma, variables)
 
@@ -325,36 +367,15 @@ def _next(series: Array) -> float:
     return float(np.mean(series[:-1] * series[1:]) / max(float(np.mean(series**2)), 1e-300))
 
 
-def _smallest(evidence: Evidence) -> tuple[tuple[str, str, str], ...]:
-    """The smallest size of each effect that would have been found."""
-    step = evidence.found.rounds[-1]
-    columns: Columns = step.columns
-    weight = step.noise.weight
-    gram = Gram.of(columns.matrix * weight[:, None], np.zeros(len(weight)))
-    base = list(range(columns.instruments.stop))
-    inverse = solve(gram, base).covariance
-    found: dict[str, tuple[float, Hypothesis, Knob]] = {}
-    open_ones = [h for h in evidence.candidates if h.name not in columns.model.names]
-    for hypothesis in open_ones:
-        row = columns.candidates[hypothesis.key].start
-        cross = gram.matrix[row, base]
-        information = gram.matrix[row, row] - float(cross @ inverse @ cross)
-        if information <= 0.0 or hypothesis.effect.startswith("parameter."):
-            continue
-        knob = hypothesis.knobs[0]
-        size = knob.spread * math.sqrt(
-            2.0 * (finding_cost(evidence.study) + math.log1p(information)) / information
-        )
-        size = max(size, hypothesis.least)
-        best = found.get(hypothesis.name)
-        if best is None or size < best[0]:
-            found[hypothesis.name] = (size, hypothesis, knob)
-    rows = [
-        (item.effect, ", ".join(item.where), f"{knob.name} {size:.2g} {knob.unit}".rstrip())
-        for size, item, knob in found.values()
-        if item.where[0] in ("all_wheels", "body", "supply")
-    ]
-    return tuple(rows[: 2 * _LISTED])
+def _for_users(evidence: Evidence, model: Model) -> Model:
+    """The model for the user's simulation: without what that shows by itself."""
+    names = [item.name for item in evidence.found.best.model.hypotheses]
+    theirs = dict(zip(names, evidence.shared, strict=True))
+    turns = tuple(
+        tuple(turn - other for turn, other in zip(own, theirs[hypothesis.name], strict=True))
+        for hypothesis, own in zip(model.hypotheses, model.turns, strict=True)
+    )
+    return evolve(model, turns=turns)
 
 
 def _described(evidence: Evidence, model: Model) -> str:

@@ -85,6 +85,23 @@ def names_of(paths: Sequence[Path]) -> list[str]:
     return names
 
 
+def skips_of(given: Sequence[str], bags: Sequence[Path]) -> Skips:
+    """What `--skip BAG=FROM:TO` leaves out. Raises InputError for what names no recording."""
+    found: dict[str, list[tuple[float, float]]] = {}
+    names = names_of(bags)
+    for text in given:
+        name, _, interval = text.rpartition("=")
+        start, _, end = interval.partition(":")
+        try:
+            limits = float(start), float(end)
+        except ValueError:
+            raise InputError(f"--skip {text}: give BAG=FROM:TO in seconds") from None
+        if name not in names:
+            raise InputError(f"--skip {text}: no recording {name}: {', '.join(names)} are given")
+        found.setdefault(name, []).append(limits)
+    return found
+
+
 def without(recorded: Recorded, intervals: Sequence[tuple[float, float]]) -> Recorded:
     """A recording without some intervals [s]. Raises InputError if nothing is left."""
 

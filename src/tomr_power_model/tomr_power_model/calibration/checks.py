@@ -85,7 +85,7 @@ def refuse_little_motion(recordings: Sequence[Recorded], robot: Robot) -> None:
     moving = np.zeros(WHEELS)
     anything = 0.0
     for item in recordings:
-        speed = np.abs(_speed(item)) > _MOVING
+        speed = np.abs(measured_speed(item)) > _MOVING
         step = np.minimum(np.diff(item.encoder_time, prepend=item.encoder_time[0]), 0.5)
         moving += (speed * step[:, None]).sum(axis=0)
         anything += float(step[speed.any(axis=1)].sum())
@@ -103,7 +103,7 @@ def refuse_little_motion(recordings: Sequence[Recorded], robot: Robot) -> None:
         )
 
 
-def _speed(item: Recorded) -> Array:
+def measured_speed(item: Recorded) -> Array:
     """Wheel speeds at the encoder's samples [rad/s], as told or from differences, (n, 3)."""
     told = item.velocity
     step = np.diff(item.encoder_time, prepend=item.encoder_time[0] - 1.0)[:, None]
@@ -115,7 +115,7 @@ def _geometry(item: Recorded, robot: Robot) -> Iterator[Finding]:
     """Wheels that answer to other headings than their places in robot.yaml say."""
     if len(item.command_time) < 2:
         return
-    speed, asked = _speed(item), _held(item)
+    speed, asked = measured_speed(item), _held(item)
     rows = np.isfinite(asked).all(axis=1) & np.isfinite(speed).all(axis=1)
     rows &= np.abs(asked).any(axis=1)
     if np.count_nonzero(rows) < 50 or np.linalg.cond(asked[rows][:, :2]) > 10.0:
@@ -157,7 +157,7 @@ def _not_following(item: Recorded, robot: Robot) -> Iterator[Finding]:
     gap = np.diff(item.encoder_time)[after - 1] > max(_TICK, 3.0 * median_period(item.encoder_time))
     known = np.isfinite(expected) & ~gap[:, None]
     speed = np.column_stack(
-        [np.interp(time, item.encoder_time, column) for column in _speed(item).T]
+        [np.interp(time, item.encoder_time, column) for column in measured_speed(item).T]
     )
     width = _COMPARED / _TICK
     error = gaussian_filter1d(np.where(known, speed - expected, 0.0) ** 2, width, axis=0)
@@ -181,7 +181,7 @@ def _expected(item: Recorded, robot: Robot) -> tuple[Array, Array]:
     pending = deque(zip(item.command_time, item.command, strict=True))
     time = np.arange(item.encoder_time[0], item.encoder_time[-1], _TICK) + _TICK
     speeds = np.full((len(time), WHEELS), np.nan)
-    first = _speed(item)[0]
+    first = measured_speed(item)[0]
     for row, tick in enumerate(time):
         while pending and pending[0][0] <= tick:
             stamp, (vx, vy, wz) = pending.popleft()
@@ -283,7 +283,7 @@ def _of_wheel(item: Recorded, wheel: int) -> tuple[Array, Array, Array]:
     """Time, reading and wheel speed where the wheel's power was measured."""
     known = np.isfinite(item.reading[:, wheel])
     time = item.power_time[known]
-    speed = _speed(item)[:, wheel]
+    speed = measured_speed(item)[:, wheel]
     return time, item.reading[known, wheel], np.interp(time, item.encoder_time, speed)
 
 
@@ -293,7 +293,8 @@ def _found(item: Recorded, name: str, rows: slice, time: Array, seen: str) -> Fi
     return Finding(item.name, name, start, end, seen, f"{remedy}, or record it again")
 
 
-CHECKS: tuple[Callable[[Recorded, Robot], Iterator[Finding]], ...] = (
+Check = Callable[[Recorded, Robot], Iterator[Finding]]
+CHECKS: tuple[Check, ...] = (
     _geometry,
     _frozen_encoder,
     _not_following,
@@ -301,3 +302,5 @@ CHECKS: tuple[Callable[[Recorded, Robot], Iterator[Finding]], ...] = (
     _stuck_power,
     _wrong_sign,
 )
+# Those that need no model of the motion.
+SENSOR_CHECKS = tuple(check for check in CHECKS if check is not _not_following)

@@ -5,6 +5,11 @@ stretches that begin a warm-up earlier, wheels. Stretches run side by side becau
 in less than a second; variants, because a derivative is the difference of two of them.
 
 Each driver period h is integrated in `substeps` equal parts; the voltage holds over the period.
+Drivers far faster than a step need to be are taken as continuous, in steps of `_COARSEST`:
+
+    v(t) = v(0) - k_p (omega(t) - omega(0)),   so that D grows by k k_p / R
+
+with v(0) of the error at the step's start, limited; the exponential is exact for it.
 """
 
 import math
@@ -18,13 +23,25 @@ from scipy.linalg import expm
 
 from tomr_power_model.physics.effects import COPPER, Effect, WheelState, acting, stacked_effects
 from tomr_power_model.physics.model import STICKING_SLIDE, PhysicalModel
+from tomr_power_model.response.contacts import Contacts
+from tomr_power_model.response.sliding import Sliding
 from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
 
 _COARSEST = 0.005  # s, of a substep
-_SWEEPS = 2  # of Gauss-Seidel; the last step's friction is the first guess
+_FAST = 0.4  # of it: drivers with a shorter period are continuous
 _NO_SLIDE = 1e-12
+
+
+def is_continuous(robot: Robot) -> bool:
+    """Whether a robot's drivers are so fast that their loop is taken as continuous."""
+    return robot.controller.rate * _FAST * _COARSEST > 1.0
+
+
+def step_of(robot: Robot) -> float:
+    """The driver's period, or what stands for it where the loop is continuous [s]."""
+    return _COARSEST if is_continuous(robot) else 1.0 / robot.controller.rate
 
 
 @frozen
@@ -54,6 +71,7 @@ class Runs:
     voltage: Array  # of the supply [V], (s, v, c)
     yaw_rate: Array  # rad/s, (s, v, c)
     copper: Array  # i^2 R of each motor [W], (s, v, c, 3)
+    current: Array  # of each motor, positive where it drives forwards [A], (s, v, c, 3)
 
 
 @frozen
@@ -62,9 +80,13 @@ class ManyLoops:
 
     period_s: float
     substeps: int
+    continuous: bool
     inertia: Array  # M as the wheels feel it, (v, 3, 3)
     decay: Array  # E^T, (v, 3, 3): rows of wheels times it
     gain: Array  # G^T
+    damping: Array  # of the wheels, motors included [N m s/rad], (v, 1, 3)
+    body_mass: Array  # at base_link, (v, 3, 3)
+    wheel_inertia: Array  # wheel and rotor at the axle [kg m^2], (v, 1, 3)
     constant: Array  # k, (v, 1, 3)
     resistance: Array  # ohm, (v, 1, 3)
     to_twist: Array  # transposed, (v, 3, 3)
@@ -87,7 +109,7 @@ class ManyLoops:
     def of(cls, robots: Sequence[Robot]) -> Self:
         """Discretise the loops of robots that differ in numbers, not in the driver's rate."""
         models = [PhysicalModel.of(robot) for robot in robots]
-        period = 1.0 / robots[0].controller.rate
+        period, continuous = step_of(robots[0]), is_continuous(robots[0])
         substeps = max(1, math.ceil(period / _COARSEST - 1e-9))
         bodies = [model.body for model in models]
 
@@ -98,17 +120,24 @@ class ManyLoops:
         resistance = rows(lambda v: models[v].resistance)
         viscous = rows(lambda v: models[v].viscous)
         inertia = rows(lambda v: bodies[v].wheel_mass_matrix)
+        proportional = rows(lambda v: robots[v].controller.proportional)[:, None]
         damping = np.zeros_like(inertia)
         damping[:, range(3), range(3)] = constant**2 / resistance + viscous
+        if continuous:
+            damping[:, range(3), range(3)] += constant * proportional / resistance
         decay = expm(-(period / substeps) * np.linalg.solve(inertia, damping))
         gain = (np.eye(3) - decay) @ np.linalg.inv(damping)
         transposed = (0, 2, 1)
         return cls(
             period_s=period,
             substeps=substeps,
+            continuous=continuous,
             inertia=inertia.transpose(transposed),
             decay=decay.transpose(transposed),
             gain=gain.transpose(transposed),
+            damping=np.einsum("vii->vi", damping)[:, None, :],
+            body_mass=rows(lambda v: bodies[v].mass_matrix),
+            wheel_inertia=rows(lambda v: bodies[v].wheel_inertia)[:, None, :],
             constant=constant[:, None, :],
             resistance=resistance[:, None, :],
             to_twist=rows(lambda v: bodies[v].to_twist.T),
@@ -123,7 +152,7 @@ class ManyLoops:
             tilting=rows(lambda v: 2.0 * bodies[v].mass * _height(robots[v]) / 3.0)[:, None, None],
             wheel_radius=rows(lambda v: models[v].wheel_radius)[:, None, :],
             gear_ratio=rows(lambda v: models[v].gear_ratio)[:, None, :],
-            proportional=rows(lambda v: robots[v].controller.proportional)[:, None, None],
+            proportional=proportional[:, None],
             integral=rows(lambda v: robots[v].controller.integral)[:, None, None],
             voltage=rows(lambda v: robots[v].supply.nominal_voltage)[:, None, None],
             auxiliary=rows(lambda v: robots[v].supply.auxiliary_power)[:, None],
@@ -143,6 +172,7 @@ class ManyLoops:
             voltage=np.empty(shape),
             yaw_rate=np.empty(shape),
             copper=np.empty((*shape, 3)),
+            current=np.empty((*shape, 3)),
         )
         for step in range(count):
             loop.period(step, runs)
@@ -176,10 +206,30 @@ class _Stepper:
         )
         self.leans = any(e.needs_load for e in loops.effects) and bool(np.any(loops.tilting))
         self.holds = bool(np.any(self.drag)) and not np.any(self.slide)
-        self.contacts = _Contacts.of(loops, self.holds)
+        self.contacts = Contacts.of(loops.gain, loops.to_twist, loops.axles if self.holds else None)
         self.friction = np.zeros((*shape[:2], self.contacts.count))
         self.sag = np.asarray(sum((e.voltage_drop() for e in loops.effects), np.zeros(1)))
         self.integral = self._steady()
+        self.sliding = self._sliding()
+
+    def _sliding(self) -> Sliding | None:
+        """What moves where wheels slide; None if none can."""
+        limits = [effect.grip() for effect in self.acting["grip"]]
+        if not limits:
+            return None
+        loops = self._loops
+        return Sliding.of(
+            np.asarray(limits[0]),
+            loops.wheel_radius,
+            loops.to_twist,
+            loops.body_mass,
+            loops.wheel_inertia,
+            loops.damping,
+            loops.turning,
+            loops.axles,
+            loops.period_s / loops.substeps,
+            self.speed,
+        )
 
     def _steady(self) -> Array:
         """Integrals [rad] that hold the motion which the stretches begin with."""
@@ -199,7 +249,10 @@ class _Stepper:
     def _loads(self) -> Array:
         """Wheel loads [N]: speeding up leans on the wheels behind, height over radius much."""
         loops = self._loops
-        twist, change = self.speed @ loops.to_twist, self.acceleration @ loops.to_twist
+        if self.sliding is None:
+            twist, change = self.speed @ loops.to_twist, self.acceleration @ loops.to_twist
+        else:
+            twist, change = self.sliding.twist, self.sliding.change
         yaw = twist[..., 2]
         along = np.stack(
             [change[..., 0] - yaw * twist[..., 1], change[..., 1] + yaw * twist[..., 0]], axis=-1
@@ -225,16 +278,23 @@ class _Stepper:
         """Wheel torques of omega x v, of axle drag and of the floor's slope [N m]."""
         loops = self._loops
         twist = speed @ loops.to_twist
+        self.yaw_rate = twist[..., 2]
         force = twist[..., 2:] * (twist @ loops.turning)
         if np.any(self.slide):
             along = twist[..., :2] @ loops.axles.T
             sliding = np.maximum(np.hypot(along, self.slide * speed), _NO_SLIDE)
             share = np.tanh(sliding / STICKING_SLIDE) * along / sliding
             force[..., :2] += (self.drag * share) @ loops.axles
-        for effect in self.acting["floor_force"]:
-            force[..., :2] -= effect.floor_force(loops.mass, self.heading[..., None])
-        self.yaw_rate = twist[..., 2]
+        if self.acting["floor_force"]:
+            force -= self._slope()
         return np.asarray(force @ loops.from_force)
+
+    def _slope(self) -> Array:
+        """Force of a tilted floor on the body [N, N, N m]."""
+        force = np.zeros_like(self.speed)
+        for effect in self.acting["floor_force"]:
+            force[..., :2] += effect.floor_force(self._loops.mass, self.heading[..., None])
+        return force
 
     def _volts(self, step: int) -> Array:
         """Voltages of the drivers [V], after one control step."""
@@ -262,51 +322,66 @@ class _Stepper:
         self.extra = 0.0 if extra is None else extra[:, :, step]
         for row in rows:
             turned, speed = self.turned, self.speed
-            current = self._substep(volts, resistance)
-            before_it = (volts - loops.constant * speed) / resistance
+            mean_volts, current = self._substep(volts, resistance)
+            before_it = (mean_volts - loops.constant * speed) / resistance
             after_it = 2.0 * current - before_it
-            first = self._drawn(volts * before_it, before_it)
-            last = self._drawn(volts * after_it, after_it)
+            first = self._drawn(mean_volts * before_it, before_it)
+            last = self._drawn(mean_volts * after_it, after_it)
             power = 0.5 * (first + last)
             runs.tilt[row] = last - first
             drawn += power.sum(axis=2)
             runs.power[row] = power
             runs.copper[row] = resistance * current**2
+            runs.current[row] = current
             runs.speed[row] = (self.turned - turned) * (loops.substeps / loops.period_s)
             runs.yaw_rate[row] = self.yaw_rate
-        self.measured = (self.turned - before) / loops.period_s
+        mean_speed = (self.turned - before) / loops.period_s
+        self.measured = self.speed if loops.continuous else mean_speed
         self.drawn = (drawn / loops.substeps + loops.auxiliary) / bus
         runs.voltage[rows.start : rows.stop] = loops.voltage[..., 0] - self.sag * self.drawn
 
-    def _substep(self, volts: Array, resistance: Array) -> Array:
-        """Advance all wheels; returns the mean motor currents [A]."""
+    def _substep(self, volts: Array, resistance: Array) -> tuple[Array, Array]:
+        """Advance all wheels; returns the mean voltages [V] and motor currents [A]."""
         loops = self._loops
+        # What a continuous driver takes back while the wheel speeds up is in the damping.
+        back = loops.proportional if loops.continuous else 0.0
+        held = volts + back * self.speed if loops.continuous else volts
         duration = loops.period_s / loops.substeps
         if self.leans:
             self.normal = self._loads()
             self.drag = self._drag(self.normal)
         dry, moving = self._resistance(self._state())
-        load = (
-            loops.constant / resistance * volts - moving - self._external(self.speed) - self.extra
-        )
+        load = loops.constant / resistance * held - moving - self.extra
         if resistance is not loops.resistance:
             # The discretised damping is that of cold windings: what is less is given back.
-            cold, hot = loops.constant**2 / loops.resistance, loops.constant**2 / resistance
-            load += (cold - hot) * self.speed
-        free = self.speed @ loops.decay + load @ loops.gain
+            damped = loops.constant * (loops.constant + back)
+            load += damped * (1.0 / loops.resistance - 1.0 / resistance) * self.speed
+        free = self.speed @ loops.decay + (load - self._external(self.speed)) @ loops.gain
         limits = dry
         if self.holds:
             limits = np.concatenate([dry, np.broadcast_to(self.drag, dry.shape)], axis=-1)
         self.friction = self.contacts.solve(free, limits, self.friction)
         speed = free - self.contacts.effect(self.friction)
         mean = 0.5 * (speed + self.speed)
+        if self.sliding is not None:
+            speed, mean, self.yaw_rate = self.sliding.step(
+                self.speed,
+                speed,
+                load,
+                dry,
+                self.friction[..., :3],
+                self.normal,
+                self.drag,
+                self._slope(),
+            )
         self.acceleration = (speed - self.speed) / duration
         self.speed = speed
         self.turned = self.turned + mean * duration
         self.heading += self.yaw_rate * duration
-        current = (volts - loops.constant * mean) / resistance
+        mean_volts = held - back * mean if loops.continuous else volts
+        current = (mean_volts - loops.constant * mean) / resistance
         self.torque = loops.constant * current
-        return np.asarray(current)
+        return mean_volts, np.asarray(current)
 
     def _drawn(self, power: Array, current: Array) -> Array:
         for effect in self.acting["supplied"]:
@@ -314,61 +389,6 @@ class _Stepper:
         for effect in self.acting["driver_power"]:
             power = power + effect.driver_power(current)
         return power
-
-
-@frozen
-class _Contacts:
-    """Dry friction at the axles, and of the rollers along them, as one complementarity problem.
-
-    u = S (free - G S^T f) with S = [I; D], D the sliding of each contact along its axle per wheel
-    speed; each f is the force within its limit that brings its u to rest if it can.
-    """
-
-    slides: Array  # S^T, (v, 3, k)
-    moves: Array  # (G S^T)^T, (v, k, 3)
-    coupling: Array  # columns of S G S^T, (k, k, v, 1): [column, row]
-    own: Array  # its diagonal, (k, v, 1)
-
-    @classmethod
-    def of(cls, loops: ManyLoops, holds: bool) -> Self:
-        """Three rows, or six where rollers drag."""
-        gain = loops.gain.transpose(0, 2, 1)
-        rows = np.broadcast_to(np.eye(3), gain.shape)
-        if holds:
-            along = loops.axles @ loops.to_twist.transpose(0, 2, 1)[:, :2]
-            rows = np.concatenate([rows, along], axis=1)
-        moves = gain @ rows.transpose(0, 2, 1)
-        coupling = np.ascontiguousarray((rows @ moves).transpose(2, 1, 0))[..., None]
-        return cls(
-            np.ascontiguousarray(rows.transpose(0, 2, 1)),
-            np.ascontiguousarray(moves.transpose(0, 2, 1)),
-            coupling,
-            np.stack([coupling[row, row] for row in range(len(coupling))]),
-        )
-
-    @property
-    def count(self) -> int:
-        return int(self.slides.shape[2])
-
-    def effect(self, forces: Array) -> Array:
-        """Change of wheel speeds [rad/s], (v, c, 3)."""
-        return np.asarray(forces @ self.moves)
-
-    def solve(self, free: Array, limits: Array, guess: Array) -> Array:
-        """Forces and torques after projected Gauss-Seidel from the last ones, (v, c, k)."""
-        moving = np.ascontiguousarray(
-            ((free - self.effect(guess)) @ self.slides).transpose(2, 0, 1)
-        )
-        forces = np.ascontiguousarray(guess.transpose(2, 0, 1))
-        most = np.ascontiguousarray(np.broadcast_to(limits, guess.shape).transpose(2, 0, 1))
-        least = -most
-        for row in [*range(self.count)] * _SWEEPS:
-            wanted = forces[row] + moving[row] / self.own[row]
-            np.maximum(wanted, least[row], out=wanted)
-            np.minimum(wanted, most[row], out=wanted)
-            moving -= self.coupling[row] * (wanted - forces[row])
-            forces[row] = wanted
-        return np.asarray(forces.transpose(1, 2, 0))
 
 
 def _height(robot: Robot) -> float:

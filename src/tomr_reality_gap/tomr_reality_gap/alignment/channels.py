@@ -11,7 +11,11 @@ from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.steady import steady
 
 Array = NDArray[np.float64]
-Kind = Literal["power", "total", "voltage", "speed", "yaw"]
+Kind = Literal["power", "current", "total", "voltage", "speed", "yaw"]
+
+# What motors draw, power or else current, and what the robot draws: the kinds that are scored.
+MOTOR_KINDS: tuple[Kind, ...] = ("power", "current")
+DRAWN_KINDS: tuple[Kind, ...] = (*MOTOR_KINDS, "total")
 
 _BLOCK = 0.05  # s, over which wheel speed and yaw rate are averaged
 _GAP = 3.0  # usual periods between two encoder samples: a longer time is a gap, and stays one
@@ -28,6 +32,7 @@ class Channel:
     time: Array  # end of what the value is a mean of [s], (n,)
     span: Array  # how long that is [s], (n,)
     value: Array  # (n,)
+    quantum: float = 0.0  # of a value, where it is coarse
 
 
 def channels_of(
@@ -52,23 +57,35 @@ def channels_of(
 
 
 def _known(
-    name: str, kind: Kind, wheel: int | None, unit: str, time: Array, window: float, value: Array
+    name: str,
+    kind: Kind,
+    wheel: int | None,
+    unit: str,
+    time: Array,
+    window: float,
+    value: Array,
+    quantum: float = 0.0,
 ) -> Channel:
     rows = np.isfinite(value)
     span = np.full(int(rows.sum()), window)
-    return Channel(name, kind, wheel, unit, time[rows], span, value[rows])
+    return Channel(name, kind, wheel, unit, time[rows], span, value[rows], quantum)
 
 
 def _powers(recorded: Recorded, robot: Robot, window: float) -> list[Channel]:
+    kind: Kind = "power"
+    unit, quantum = "W", 0.0
+    if robot.measurement.quantity == "motor_current":
+        kind, unit, quantum = "current", "A", robot.sensors.current_resolution
     found = [
         _known(
-            f"{topic}/power",
-            "power",
+            f"{topic}/{kind}",
+            kind,
             wheel,
-            "W",
+            unit,
             recorded.power_time,
             window,
             recorded.power[:, wheel],
+            quantum,
         )
         for wheel, topic in enumerate(robot.wheel_topics)
     ]
@@ -94,12 +111,18 @@ def _blocks(recorded: Recorded) -> Channel:
 
 
 def _speeds(recorded: Recorded, robot: Robot) -> list[Channel]:
-    """Mean wheel speeds between encoder samples, from angles; the sample's speed without them."""
+    """Mean wheel speeds between encoder samples, from angles; the sample's speed without them.
+
+    A robot whose description tells the quantum of its speeds measures them by themselves: then it
+    is they that its drivers follow.
+    """
     found = []
+    quantum = robot.sensors.velocity_resolution
     for wheel, name in enumerate(robot.wheel_names):
         known = np.isfinite(recorded.position[:, wheel])
         time = recorded.encoder_time
-        if known.sum() > 1:
+        told = quantum > 0.0 and bool(np.isfinite(recorded.velocity[:, wheel]).any())
+        if known.sum() > 1 and not told:
             every = max(1, round(_BLOCK / float(np.median(np.diff(time[known])))))
             time, angle = time[known][::every], recorded.position[known, wheel][::every]
             span = np.diff(time)
@@ -108,6 +131,8 @@ def _speeds(recorded: Recorded, robot: Robot) -> list[Channel]:
             found.append(Channel(name, "speed", wheel, "rad/s", time[1:][rows], span[rows], speed))
         else:
             found.append(
-                _known(name, "speed", wheel, "rad/s", time, 0.0, recorded.velocity[:, wheel])
+                _known(
+                    name, "speed", wheel, "rad/s", time, 0.0, recorded.velocity[:, wheel], quantum
+                )
             )
     return found

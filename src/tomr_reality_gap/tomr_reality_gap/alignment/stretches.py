@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tomr_power_model.calibration.motion import wheel_motion
 from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.geometry.kinematics import twist_to_wheels, wheels_to_twist
-from tomr_power_model.response.many import Stretches
+from tomr_power_model.response.many import Stretches, step_of
 from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ class Timeline:
 
     A stretch runs `warm` periods before its first, so that what it began with is forgotten. A
     wheel that stands forgets nothing: its integral stays. So a stretch begins where all wheels
-    have moved for as long as the warm-up, if there is such a place.
+    have moved for as long as the warm-up, if there is such a place; anywhere, without an integral.
     """
 
     start: float  # of the first period [s]
@@ -58,7 +58,7 @@ class Timeline:
 
 def timeline_of(recorded: Recorded, robot: Robot) -> Timeline:
     """Driver periods from the first encoder sample to the last measurement."""
-    period = 1.0 / robot.controller.rate
+    period = step_of(robot)
     last = max(float(time[-1]) for time in _times(recorded))
     count = math.ceil(last / period) + 2
     warm = math.ceil(_memory(robot) / period)
@@ -66,6 +66,7 @@ def timeline_of(recorded: Recorded, robot: Robot) -> Timeline:
     whole = Timeline(start, period, count, warm, np.zeros(1, dtype=np.intp), count)
     twist = ramped(recorded, robot, whole)
     moving = np.all(np.abs(twist @ twist_to_wheels(robot, nominal=True).T) > _MOVING, axis=1)
+    moving |= not robot.controller.integral
     since = np.arange(len(moving)) - np.maximum.accumulate(
         np.where(moving, -1, np.arange(len(moving)))
     )
@@ -145,7 +146,7 @@ def stretches_of(
     speed, acceleration = motion.speed.copy(), motion.acceleration.copy()
     speed[still], acceleration[still] = 0.0, 0.0
     acceleration[np.abs(speed) < _MOVING] = 0.0
-    turned = np.stack([_angle(recorded, wheel) for wheel in range(WHEELS)], axis=1)
+    turned = np.stack([turned_angle(recorded, wheel) for wheel in range(WHEELS)], axis=1)
     angle = np.stack(
         [np.interp(begins, recorded.encoder_time, turned[:, wheel]) for wheel in range(WHEELS)],
         axis=1,
@@ -157,7 +158,7 @@ def stretches_of(
     return Stretches(set_speed[None], speed, acceleration, angle, heading)
 
 
-def _angle(recorded: Recorded, wheel: int) -> Array:
+def turned_angle(recorded: Recorded, wheel: int) -> Array:
     """Angle of a wheel at the encoder samples [rad]; integrated speed where none is told."""
     angle = recorded.position[:, wheel]
     if np.isfinite(angle).all():

@@ -1,6 +1,7 @@
 """What no named effect explains: which variable it depends on, at which wheels, in what shape."""
 
 from collections.abc import Sequence
+from types import MappingProxyType
 
 import numpy as np
 from attrs import frozen
@@ -9,16 +10,19 @@ from numpy.typing import NDArray
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_reality_gap.explanation import Shape
 from tomr_reality_gap.fit.linear import Gram, solve
-from tomr_reality_gap.fit.noise import rows_of
-from tomr_reality_gap.fit.search import Fitted, Found
+from tomr_reality_gap.fit.probed import Probed
+from tomr_reality_gap.fit.refine import Fitted
+from tomr_reality_gap.fit.search import Found
 from tomr_reality_gap.fit.study import Columns, Study
-from tomr_reality_gap.mismatch.probes import Family, families
+from tomr_reality_gap.hypotheses.knobs import Hypothesis
+from tomr_reality_gap.mismatch.probes import Family, Motion
 
 Array = NDArray[np.float64]
 
-_SIZE = 0.1  # of a typical torque, belief about each bump
 _POINTS = 80
 _NEEDED = 10.0  # log evidence that a named finding must bring beside an unnamed one
+# Effects that are one curve of one variable.
+_SHAPED = MappingProxyType({"drivetrain.torque_ripple": "wheel angle [rad]"})
 _NEEDED_SHARE = 0.3  # or this part of what the unnamed one brings
 
 
@@ -32,44 +36,63 @@ class Leftover:
     by_wheel: tuple[float, ...]
     columns: Array  # of its bumps at those wheels, weighted (n, k)
     shapes: tuple[Shape, ...]
+    turns: tuple[Array, ...]  # of the bumps at each of those wheels [N m], (k,) each
+
+    def torque(self, motion: Motion) -> Array:
+        """What it amounts to on a drive, at each wheel [N m], (n, 3)."""
+        found = np.zeros_like(motion.speed)
+        bumps = self.family.torques(motion)
+        for wheel, turns in zip(self.wheels, self.turns, strict=True):
+            found[:, wheel] = turns @ bumps[:, :, wheel]
+        return found
 
 
 def leftovers(
-    study: Study, fitted: Fitted, columns: Columns, found: Found, robot: Robot, torque: float
+    study: Study, fitted: Fitted, columns: Columns, found: Found, nameless: Probed
 ) -> list[Leftover]:
     """Each family with its evidence, best first."""
-    groups = _families(study, robot)
     kept = columns.instruments.stop + sum(part.stop - part.start for part in columns.own)
     weight = found.noise.weight
     base = columns.matrix[:, :kept] * weight[:, None]
     residual = (study.value - fitted.value) * weight
-    results = []
-    value = study.predict([robot])[0]
-    for number in range(len(groups[0])):
-        family = groups[0][number]
-        size = _SIZE * torque
-        response = study.respond(robot, [group[number].torque * size for group in groups]) - value
-        results.append(_result(study, family, size, base, residual, response.T, weight))
+    results = [
+        _result(study, family, nameless, base, residual, response, weight)
+        for family, response in zip(nameless.families, nameless.responses, strict=True)
+    ]
     return sorted(results, key=lambda item: -item.evidence)
 
 
-def _families(study: Study, robot: Robot) -> list[tuple[Family, ...]]:
-    """Of each recording; those that only some recordings have are left out."""
-    groups = [families(item, robot, item.run(robot)) for item in study.forwards]
-    fewest = min(len(group) for group in groups)
-    return [group[:fewest] for group in groups]
+def without_needless(
+    study: Study,
+    value: Array,
+    columns: Columns,
+    needed: Sequence[bool],
+    found: Found,
+    nameless: Probed,
+    leftover: Leftover,
+) -> Leftover:
+    """The leftover of a model that lacks the findings it made needless; `value` as simulated."""
+    weight = found.noise.weight
+    rows = list(range(columns.instruments.stop))
+    for part, wanted in zip(columns.own, needed, strict=True):
+        rows += range(part.start, part.stop) if wanted else ()
+    base = columns.matrix[:, rows] * weight[:, None]
+    residual = (study.value - value) * weight
+    places = [family.variable for family in nameless.families]
+    response = nameless.responses[places.index(leftover.family.variable)]
+    return _result(study, leftover.family, nameless, base, residual, response, weight)
 
 
 def _result(
     study: Study,
     family: Family,
-    size: float,
+    nameless: Probed,
     base: Array,
     residual: Array,
     response: Array,
     weight: Array,
 ) -> Leftover:
-    parts = [_at_wheel(study, response, wheel) * weight[:, None] for wheel in range(WHEELS)]
+    parts = [_only(response * weight[:, None], rows) for rows in nameless.rows]
     alone = solve(Gram.of(base, residual), range(base.shape[1])).evidence
     gains = []
     for part in parts:
@@ -82,20 +105,27 @@ def _result(
     chosen = np.concatenate([parts[wheel] for wheel in wheels], axis=1)
     both = np.concatenate([base, chosen], axis=1)
     whole = solve(Gram.of(both, residual), range(both.shape[1]))
-    shapes = []
+    shapes, turns = [], []
     for place, wheel in enumerate(wheels):
         rows = base.shape[1] + place * response.shape[1] + np.arange(response.shape[1])
-        shapes.append(_shape(study, family, size, wheel, whole.mean[rows], whole.covariance, rows))
-    return Leftover(family, whole.evidence - alone, wheels, tuple(gains), chosen, tuple(shapes))
+        turns.append(nameless.size * whole.mean[rows])
+        shapes.append(
+            _shape(study, family, nameless.size, wheel, whole.mean[rows], whole.covariance, rows)
+        )
+    return Leftover(
+        family,
+        whole.evidence - alone,
+        wheels,
+        tuple(gains),
+        chosen,
+        tuple(shapes),
+        tuple(turns),
+    )
 
 
-def _at_wheel(study: Study, response: Array, wheel: int) -> Array:
-    """Rows of one wheel's own channels; of the total where no wheel is measured by itself."""
-    kept = np.zeros_like(response)
-    alone = not any(channel.kind == "power" for channel in study.channels)
-    for channel, part in zip(study.channels, rows_of(study.channels), strict=True):
-        if channel.wheel == wheel or (alone and channel.kind == "total"):
-            kept[part] = response[part]
+def _only(columns: Array, rows: NDArray[np.intp]) -> Array:
+    kept = np.zeros_like(columns)
+    kept[rows] = columns[rows]
     return kept
 
 
@@ -109,17 +139,11 @@ def _shape(
     rows: Array,
 ) -> Shape:
     names = study.forwards[0].robot.wheel_names
-    if len(np.unique(family.knots)) < len(family.knots):  # harmonics: a curve over the turn
+    if family.is_periodic:
         at = np.linspace(0.0, 2.0 * np.pi, _POINTS)
-        orders = family.knots
-        waves = [
-            (np.cos if place % 2 == 0 else np.sin)(order * at) for place, order in enumerate(orders)
-        ]
-        basis = np.stack(waves, axis=1)
     else:
         at = np.linspace(family.knots[0], family.knots[-1], _POINTS)
-        width = max(float(family.knots[1] - family.knots[0]), 1e-9)
-        basis = np.exp(-0.5 * ((at[:, None] - family.knots) / width) ** 2)
+    basis = family.at(at).T
     part = covariance[np.ix_(rows, rows)]
     curve = size * basis @ mean
     half = 1.96 * size * np.sqrt(np.einsum("ij,jk,ik->i", basis, part, basis))
@@ -127,28 +151,54 @@ def _shape(
 
 
 def still_needed(
-    study: Study, fitted: Fitted, columns: Columns, found: Found, leftover: Leftover
+    study: Study,
+    fitted: Fitted,
+    columns: Columns,
+    found: Found,
+    leftover: Leftover,
+    simulated: Sequence[Array],
 ) -> list[bool]:
-    """Whether each named finding is needed once the leftover's torques are there."""
+    """Whether each named finding is needed once the leftover's torques are there.
+
+    Args:
+        study: the recordings.
+        fitted: the model with all findings.
+        columns: derivatives at it.
+        found: what the search came to.
+        leftover: the effect without a name.
+        simulated: values of the model, and of the model without each of its findings.
+    """
     weight = found.noise.weight
     kept = columns.instruments.stop + sum(part.stop - part.start for part in columns.own)
     base = columns.matrix[:, :kept] * weight[:, None]
-    own = [
-        turn / knob.spread
-        for knob, turn in zip(fitted.model.own, fitted.model.own_turns, strict=True)
-    ]
-    first = columns.instruments.stop
-    residual = (study.value - fitted.value) * weight + base[:, first:] @ np.array(own)
+    residual = (study.value - fitted.value) * weight
     both = np.concatenate([base, leftover.columns], axis=1)
-    gram = Gram.of(both, residual)
     everything = list(range(both.shape[1]))
-    whole = solve(gram, everything).evidence
+    whole = _likelihood(both, residual, everything)
     least = max(_NEEDED, _NEEDED_SHARE * leftover.evidence)
     needed = []
-    for part in columns.own:
+    for part, without in zip(columns.own, simulated[1:], strict=True):
         rest = [row for row in everything if not part.start <= row < part.stop]
-        needed.append(whole - solve(gram, rest).evidence > least)
-    return needed
+        lacking = residual + (simulated[0] - without) * weight
+        needed.append(whole - _likelihood(both, lacking, rest) > least)
+    return [
+        wanted and not _contradicts(leftover, hypothesis, study.forwards[0].robot)
+        for wanted, hypothesis in zip(needed, fitted.model.hypotheses, strict=True)
+    ]
+
+
+def _contradicts(leftover: Leftover, hypothesis: Hypothesis, robot: Robot) -> bool:
+    """Whether what is left is of the same variable and wheel: then it is not of the named shape."""
+    if _SHAPED.get(hypothesis.effect) != leftover.family.variable:
+        return False
+    wheels = {robot.wheel_names[wheel] for wheel in leftover.wheels}
+    return bool(wheels & set(hypothesis.where)) or "all_wheels" in hypothesis.where
+
+
+def _likelihood(columns: Array, residual: Array, chosen: Sequence[int]) -> float:
+    """Log evidence of some columns, up to what all residuals of one weighting share."""
+    gram = Gram.of(columns, residual)
+    return solve(gram, chosen).evidence - 0.5 * gram.square
 
 
 def names(wheels: Sequence[int], robot: Robot) -> tuple[str, ...]:

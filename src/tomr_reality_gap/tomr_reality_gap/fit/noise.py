@@ -6,6 +6,7 @@ the voltage). What is correlated counts for less: a sample weighs 1 / (variance 
 autocorrelation time in samples.
 """
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -21,7 +22,7 @@ Array = NDArray[np.float64]
 _ROUNDS = 4
 _RIDGE = 1e-2
 _FLOOR = 0.3  # of the median deviation: a channel that stands still for long is not that exact
-_INEXACT = 4e-3  # of motion: what the simulator itself is not sure of
+_INEXACT = 2e-3  # of motion: what the simulator itself is not sure of
 _OUTLIER = 4.0  # standard deviations: beyond, a sample weighs less
 _LAGS = 80
 _UNCORRELATED = 0.03
@@ -36,6 +37,14 @@ class Noise:
     time: tuple[float, ...]  # autocorrelation time of each channel [samples]
 
 
+@frozen
+class Local:
+    """Columns that show in some rows only."""
+
+    rows: NDArray[np.intp]  # (m,)
+    matrix: Array  # (m, k)
+
+
 def rows_of(channels: Sequence[Channel]) -> list[slice]:
     """Rows of each channel in the stacked values."""
     edges = np.cumsum([0, *(len(channel.time) for channel in channels)])
@@ -43,7 +52,12 @@ def rows_of(channels: Sequence[Channel]) -> list[slice]:
 
 
 def noise_of(
-    channels: Sequence[Channel], residual: Array, columns: Array, value: Array, slope: Array
+    channels: Sequence[Channel],
+    residual: Array,
+    columns: Array,
+    value: Array,
+    slope: Array,
+    local: Sequence[Local] = (),
 ) -> Noise:
     """Noise left by a fit of all columns together.
 
@@ -53,16 +67,17 @@ def noise_of(
         columns: of everything that may explain it, scaled by beliefs, (n, p).
         value: modelled, (n,).
         slope: its derivative in time, (n,).
+        local: further columns, of rows that do not overlap.
     """
     rows = rows_of(channels)
     variance = np.empty_like(residual)
-    for part in rows:
-        variance[part] = _scale(residual[part]) ** 2
+    for channel, part in zip(channels, rows, strict=True):
+        variance[part] = _scale(residual[part], channel.quantum) ** 2
     times = np.ones(len(rows))
     outlier = np.ones_like(residual)
     for _ in range(_ROUNDS):
         weight = _weight(rows, variance, times, outlier)
-        left = residual - columns @ _ridge(columns * weight[:, None], residual * weight)
+        left = _left(columns, residual, weight, local)
         for number, (channel, part) in enumerate(zip(channels, rows, strict=True)):
             noise = left[part]
             variance[part] = _variance(channel, noise, variance[part], value[part], slope[part])
@@ -80,14 +95,34 @@ def _weight(rows: Sequence[slice], variance: Array, times: Array, outlier: Array
     return weight
 
 
-def _ridge(columns: Array, residual: Array) -> Array:
-    gram = columns.T @ columns
-    return np.asarray(np.linalg.solve(gram + _RIDGE * np.eye(len(gram)), columns.T @ residual))
+def _left(columns: Array, residual: Array, weight: Array, local: Sequence[Local]) -> Array:
+    """What a ridge regression on all columns leaves.
+
+    Local columns of different rows meet in the others only, so their blocks are eliminated:
+    (A - sum C_w D_w^-1 C_w^T) x = a - sum C_w D_w^-1 d_w.
+    """
+    weighted, wanted = columns * weight[:, None], residual * weight
+    matrix = weighted.T @ weighted + _RIDGE * np.eye(columns.shape[1])
+    vector = weighted.T @ wanted
+    blocks = []
+    for item in local:
+        own = item.matrix * weight[item.rows, None]
+        cross = weighted[item.rows].T @ own
+        inner = own.T @ own + _RIDGE * np.eye(own.shape[1])
+        solved = np.linalg.solve(inner, np.column_stack([cross.T, own.T @ wanted[item.rows]]))
+        matrix -= cross @ solved[:, :-1]
+        vector -= cross @ solved[:, -1]
+        blocks.append(solved)
+    turns = np.linalg.solve(matrix, vector)
+    left = residual - columns @ turns
+    for item, solved in zip(local, blocks, strict=True):
+        left[item.rows] -= item.matrix @ (solved[:, -1] - solved[:, :-1] @ turns)
+    return np.asarray(left)
 
 
-def _scale(noise: Array) -> float:
+def _scale(noise: Array, quantum: float) -> float:
     spread = 1.4826 * float(np.median(np.abs(noise)))
-    return max(spread, 0.1 * float(np.std(noise)), 1e-9)
+    return max(spread, 0.1 * float(np.std(noise)), quantum / math.sqrt(12.0), 1e-9)
 
 
 def _variance(channel: Channel, noise: Array, before: Array, value: Array, slope: Array) -> Array:
@@ -98,7 +133,7 @@ def _variance(channel: Channel, noise: Array, before: Array, value: Array, slope
     square = np.minimum(noise**2, _OUTLIER**2 * before) / before
     unit = np.sqrt((matrix**2).sum(axis=0)) + 1e-300
     shares, _ = nnls(matrix / unit, square)
-    floor = (_FLOOR * _scale(noise)) ** 2
+    floor = max((_FLOOR * _scale(noise, channel.quantum)) ** 2, channel.quantum**2 / 12.0)
     if channel.kind in ("speed", "yaw"):
         floor += (_INEXACT * float(np.std(value))) ** 2
     return np.asarray(np.maximum((matrix * before[:, None]) @ (shares / unit), floor))
@@ -106,7 +141,7 @@ def _variance(channel: Channel, noise: Array, before: Array, value: Array, slope
 
 def _correlation_time(series: Array) -> float:
     """1 + 2 sum of the autocorrelation up to where it has died away."""
-    power = float(np.mean(series**2))
+    power = max(float(np.mean(series**2)), 1e-300)  # a simulation may be told without noise
     time = 1.0
     for lag in range(1, min(_LAGS, len(series) // 4)):
         share = float(np.mean(series[:-lag] * series[lag:])) / power

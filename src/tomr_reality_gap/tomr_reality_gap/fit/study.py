@@ -7,8 +7,8 @@ from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.robot import Robot
-from tomr_reality_gap.alignment.channels import Channel
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.channels import DRAWN_KINDS, Channel
+from tomr_reality_gap.alignment.forward import Forward, predict_all, respond_all
 from tomr_reality_gap.hypotheses.knobs import Hypothesis, Knob, Turned
 
 Array = NDArray[np.float64]
@@ -34,24 +34,24 @@ class Study:
         object.__setattr__(self, "value", np.concatenate([item.value for item in channels]))
 
     def predict(
-        self, robots: Sequence[Robot], tick: Callable[[int], None] = lambda done: None
+        self,
+        robots: Sequence[Robot],
+        tick: Callable[[int], None] = lambda done: None,
+        later: Sequence[float] = (),
     ) -> Array:
-        """Values of all channels for each robot, (v, n)."""
-        return np.concatenate([item.predict(robots, tick) for item in self.forwards], axis=1)
+        """As `Forward.predict`, of all recordings' channels, (v + l, n)."""
+        return predict_all(self.forwards, robots, tick, later)
+
+    def sloped(
+        self, robots: Sequence[Robot], tick: Callable[[int], None] = lambda done: None
+    ) -> tuple[Array, Array]:
+        """Values for each robot, (v, n), and the derivative of the first's in time, (n,)."""
+        values = self.predict(robots, tick, (_DELAY_STEP,))
+        return values[:-1], np.asarray((values[0] - values[-1]) / _DELAY_STEP)
 
     def respond(self, robot: Robot, torques: Sequence[Array]) -> Array:
         """As `Forward.respond`, torques one array (v, count, 3) per recording."""
-        pairs = zip(self.forwards, torques, strict=True)
-        return np.concatenate([item.respond(robot, torque) for item, torque in pairs], axis=1)
-
-    def slope(self, robot: Robot, value: Array) -> Array:
-        """Derivative of all channels' values in time, (n,)."""
-        return np.asarray((value - self.shifted(robot, _DELAY_STEP)) / _DELAY_STEP)
-
-    def shifted(self, robot: Robot, delay: float) -> Array:
-        """Values of all channels, were the response later by a delay [s], (n,)."""
-        items = [evolve(item, delay=item.delay + delay) for item in self.forwards]
-        return np.concatenate([item.predict([robot])[0] for item in items])
+        return respond_all(self.forwards, robot, torques)
 
     def instruments(self, value: Array, slope: Array) -> Array:
         """Columns of what instruments may be off, in units of their beliefs, (n, k).
@@ -71,7 +71,7 @@ class Study:
             add(slice(row, row + size), -_DELAY_SPREAD * slope)
             for channel in item.channels:
                 part = slice(row, row := row + len(channel.time))
-                if channel.kind in ("power", "total"):
+                if channel.kind in DRAWN_KINDS:
                     add(part, -_CLOCK_SPREAD * slope)
                 elif channel.kind == "yaw":
                     add(part, np.full_like(value, _GYRO_BIAS))
@@ -131,6 +131,12 @@ class Model:
             turns=tuple(self.turns[index] for index in keep),
         )
 
+    def swapped(self, number: int, hypothesis: Hypothesis, turns: tuple[float, ...]) -> "Model":
+        """With another hypothesis in the place of one."""
+        hypotheses, all_turns = list(self.hypotheses), list(self.turns)
+        hypotheses[number], all_turns[number] = hypothesis, turns
+        return evolve(self, hypotheses=tuple(hypotheses), turns=tuple(all_turns))
+
     def moved(self, nuisance: Array, own: Array) -> "Model":
         """With all knobs at new turns, within their bounds."""
         nuisance = np.clip(
@@ -188,13 +194,12 @@ def columns_at(
             {key: at for key, at in candidate.start.items() if key not in described.values}
         )
         for knob in (knob for knob in candidate.knobs if not knob.is_shape):
-            robots.append(started.by([knob], [knob.step]).robot)
-            steps.append(knob.step)
+            robots.append(started.by([knob], [knob.first_step]).robot)
+            steps.append(knob.first_step)
             knobs.append(knob)
-    values = study.predict(robots, tick)
+    values, slope = study.sloped(robots, tick)
     spread = np.array([knob.spread for knob in knobs])
     matrix = ((values[1:] - values[0]).T / np.array(steps)) * spread
-    slope = study.slope(robots[0], values[0])
     instruments = study.instruments(values[0], slope)
     first = len(model.nuisances)
     own = len(model.own)

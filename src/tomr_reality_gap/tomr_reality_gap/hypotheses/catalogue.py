@@ -51,6 +51,11 @@ def _times(scales: Scales) -> Sequence[Mapping[str, float]]:
     return [{"time_constant": part * scales.duration} for part in (0.15, 0.5, 1.5)]
 
 
+def _slips(scales: Scales) -> Sequence[Mapping[str, float]]:
+    """The contract's law, and dry friction against sliding in the rolling direction as well."""
+    return [{}, {"slip": 0.4}]
+
+
 def _azimuths(scales: Scales) -> Sequence[Mapping[str, float]]:
     return [{"azimuth": part * math.pi / 4.0} for part in range(8)]
 
@@ -62,7 +67,9 @@ _TABLE: Mapping[str, Row] = {
     "friction.asymmetric": Row({"torque": lambda s: 0.3 * s.torque}, sign=0),
     "friction.load_dependent": Row({"coefficient": lambda s: 0.1}),
     "friction.quadratic": Row({"coefficient": lambda s: 0.5 * s.torque / s.speed**2}),
-    "contact.roller_drag": Row({"coefficient": lambda s: 0.5 * s.torque / (s.load * s.radius)}),
+    "contact.roller_drag": Row(
+        {"coefficient": lambda s: 0.5 * s.torque / (s.load * s.radius)}, _slips
+    ),
     "contact.rolling_resistance": Row(
         {"coefficient": lambda s: 0.5 * s.torque / (s.load * s.radius)}
     ),
@@ -109,6 +116,23 @@ _PARAMETERS: Mapping[str, tuple[float, str]] = {
     "supply.nominal_voltage": (0.05, SUPPLY),
     "supply.auxiliary_power": (0.3, SUPPLY),
 }
+# What shows in electrical power alone, and iron loss, which brakes the rotor as Coulomb and viscous
+# friction do: the currents of the motors do not tell it.
+_ELECTRICAL = frozenset(
+    {
+        "electrical.iron_loss",
+        "electrical.driver_standby",
+        "electrical.switching_loss",
+        "electrical.regeneration_loss",
+        "sensor.power_scale",
+        "sensor.power_bias",
+        "sensor.power_lag",
+        "sensor.clock_offset",
+    }
+)
+_DELAY_STEP = 0.002  # s
+_ROLLS = 1.05  # of the largest traction over load: with this friction no wheel slides
+_LEAST_GRIP = 0.01
 _EFFECT_PARAMETER = 0.4  # spread of an included effect's parameter, relative to its value
 _WRONG = 1.5  # tolerances that a parameter must be off to be called wrong
 _WRONG_PARAMETER = -math.log(2.0)  # what is left out is likelier than a wrong number
@@ -160,13 +184,49 @@ def catalogue(
     scales: Scales,
     tolerance: float,
     orders: Sequence[float] = (),
+    leaps: Mapping[str, float] = MappingProxyType({}),
+    currents_only: bool = False,
 ) -> tuple[Hypothesis, ...]:
-    """All hypotheses about a robot; `orders` are those of torque ripples that may be there."""
-    return (
+    """All hypotheses about a robot.
+
+    Args:
+        base: its description.
+        wheels: their names.
+        scales: how large effects may be.
+        tolerance: of the description's values.
+        orders: of torque ripples that may be there.
+        leaps: values of the drivers that the wheels' speeds ask for, far from the described ones.
+        currents_only: whether nothing but the motors' currents is measured.
+    """
+    found = (
         *_effects(base, wheels, scales),
         *_ripples(base, wheels, scales, orders),
+        *_slipping(base, wheels, scales),
         *_wrong_parameters(base, wheels, tolerance),
+        *(_leap(base, key, value) for key, value in leaps.items()),
     )
+    if not currents_only:
+        return found
+    hidden = tuple(f"parameter.physics.{effect}." for effect in _ELECTRICAL)
+    return tuple(
+        item
+        for item in found
+        if item.effect not in _ELECTRICAL and not item.effect.startswith(hidden)
+    )
+
+
+def _leap(base: Turned, key: str, value: float) -> Hypothesis:
+    """A value that is another one, not the same a little off; 0 may be either."""
+    before = base.values.get(key, 0.0)
+    assert isinstance(before, int | float)
+    turn = value - before
+    low, high = bounds_of(key)
+    step = _DELAY_STEP if key == "controller.delay" else _STEP * abs(turn)
+    knob = Knob(
+        "value", (key,), unit_of(key), abs(turn), step, low - before, high - before, leap=turn
+    )
+    place = _PARAMETERS.get(key, (0.0, BODY))[1]
+    return Hypothesis(f"parameter.{key}", (place,), (knob,), {}, _WRONG_PARAMETER)
 
 
 def _ripples(
@@ -191,6 +251,23 @@ def _ripples(
                 start |= dict.fromkeys(keys["order"], order)
                 start |= dict.fromkeys(keys["phase"], 0.5 * math.pi * quarter)
                 yield Hypothesis(effect_id, where, knobs, start)
+
+
+def _slipping(base: Turned, wheels: Sequence[str], scales: Scales) -> Iterator[Hypothesis]:
+    """Grips at which some of what the contacts carry is too much; above all of it nothing shows."""
+    effect_id = "contact.slip"
+    if not scales.grips or any(key.startswith(f"physics.{effect_id}.") for key in base.values):
+        return
+    rolls = max(scales.grips)
+    for where in _places(effect_id, wheels):
+        keys = _keys(effect_id, "friction", where, wheels)
+        for number, grip in enumerate(scales.grips[1:]):
+            # Starts differ a little so that hypotheses do; at none of them does a wheel slide.
+            start = rolls * (_ROLLS + 0.001 * number)
+            leap = grip - start
+            low = _LEAST_GRIP - start
+            knob = Knob("friction", keys, "", -leap, -_STEP * grip, low, 0.0, leap=leap)
+            yield Hypothesis(effect_id, where, (knob,), dict.fromkeys(keys, start))
 
 
 def _effects(base: Turned, wheels: Sequence[str], scales: Scales) -> Iterator[Hypothesis]:

@@ -29,6 +29,12 @@ class Knob:
     lower: float = -math.inf  # bounds of the turn x
     upper: float = math.inf
     is_shape: bool = False  # shows only where its effect has a size
+    leap: float = 0.0  # turn to try first, where a small step shows nothing of a large one
+
+    @property
+    def first_step(self) -> float:
+        """Step of the derivative that tells whether it is turned at all."""
+        return self.leap or self.step
 
 
 @frozen

@@ -1,12 +1,18 @@
 """How large an effect may reasonably be on a robot, from what it does in a recording."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.physics.model import PhysicalModel
+from tomr_power_model.response.many import step_of
 from tomr_power_model.robot import GRAVITY, Robot
 
 Array = NDArray[np.float64]
+
+_GRIPS = (1.0, 0.8, 0.64, 0.51, 0.41, 0.33, 0.26)  # of what the contacts carry at most
 
 
 @frozen
@@ -26,20 +32,51 @@ class Scales:
     voltage: float  # V
     duration: float  # s
     period: float  # of the drivers [s]
+    grips: tuple[float, ...] = ()  # traction over load that a contact carries: most, and less
 
 
-def scales_of(robot: Robot, speed: Array, power: Array, copper: Array, duration: float) -> Scales:
-    """Scales from simulated wheel speeds [rad/s], powers and copper losses [W], each (n, 3)."""
+def grips_of(robot: Robot, speed: Array, period: float) -> tuple[float, ...]:
+    """The largest traction over load of any wheel that rolls, and parts of it, falling.
+
+    Args:
+        robot: whose wheels roll.
+        speed: of its wheels in each period [rad/s], (n, 3).
+        period: s.
+    """
+    body = PhysicalModel.of(robot).body
+    twist = speed @ body.to_twist.T
+    change = np.gradient(twist, period, axis=0)
+    force = change @ body.mass_matrix.T + body.turning_force(twist)
+    traction = np.abs(force @ body.from_force.T) / robot.wheel_radius
+    most = float(np.max(traction / body.normal))
+    return tuple(part * most for part in _GRIPS)
+
+
+def scales_of(
+    robot: Robot,
+    speed: Array,
+    power: Array,
+    copper: Array,
+    duration: float,
+    currents: Sequence[Array] = (),
+) -> Scales:
+    """Scales from simulated wheel speeds [rad/s], powers and copper losses [W], each (n, 3).
+
+    Measured `currents` [A] count where they are larger: what is left out may be most of it.
+    """
     motor = robot.motors[0]
+    loss = float(np.mean(copper))
+    if currents:
+        loss = max(loss, motor.resistance * float(np.mean(np.concatenate(currents) ** 2)))
     moving = np.abs(speed) > 0.2
     typical = float(np.sqrt(np.mean(speed[moving] ** 2))) if moving.any() else 1.0
-    current = float(np.sqrt(np.mean(copper) / motor.resistance))
+    current = float(np.sqrt(loss / motor.resistance))
     return Scales(
         torque=max(motor.wheel_constant * current, 1e-3),
         speed=typical,
         current=max(current, 1e-3),
         power=max(float(np.mean(np.abs(power))), 1e-2),
-        copper=max(float(np.mean(copper)), 1e-4),
+        copper=max(loss, 1e-4),
         load=robot.mass * GRAVITY / 3.0,
         radius=robot.wheel_radius,
         arm=robot.robot_radius,
@@ -47,5 +84,5 @@ def scales_of(robot: Robot, speed: Array, power: Array, copper: Array, duration:
         gear=motor.gear_ratio,
         voltage=robot.supply.nominal_voltage,
         duration=duration,
-        period=1.0 / robot.controller.rate,
+        period=step_of(robot),
     )

@@ -1,23 +1,40 @@
 """Measured against simulated, before and after, and what that amounts to."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tomr_power_model.robot import Robot
+from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.explanation import Comparison, Score
 from tomr_reality_gap.fit.noise import rows_of
+from tomr_reality_gap.mismatch.probes import Motion, motion_of
 
 Array = NDArray[np.float64]
 
 
-def comparison(forward: Forward, before: Robot, after: Robot, held_out: bool) -> Comparison:
-    """One recording with the robot as described and as explained."""
-    values = forward.predict([before, after])
-    rows = rows_of(forward.channels)
+def simulated(
+    forward: Forward, before: Robot, after: Robot, besides: Callable[[Motion], Array] | None
+) -> tuple[Array, Mapping[str, Array]]:
+    """Values before and after, (2, n), and the motion of `Forward.run` after.
+
+    `besides` are torques at the wheels that no robot's description holds.
+    """
     run = forward.run(after)
+    values = forward.predict([before, after])
+    if besides is not None:
+        torque = besides(motion_of(forward, after, run))
+        values[1] = forward.respond(after, torque[None])[0]
+    return values, run
+
+
+def comparison(
+    forward: Forward, values: Array, run: Mapping[str, Array], is_held_out: bool
+) -> Comparison:
+    """One recording, simulated before and after, (2, n); `run` is of `forward.run` after."""
+    rows = rows_of(forward.channels)
     line = forward.timeline
     residual = np.concatenate([channel.value for channel in forward.channels]) - values[1]
     sigma = tuple(
@@ -26,7 +43,7 @@ def comparison(forward: Forward, before: Robot, after: Robot, held_out: bool) ->
     )
     return Comparison(
         name=forward.recorded.name,
-        held_out=held_out,
+        held_out=is_held_out,
         channels=forward.channels,
         before=tuple(values[0, part] for part in rows),
         after=tuple(values[1, part] for part in rows),
@@ -37,9 +54,9 @@ def comparison(forward: Forward, before: Robot, after: Robot, held_out: bool) ->
 
 
 def score_of(held: Sequence[Comparison]) -> Score | None:
-    """Pooled over the motors' power of all held-out recordings; of the total without motors."""
+    """Pooled over the motors of all held-out recordings; of the total where none is measured."""
     kinds = {channel.kind for item in held for channel in item.channels}
-    kind = "power" if "power" in kinds else "total"
+    kind = next((kind for kind in DRAWN_KINDS if kind in kinds), None)
     measured, before, after, spread = [], [], [], []
     for item in held:
         for channel, first, last in zip(item.channels, item.before, item.after, strict=True):
@@ -55,4 +72,5 @@ def score_of(held: Sequence[Comparison]) -> Score | None:
     errors = [np.concatenate(part) for part in (before, after)]
     nrmse = [float(np.sqrt(np.mean(error**2)) / deviation) for error in errors]
     accuracy = [float(1.0 - np.abs(error).sum() / total) for error in errors]
-    return Score(nrmse[0], nrmse[1], accuracy[0], accuracy[1])
+    quantity = "motor current [A]" if kind == "current" else "power [W]"
+    return Score(nrmse[0], nrmse[1], accuracy[0], accuracy[1], quantity)

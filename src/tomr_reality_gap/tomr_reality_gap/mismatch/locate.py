@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tomr_reality_gap.alignment.channels import Channel
+from tomr_reality_gap.alignment.channels import DRAWN_KINDS, Channel
 from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.explanation import Located, Map
 from tomr_reality_gap.fit.noise import rows_of
@@ -123,7 +123,7 @@ def maps_of(
     kept = [
         (channel, part)
         for channel, part in zip(channels, rows_of(channels), strict=True)
-        if channel.kind in ("power", "total")
+        if channel.kind in DRAWN_KINDS
     ]
     maps = []
     for name, values in variables.items():

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomr_power_model.calibration.recorded import Recorded
-from tomr_reality_gap.alignment.channels import Channel
+from tomr_reality_gap.alignment.channels import MOTOR_KINDS, Channel
 
 Array = NDArray[np.float64]
 
@@ -19,23 +19,24 @@ _SLOW = 0.3  # s: what is slower than this is no ripple
 def ripple_orders(
     recorded: Recorded, channels: tuple[Channel, ...], residuals: list[Array], speeds: list[Array]
 ) -> tuple[float, ...]:
-    """Orders [1/rev] at which a power residual swings with the angle of its wheel.
+    """Orders [1/rev] at which a residual of power or current swings with the angle of its wheel.
 
     Args:
         recorded: the recording.
         channels: its channels.
-        residuals: of each channel [W].
+        residuals: of each channel [W, A].
         speeds: of the wheel at each of the channel's times [rad/s].
     """
     found: list[float] = []
     for channel, residual, speed in zip(channels, residuals, speeds, strict=True):
-        if channel.kind != "power" or channel.wheel is None or len(channel.time) < _BLOCK:
+        if channel.kind not in MOTOR_KINDS or channel.wheel is None or len(channel.time) < _BLOCK:
             continue
         middle = channel.time - 0.5 * channel.span
         angle = np.interp(middle, recorded.encoder_time, recorded.position[:, channel.wheel])
         if not np.isfinite(angle).all():
             continue
-        power = _spectrum(_fast(channel.time, residual), speed, angle)
+        lever = speed if channel.kind == "power" else np.sign(speed)
+        power = _spectrum(_fast(channel.time, residual), lever, angle)
         usual = float(np.median(power)) / np.log(2.0)
         for _ in range(_MOST):
             best = int(np.argmax(power))
@@ -56,12 +57,12 @@ def _fast(time: Array, values: Array) -> Array:
     return np.asarray(values - np.convolve(values, np.ones(width) / width, mode="same"))
 
 
-def _spectrum(residual: Array, speed: Array, angle: Array) -> Array:
-    """Power of residual ~ speed * sin(order * angle + phase), over all orders."""
+def _spectrum(residual: Array, lever: Array, angle: Array) -> Array:
+    """Power of residual ~ lever * sin(order * angle + phase), over all orders."""
     scale = 1.4826 * float(np.median(np.abs(residual))) + 1e-12
-    weighted = np.clip(residual / scale, -4.0, 4.0) * speed
+    weighted = np.clip(residual / scale, -4.0, 4.0) * lever
     power = np.empty(len(_ORDERS))
     for first in range(0, len(_ORDERS), _BLOCK):
         turn = np.exp(1j * np.outer(_ORDERS[first : first + _BLOCK], angle))
         power[first : first + _BLOCK] = np.abs(turn @ weighted) ** 2
-    return np.asarray(power / max(float(speed @ speed), 1e-12))
+    return np.asarray(power / max(float(lever @ lever), 1e-12))

@@ -1,10 +1,12 @@
 """What an effect without a name depends on: smooth torques of one variable, as columns.
 
 A probe is a torque that resists motion at one wheel, a bump of a variable of the motion. If bumps
-of a variable explain what all named effects together leave, something depends on that variable.
+of a variable explain what all named effects together leave, something depends on that variable;
+and what they amount to can be laid on another drive.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from attrs import frozen
@@ -13,12 +15,80 @@ from numpy.typing import NDArray
 from tomr_power_model.geometry.kinematics import wheels_to_twist
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.stretches import turned_angle
 
 Array = NDArray[np.float64]
 
 _BUMPS = 10
-_HARMONICS = 4
+_LOWEST = (1.0, 2.0, 3.0, 4.0)  # harmonics
+_MOST_HARMONICS = 10
+_ALONE = 0.1  # orders closer than this are one
 _MOVING = 0.1  # rad/s: the sign of slower motion is not sure
+_ACROSS = 3  # bumps along each side of the floor
+_LEAST_FLOOR = 0.2  # m: who goes no farther sees no floor
+PLACE = "place on the floor [m]"
+
+
+@frozen
+class Motion:
+    """A robot's motion in a recording, by driver periods; wheels (n, 3), body (n, 1)."""
+
+    speed: Array  # rad/s
+    sign: Array  # of it, fading at standstill
+    angle: Array  # of the wheels as joint_states count them [rad]
+    load: Array  # root of the motors' copper loss [sqrt W]
+    time: Array  # s
+    direction: Array  # of travel in base_link [rad]
+    heading: Array  # rad
+    x: Array  # m, from dead reckoning
+    y: Array
+
+
+def motion_of(forward: Forward, robot: Robot, run: Mapping[str, Array]) -> Motion:
+    """The motion that a robot makes in a recording; `run` is of `forward.run(robot)`."""
+    speed, line = run["speed"], forward.timeline
+    twist = speed @ wheels_to_twist(robot).T
+    heading = np.cumsum(run["yaw_rate"]) * line.period
+    cos, sin = np.cos(heading), np.sin(heading)
+    time = line.start + line.period * (np.arange(line.count) + 0.5)
+    # As measured: simulated speeds would add up to another angle after a hundred turns.
+    angle = np.stack(
+        [
+            np.interp(time, forward.recorded.encoder_time, turned_angle(forward.recorded, wheel))
+            for wheel in range(speed.shape[1])
+        ],
+        axis=1,
+    )
+    return Motion(
+        speed=speed,
+        sign=np.tanh(speed / _MOVING),
+        angle=angle,
+        load=np.sqrt(run["copper"]),
+        time=np.asarray(time)[:, None],
+        direction=np.arctan2(twist[:, 1], twist[:, 0])[:, None],
+        heading=heading[:, None],
+        x=(np.cumsum(cos * twist[:, 0] - sin * twist[:, 1]) * line.period)[:, None],
+        y=(np.cumsum(sin * twist[:, 0] + cos * twist[:, 1]) * line.period)[:, None],
+    )
+
+
+Variable = Callable[[Motion], tuple[Array, Array]]  # its values, and the sign of the torque
+
+_SMOOTH: Mapping[str, Variable] = MappingProxyType(
+    {
+        "wheel speed [rad/s]": lambda m: (np.abs(m.speed), m.sign),
+        "signed wheel speed [rad/s]": lambda m: (m.speed, np.abs(m.sign)),
+        "time [s]": lambda m: (m.time, m.sign),
+        "load current [sqrt W]": lambda m: (m.load, m.sign),
+    }
+)
+_PERIODIC: Mapping[str, Variable] = MappingProxyType(
+    {
+        "wheel angle [rad]": lambda m: (m.angle, np.ones_like(m.sign)),
+        "direction of travel [rad]": lambda m: (m.direction, m.sign),
+        "heading [rad]": lambda m: (m.heading, m.sign),
+    }
+)
 
 
 @frozen
@@ -26,84 +96,77 @@ class Family:
     """Torques that depend on one variable."""
 
     variable: str  # with its unit
-    knots: Array  # where the bumps have their tops, (k,)
-    torque: Array  # per unit of size, of each bump, wheel and driver period, (k, count, 3)
+    knots: Array  # tops of the bumps, orders of a cosine and a sine each, or x of places, (k,)
+    across: Array  # y of places, (k,); else empty
+    width: tuple[float, float]  # of the bumps, in x and y of places
+
+    @property
+    def is_periodic(self) -> bool:
+        return self.variable in _PERIODIC
+
+    def at(self, values: Array) -> Array:
+        """Each bump or wave at values of the variable, (k, ...)."""
+        wide = self.knots.reshape(-1, *(1 for _ in values.shape))
+        if self.is_periodic:
+            shift = np.where(np.arange(len(self.knots)) % 2 == 0, 0.0, 0.5 * np.pi)
+            return np.asarray(np.cos(wide * values - shift.reshape(wide.shape)))
+        return np.asarray(np.exp(-0.5 * ((values - wide) / self.width[0]) ** 2))
+
+    def torques(self, motion: Motion) -> Array:
+        """Per unit of size, of each bump, driver period and wheel, (k, n, 3)."""
+        if self.variable == PLACE:
+            along = self.at(motion.x)
+            side = (motion.y - self.across[:, None, None]) / self.width[1]
+            return np.asarray(along * np.exp(-0.5 * side**2) * motion.sign)
+        values, sign = {**_SMOOTH, **_PERIODIC}[self.variable](motion)
+        return np.asarray(self.at(values) * sign)
 
 
-def families(forward: Forward, robot: Robot, run: Mapping[str, Array]) -> tuple[Family, ...]:
-    """All families, over the motion that a robot makes in a recording.
+def families(motions: Sequence[Motion], orders: Sequence[float] = ()) -> tuple[Family, ...]:
+    """All families over the motions of one robot.
 
     Args:
-        forward: the recording.
-        robot: its description.
-        run: of `forward.run(robot)`.
+        motions: in its recordings.
+        orders: of wheel angles at which power was seen to swing [1/rev].
     """
-    speed = run["speed"]
-    line = forward.timeline
-    time = line.start + line.period * (np.arange(line.count) + 0.5)
-    sign = np.tanh(speed / _MOVING)
-    twist = speed @ wheels_to_twist(robot).T
-    heading = np.cumsum(run["yaw_rate"]) * line.period
-    direction = np.arctan2(twist[:, 1], twist[:, 0])
-    angle = np.cumsum(speed, axis=0) * line.period
-    start = np.array(
-        [
-            np.interp(0.0, forward.recorded.encoder_time, column)
-            for column in forward.recorded.position.T
-        ]
-    )
-    angle = angle + np.where(np.isfinite(start), start, 0.0)
-    current = np.sqrt(run["copper"])
-    wide = np.broadcast_to
-    shape = speed.shape
-    return (
-        _bumps("wheel speed [rad/s]", np.abs(speed), sign),
-        _bumps("signed wheel speed [rad/s]", speed, np.abs(sign)),
-        _turns("wheel angle [rad]", angle, np.ones(shape)),
-        _bumps("time [s]", wide(time[:, None], shape), sign),
-        _bumps("load current [sqrt W]", current, sign),
-        _turns("direction of travel [rad]", wide(direction[:, None], shape), sign),
-        _turns("heading [rad]", wide(heading[:, None], shape), sign),
-        *_places(twist, heading, line.period, sign),
-    )
+    none = np.empty(0)
+    found = []
+    for name, variable in _SMOOTH.items():
+        parts = [variable(motion) for motion in motions]
+        shape = [np.broadcast_shapes(values.shape, sign.shape) for values, sign in parts]
+        values = np.concatenate(
+            [np.broadcast_to(v, s).ravel() for (v, _), s in zip(parts, shape, strict=True)]
+        )
+        moves = np.abs(np.concatenate([sign.ravel() for _, sign in parts])) > 0.5
+        knots = _between(values[moves] if moves.any() else values, 0.01, 0.99, _BUMPS)
+        found.append(Family(name, knots, none, (_apart(knots), 1.0)))
+    for name in _PERIODIC:
+        chosen = _harmonics(orders) if name.startswith("wheel angle") else _LOWEST
+        found.append(Family(name, np.repeat(np.array(chosen), 2), none, (1.0, 1.0)))
+    return (*found, *_places(motions))
 
 
-def _bumps(variable: str, values: Array, factor: Array) -> Family:
-    """Gaussian bumps at quantiles of a variable."""
-    usual = np.abs(factor) > 0.5
-    inside = values[usual] if usual.any() else values.ravel()
-    knots = _between(inside, 0.01, 0.99, _BUMPS)
-    width = max(float(knots[1] - knots[0]), 1e-9)
-    torque = [np.exp(-0.5 * ((values - knot) / width) ** 2) * factor for knot in knots]
-    return Family(variable, knots, np.stack(torque))
+def _harmonics(orders: Sequence[float]) -> tuple[float, ...]:
+    """The lowest, and those that were seen with twice as many; none twice."""
+    found = list(_LOWEST)
+    for order in (times * order for order in orders for times in (1.0, 2.0)):
+        if len(found) < _MOST_HARMONICS and min(abs(order - one) for one in found) > _ALONE:
+            found.append(order)
+    return tuple(found)
 
 
-def _turns(variable: str, angle: Array, factor: Array) -> Family:
-    """Harmonics of an angle; the constant is left to friction."""
-    torque = [
-        wave(order * angle) * factor
-        for order in range(1, _HARMONICS + 1)
-        for wave in (np.cos, np.sin)
-    ]
-    return Family(variable, np.repeat(np.arange(1.0, _HARMONICS + 1.0), 2), np.stack(torque))
-
-
-def _places(twist: Array, heading: Array, period: float, sign: Array) -> tuple[Family, ...]:
-    """Bumps over the floor, three by three, from dead reckoning."""
-    cos, sin = np.cos(heading), np.sin(heading)
-    x = np.cumsum(cos * twist[:, 0] - sin * twist[:, 1]) * period
-    y = np.cumsum(sin * twist[:, 0] + cos * twist[:, 1]) * period
-    if min(np.ptp(x), np.ptp(y)) < 0.2:  # m: it hardly goes anywhere
+def _places(motions: Sequence[Motion]) -> tuple[Family, ...]:
+    """Bumps over the floor, three by three; none for who hardly goes anywhere."""
+    x, y = (np.concatenate([getattr(m, name)[:, 0] for m in motions]) for name in "xy")
+    if min(np.ptp(x), np.ptp(y)) < _LEAST_FLOOR:
         return ()
-    rows = _between(x, 0.1, 0.9, 3)
-    columns = _between(y, 0.1, 0.9, 3)
-    wide, high = max(np.ptp(rows) / 2.0, 1e-3), max(np.ptp(columns) / 2.0, 1e-3)
-    torque = [
-        np.exp(-0.5 * (((x - row) / wide) ** 2 + ((y - column) / high) ** 2))[:, None] * sign
-        for row in rows
-        for column in columns
-    ]
-    return (Family("place on the floor [m]", np.arange(9.0), np.stack(torque)),)
+    rows, columns = _between(x, 0.1, 0.9, _ACROSS), _between(y, 0.1, 0.9, _ACROSS)
+    width = _apart(rows), _apart(columns)
+    return (Family(PLACE, np.repeat(rows, _ACROSS), np.tile(columns, _ACROSS), width),)
+
+
+def _apart(knots: Array) -> float:
+    return max(float(knots[1] - knots[0]), 1e-9)
 
 
 def _between(values: Array, low: float, high: float, count: int) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.explanation import Comparison, Explanation, Map, Shape
 from tomr_reality_gap.report.canvas import (
     AFTER,
@@ -19,7 +20,7 @@ from tomr_reality_gap.report.canvas import (
     sheet,
     smooth,
 )
-from tomr_reality_gap.report.showing import POWER_KINDS, View, leading
+from tomr_reality_gap.report.showing import View, leading
 from tomr_reality_gap.report.words import channel_name
 
 Array = NDArray[np.float64]
@@ -124,7 +125,7 @@ def _difference(panel: Axes, view: View, found: bool) -> None:
 
 def over_time(comparison: Comparison, found: bool) -> str:
     """All power channels of a recording with their residuals; without any all channels."""
-    numbers = [n for n, item in enumerate(comparison.channels) if item.kind in POWER_KINDS]
+    numbers = [n for n, item in enumerate(comparison.channels) if item.kind in DRAWN_KINDS]
     numbers = numbers or list(range(len(comparison.channels)))
     with sheet(2 * len(numbers), 1, 1.1, heights=(1.3, 0.7) * len(numbers)) as (page, panels):
         for row, number in enumerate(numbers):

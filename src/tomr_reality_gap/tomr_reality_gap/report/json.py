@@ -96,6 +96,7 @@ def _score(score: Score | None) -> Mapping[str, Value] | None:
         "nrmse_after": _number(score.nrmse_after),
         "accuracy_before": _number(score.accuracy_before),
         "accuracy_after": _number(score.accuracy_after),
+        "quantity": score.quantity,
     }
 
 

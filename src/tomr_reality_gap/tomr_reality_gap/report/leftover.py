@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.explanation import Comparison
 from tomr_reality_gap.report.canvas import AFTER, BEFORE, MEASURED, png, sheet
-from tomr_reality_gap.report.showing import POWER_KINDS
 from tomr_reality_gap.report.words import channel_name
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ _WHITE = 0.2  # shown of the autocorrelation at least, so that none looks like n
 def shown_names(comparisons: Sequence[Comparison]) -> list[str]:
     """Channels to show: the powers, and without any all."""
     channels = {channel_name(item): item.kind for one in comparisons for item in one.channels}
-    powers = [name for name, kind in channels.items() if kind in POWER_KINDS]
+    powers = [name for name, kind in channels.items() if kind in DRAWN_KINDS]
     return powers or list(channels)
 
 

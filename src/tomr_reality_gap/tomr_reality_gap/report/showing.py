@@ -6,12 +6,12 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.explanation import Comparison, Explanation, Finding
 from tomr_reality_gap.report.words import channel_name
 
 Array = NDArray[np.float64]
 
-POWER_KINDS = ("power", "total")
 _PART = 0.06  # of the recording
 _WINDOW = (4.0, 12.0)  # s
 _MARGIN = 0.25  # of the window, shown on either side
@@ -72,7 +72,7 @@ def _channel(comparison: Comparison, finding: Finding | None, gains: Sequence[Ar
         if max(shares) > 0.0:
             return int(np.argmax(shares))
     kinds = [channel.kind for channel in comparison.channels]
-    powers = [n for n, kind in enumerate(kinds) if kind in POWER_KINDS] or list(range(len(kinds)))
+    powers = [n for n, kind in enumerate(kinds) if kind in DRAWN_KINDS] or list(range(len(kinds)))
     return max(powers, key=lambda number: float(gains[number].sum()))
 
 

@@ -24,7 +24,7 @@ def print_explanation(explanation: Explanation) -> None:
     if explanation.score is not None and explanation.findings:
         score = explanation.score
         console.print(
-            f"held-out NRMSE {number_words(score.nrmse_before)} -> "
+            f"held-out NRMSE of {score.quantity} {number_words(score.nrmse_before)} -> "
             f"{number_words(score.nrmse_after)}, accuracy {100 * score.accuracy_before:.1f} % -> "
             f"{100 * score.accuracy_after:.1f} %; "
             f"{percent_words(explanation.unexplained_share)} of the mismatch unexplained"

@@ -63,6 +63,10 @@ class Effect:
         """Sliding of the contact in the direction of rolling, per rolling speed [-]."""
         return 0.0
 
+    def grip(self) -> Array | float:
+        """Friction of the contacts: a wheel slides where it would take more [-]."""
+        return np.inf
+
     def driver_power(self, current: Array) -> Array | float:
         """Power lost in the driver on top of the motor's [W], from motor current [A]."""
         return 0.0
@@ -121,6 +125,7 @@ _HOOKS = (
     "reported",
     "lag",
     "delayed",
+    "grip",
 )
 
 
@@ -157,8 +162,10 @@ def effects_of(robot: Robot) -> tuple[Effect, ...]:
     return tuple(_make(effect_id, robot) for effect_id in robot.physics)
 
 
+GRIPS = 1e3  # friction of a contact that never slides
+
 # Parameters whose neutral value is not zero: a speed divides, an efficiency or a scale multiplies.
-_NEUTRAL = {"speed": 1.0, "efficiency": 1.0, "scale": 1.0, "time_constant": 0.0}
+_NEUTRAL = {"speed": 1.0, "efficiency": 1.0, "scale": 1.0, "time_constant": 0.0, "friction": GRIPS}
 
 
 def _make(effect_id: str, robot: Robot) -> Effect:

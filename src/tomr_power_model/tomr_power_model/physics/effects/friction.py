@@ -122,6 +122,23 @@ class RollerDrag(Effect):
         return self.slip
 
 
+@effect("contact.slip")
+@frozen
+class Slip(Effect):
+    """Traction of a wheel limited to friction * N_i.
+
+    Only the simulation of the closed loop slides: what is told from the wheels' motion alone
+    takes them for rolling.
+    """
+
+    needs_load: ClassVar[bool] = True
+
+    friction: Array
+
+    def grip(self) -> Array:
+        return self.friction
+
+
 @effect("electrical.iron_loss")
 @frozen
 class IronLoss(Effect):

@@ -1,0 +1,74 @@
+"""Recordings of different robots in one list: told by parameters that cannot change in between."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tomr_power_model.errors import InputError
+from tomr_reality_gap.fit.alike import refuse_strangers
+from tomr_reality_gap.hypotheses.knobs import Knob
+
+KEYS = ("robot.mass", "motor.wheel_1_joint.torque_constant", "physics.friction.coulomb.torque")
+VALUES = {KEYS[0]: 15.0, KEYS[1]: 0.035, KEYS[2]: 0.06}
+ROWS = 400
+
+
+def _made(
+    *off: tuple[float, float, float], noise: float = 0.1, duration: float = 60.0
+) -> tuple[object, object]:
+    """A study whose recordings' robots are off by such shares of mass, constant and friction."""
+    random = np.random.default_rng(2)
+    knobs = tuple(Knob(key, (key,), "", 0.01 * VALUES[key], 1.0) for key in KEYS)
+    matrix = random.standard_normal((ROWS * len(off), 4))  # spreads, and one instrument
+    turns = np.repeat([[part / 0.01 for part in parts] for parts in off], ROWS, axis=0)
+    value = (matrix[:, :3] * turns).sum(axis=1) + noise * random.standard_normal(len(matrix))
+    channel = SimpleNamespace(time=np.zeros(ROWS))
+    forwards = tuple(
+        SimpleNamespace(
+            channels=(channel,), recorded=SimpleNamespace(name=f"tour{number}", duration=duration)
+        )
+        for number in range(len(off))
+    )
+    model = SimpleNamespace(nuisances=knobs, described=SimpleNamespace(values=VALUES))
+    columns = SimpleNamespace(
+        matrix=matrix,
+        nuisance=slice(0, 3),
+        instruments=slice(3, 4),
+        own=(),
+        value=np.zeros(len(matrix)),
+        model=model,
+    )
+    weight = np.full(len(matrix), 1.0 / noise)
+    last = SimpleNamespace(columns=columns, noise=SimpleNamespace(weight=weight))
+    return SimpleNamespace(forwards=forwards, value=value), last
+
+
+def test_recordings_of_one_robot_go_together() -> None:
+    """Off by five times the tolerance, but all of them alike."""
+    refuse_strangers(*_made((0.1, 0.0, 0.3), (0.1, 0.0, 0.3), (0.11, 0.0, 0.3)))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        ((0.3, 0.0, 0.0), r"tour0 and tour2: .* values of robot\.mass that lie 30 % apart"),
+        ((0.0, -0.2, 0.0), r"motor\.wheel_1_joint\.torque_constant that lie 20 % apart"),
+    ],
+)
+def test_another_robot_among_them_is_refused(other: tuple[float, float, float], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        refuse_strangers(*_made((0.0, 0.0, 0.0), (0.01, 0.0, 0.0), other))  # type: ignore[arg-type]
+
+
+def test_another_floor_is_no_other_robot() -> None:
+    refuse_strangers(*_made((0.0, 0.0, 0.0), (0.0, 0.0, 0.5)))  # type: ignore[arg-type]
+
+
+def test_what_a_recording_hardly_tells_is_not_held_against_it() -> None:
+    refuse_strangers(*_made((0.0, 0.0, 0.0), (0.3, 0.0, 0.0), noise=200.0))  # type: ignore[arg-type]
+
+
+def test_short_drives_tell_the_floor_under_them() -> None:
+    """One straight each, in directions of their own."""
+    refuse_strangers(*_made((0.0, 0.0, 0.0), (0.3, 0.0, 0.0), duration=18.0))  # type: ignore[arg-type]

@@ -1,0 +1,188 @@
+"""Robots that tell the currents of their motors and nothing of power; drivers of another kind."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.robot import Robot, shipped_robot
+from tomr_reality_gap.alignment.channels import channels_of
+from tomr_reality_gap.alignment.forward import Forward, predict_all
+from tomr_reality_gap.alignment.response import leaps_of
+from tomr_reality_gap.explain import explain
+from tomr_reality_gap.explanation import Explanation
+from tomr_reality_gap.fit.noise import rows_of
+from tomr_reality_gap.request import Request
+from tomr_sim_bridge.importers.dataset import choose, default_dataset, import_files, open_dataset
+from tomr_sim_bridge.importers.robotino import Drive, Run, write_run
+
+QUANTUM = 1.0 / 39.0  # A
+START_NS = 1_672_531_200_000_000_000
+
+
+def _recorded(robot: Robot, command: np.ndarray, time: np.ndarray) -> Recorded:
+    """A recording of commands, all else blank."""
+    blank = np.zeros((len(time), 3))
+    return Recorded(
+        name="made",
+        encoder_time=time,
+        position=np.full((len(time), 3), np.nan),
+        velocity=blank,
+        power_time=time,
+        power=blank,
+        reading=blank,
+        total_time=np.empty(0),
+        total=np.empty(0),
+        command_time=time,
+        command=command,
+        voltage=np.full((len(time), 3), np.nan),
+        total_voltage=np.empty(0),
+        yaw_time=np.empty(0),
+        yaw_rate=np.empty(0),
+    )
+
+
+def _forward(robot: Robot, command: np.ndarray) -> Forward:
+    recorded = _recorded(robot, command, 0.0312 * np.arange(len(command)))
+    return Forward.of(recorded, robot, channels_of(recorded, robot, 0.005))
+
+
+def _to_and_fro(heading: float, speed: float, seconds: float = 13.0) -> np.ndarray:
+    """Straight there and back, three seconds each, from rest."""
+    time = 0.0312 * np.arange(int(seconds / 0.0312))
+    along = speed * np.where(time // 3.0 % 2 == 0, 1.0, -1.0)
+    return np.stack([along * np.cos(heading), along * np.sin(heading), 0.0 * time], axis=1)
+
+
+@pytest.fixture
+def robotino() -> Robot:
+    return shipped_robot("robotino_v2")
+
+
+def test_the_current_of_a_steady_spin_is_that_of_its_friction(robotino: Robot) -> None:
+    """Wheels told 2.5 rad/s: k_p (2.5 - w) = R i + k w and k i = c + b w; |i| either way round."""
+    motor, gain = robotino.motors[0], robotino.controller.proportional
+    k = motor.torque_constant * motor.gear_ratio
+    coulomb, viscous = 0.1300992, 0.006063360
+    speed = (k * gain * 2.5 / motor.resistance - coulomb) / (
+        k * (gain + k) / motor.resistance + viscous
+    )
+    for turn in (-0.8, 0.8):  # rad/s: wheels turn by R / r as fast, against it
+        forward = _forward(robotino, np.tile([0.0, 0.0, turn], (100, 1)))
+        value = forward.predict([robotino])[0]
+        for channel, part in zip(forward.channels, rows_of(forward.channels), strict=True):
+            if channel.kind == "current":
+                assert (channel.unit, channel.quantum) == ("A", pytest.approx(QUANTUM))
+                assert value[part][-1] == pytest.approx((coulomb + viscous * speed) / k, rel=2e-3)
+            else:
+                assert abs(value[part][-1]) == pytest.approx(speed, rel=2e-3)
+        kinds = [channel.kind for channel in forward.channels]
+        assert kinds == ["current"] * 3 + ["speed"] * 3
+
+
+def test_short_recordings_side_by_side_are_each_by_itself(robotino: Robot) -> None:
+    forwards = [
+        _forward(robotino, _to_and_fro(0.3, 0.2)),
+        _forward(robotino, _to_and_fro(1.9, 0.3, 7.0)),
+    ]
+    robots = [robotino, evolve(robotino, mass=1.2 * robotino.mass)]
+    together = predict_all(forwards, robots)
+    alone = np.concatenate([item.predict(robots) for item in forwards], axis=1)
+    np.testing.assert_allclose(together, alone, atol=1e-9)
+
+
+def test_a_later_robot_is_the_same_robot_later(robotino: Robot) -> None:
+    forward = _forward(robotino, _to_and_fro(0.3, 0.2))
+    controller = evolve(robotino.controller, delay=robotino.controller.delay + 0.0234)
+    value = forward.predict([evolve(robotino, controller=controller)])[0]
+    np.testing.assert_allclose(value, forward.predict([robotino], later=[0.0234])[1], atol=0.05)
+
+
+@pytest.mark.parametrize("integral", [0.0, 157.0])
+def test_delay_and_loop_are_seen_in_wheel_speeds(robotino: Robot, integral: float) -> None:
+    """A loop without an integral stays behind what it is told; one with it does not."""
+    forward = _forward(robotino, _to_and_fro(0.3, 0.2))
+    controller = evolve(robotino.controller, delay=0.1, integral=integral)
+    value = forward.predict([evolve(robotino, controller=controller)])[0]
+    value = value + 0.05 * np.random.default_rng(1).standard_normal(len(value))
+    channels = tuple(
+        evolve(channel, value=value[part])
+        for channel, part in zip(forward.channels, rows_of(forward.channels), strict=True)
+    )
+    right = Forward.of(forward.recorded, evolve(robotino, controller=controller), channels)
+    assert leaps_of([right], right.robot) == {}
+    other = evolve(robotino.controller, delay=0.0, integral=157.0 - integral)
+    wrong = Forward.of(forward.recorded, evolve(robotino, controller=other), channels)
+    found = leaps_of([wrong], wrong.robot)
+    assert found["controller.integral"] == pytest.approx(integral)
+    assert found["controller.delay"] == pytest.approx(0.1, abs=0.02)
+
+
+def _written(path: Path, robot: Robot, command: np.ndarray, seed: int) -> Path:
+    """What a robot's encoders and current sensors tell, with their quanta and noise."""
+    random = np.random.default_rng(seed)
+    time = 0.0312 * np.arange(len(command))
+    recorded = _recorded(robot, command, time)
+    recorded = evolve(recorded, velocity=command @ twist_to_wheels(robot).T)
+    forward = Forward.of(recorded, robot, channels_of(recorded, robot, 0.005))
+    run, line = forward.run(robot), forward.timeline
+    middle = line.start + line.period * (np.arange(line.count) + 0.5)
+    speed = np.stack([np.interp(time, middle, column) for column in run["speed"].T], axis=1)
+    loss = np.stack([np.interp(time, middle, column) for column in run["copper"].T], axis=1)
+    current = np.sqrt(loss / robot.motors[0].resistance) + random.normal(0.0, 0.05, loss.shape)
+    told = speed + random.normal(0.0, 0.1, speed.shape)
+    stamps = tuple(START_NS + int(1e9 * stamp) for stamp in time)
+    rounded = np.abs(np.round(current / QUANTUM)) * QUANTUM
+    angle = np.cumsum(speed, axis=0) * 0.0312
+    drive = Drive(command, np.zeros_like(command), np.zeros_like(command))
+    write_run(Run(stamps, angle, told, np.zeros_like(told), rounded, drive), path, "mcap")
+    return path
+
+
+def _names(found: Explanation) -> set[str]:
+    return {f"{item.effect} at {', '.join(item.where)}" for item in found.findings}
+
+
+def test_a_concealed_friction_and_a_late_command_are_named(tmp_path: Path, robotino: Robot) -> None:
+    concealed = (None, {"torque": 0.08}, None)
+    real = evolve(
+        robotino,
+        physics={**robotino.physics, "friction.asymmetric": concealed},
+        controller=evolve(robotino.controller, delay=0.303),
+    )
+    paths = tuple(
+        _written(tmp_path / f"drive{number}", real, _to_and_fro(heading, speed), number)
+        for number, (heading, speed) in enumerate(((0.3, 0.1), (1.9, 0.2)))
+    )
+    found = explain(Request("robotino_v2", paths[:1], holdout=paths[1:]))
+    assert _names(found) == {
+        "friction.asymmetric at wheel_2_joint",
+        "parameter.controller.delay at body",
+    }
+    values = {item.effect: item.parameters for item in found.findings}
+    assert values["friction.asymmetric"]["torque"].value == pytest.approx(0.08, rel=0.1)
+    assert values["parameter.controller.delay"]["value"].value == pytest.approx(0.303, abs=5e-3)
+    assert found.score is not None
+    assert found.score.quantity == "motor current [A]"
+    assert found.score.nrmse_after < 0.5 * found.score.nrmse_before
+
+
+def test_the_rollers_of_the_real_robot_drag_on_its_floor(tmp_path: Path) -> None:
+    """Wheels that turned freely on the bench: the floor adds most of the current."""
+    dataset = default_dataset()
+    if not dataset.exists():
+        pytest.skip(f"{dataset} is absent: set TOMR_RECORDINGS")
+    names = ("gray/exp07", "gray/exp19", "gray/exp34", "gray/exp154")  # 35, 95, 170 degrees; 50
+    with open_dataset(dataset) as files:
+        chosen = [item for item in choose(files, ("gray",)) if item.bag in names]
+        import_files(chosen, tmp_path, "mcap", pytest.fail)
+    *real, held = (tmp_path / name for name in names)
+    found = explain(Request("robotino_v2", tuple(real), holdout=(held,)))
+    best = max(found.findings, key=lambda item: item.located.share)
+    assert (best.effect, best.where) == ("contact.roller_drag", ("all_wheels",))
+    assert found.score is not None
+    assert found.score.accuracy_before < 0.3
+    assert found.score.accuracy_after > 0.7

@@ -1,0 +1,126 @@
+"""robot_explained.yaml: what was found, as the nodes and the simulator take it."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tomr_power_model.errors import InputError
+from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.model.predictor import PowerPredictor
+from tomr_power_model.robot import Robot, load_robot, read_description
+from tomr_power_model.robot.vocabulary import EFFECTS
+from tomr_reality_gap.fit.study import Model
+from tomr_reality_gap.hypotheses.knobs import Turned, turned
+from tomr_reality_gap.verdict import _described
+from tomr_sim_bridge.plant.simulation import Simulation
+
+WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
+FOUND: Mapping[str, Mapping[str, float]] = {
+    "friction.coulomb": {"torque": 0.09},
+    "friction.viscous": {"coefficient": 0.006},
+    "friction.stribeck": {"torque": 0.04, "speed": 1.5},
+    "friction.asymmetric": {"torque": -0.02},
+    "friction.load_dependent": {"coefficient": 0.05},
+    "friction.quadratic": {"coefficient": 5e-4},
+    "drivetrain.torque_ripple": {"torque": 0.03, "order": 6.0, "phase": 0.4},
+    "contact.roller_drag": {"coefficient": 0.01},
+    "contact.rolling_resistance": {"coefficient": 0.01},
+    "contact.slip": {"friction": 0.4},
+    "body.payload_mass": {"mass": 2.0},
+    "body.mass_center_offset": {"x": 0.01, "y": -0.02},
+    "body.slope": {"angle": 0.01, "azimuth": 0.7},
+    "electrical.winding_heating": {
+        "thermal_resistance": 4.0,
+        "time_constant": 60.0,
+        "initial": 30.0,
+    },
+    "electrical.supply_sag": {"resistance": 0.1},
+    "electrical.driver_standby": {"power": 1.5},
+    "electrical.switching_loss": {"coefficient": 0.3},
+    "electrical.regeneration_loss": {"efficiency": 0.5},
+    "electrical.iron_loss": {"hysteresis": 5e-4, "eddy": 2e-6},
+    "kinematic.wheel_radius": {"scale": 1.01},
+    "sensor.power_scale": {"scale": 1.05},
+    "sensor.power_bias": {"power": 0.4},
+    "sensor.power_lag": {"time_constant": 0.05},
+    "sensor.clock_offset": {"delay": 0.02},
+}
+MODELLED = [effect for effect in FOUND if effect != "contact.slip"]
+
+
+def explained(folder: Path, effects: Mapping[str, Mapping[str, float]], wheels: int = 3) -> Robot:
+    """The reference robot with effects at its first wheels, through robot_explained.yaml."""
+    base = turned(dict(read_description("reference")), WHEELS, "reference")
+    values = dict(base.values)
+    for effect, numbers in effects.items():
+        for key, number in numbers.items():
+            if EFFECTS[effect].place == "wheel":
+                names = WHEELS[:wheels]
+                values |= {f"physics.{effect}.{wheel}.{key}": number for wheel in names}
+            else:
+                values[f"physics.{effect}.{key}"] = number
+    evidence = SimpleNamespace(
+        robot=SimpleNamespace(wheel_names=WHEELS),
+        source="reference",
+        study=SimpleNamespace(forwards=()),
+    )
+    path = folder / "robot_explained.yaml"
+    path.write_text(_described(evidence, Model(Turned(values, "made"), (), ())), encoding="utf-8")
+    return load_robot(path)
+
+
+def predicted(robot: Robot, twist: tuple[float, float, float], until: float) -> np.ndarray:
+    """Powers of the motors as the nodes' core expects them in the last half second [W]."""
+    predictor = PowerPredictor(robot)
+    speed, found = twist_to_wheels(robot) @ twist, []
+    for step in range(round(100.0 * until)):
+        stamp = 10**15 + step * 10_000_000
+        predictor.command(stamp, twist)
+        predictor.encoders(stamp, tuple(speed * 0.01 * step), tuple(speed))
+        found += [[motor.power for motor in item.motors] for item in predictor.due()]
+    return np.array(found[-10:]).mean(axis=0)
+
+
+def simulated(robot: Robot, twist: tuple[float, float, float], until: float) -> np.ndarray:
+    """The same, measured in the simulator."""
+    simulation = Simulation(robot, seed=1)
+    simulation.command(*twist)
+    found: dict[str, list[float]] = {topic: [] for topic in robot.wheel_topics}
+    for sample in simulation.step_to(round(until * 1e9)):
+        wheel = sample.topic.removesuffix("/power")
+        if wheel in found and sample.stamp_ns > (until - 0.5) * 1e9:
+            fields = sample.message.fields
+            found[wheel].append(-fields["voltage"] * fields["current"])
+    return np.array([np.mean(values) for values in found.values()])
+
+
+def test_every_effect_of_the_vocabulary_is_tried_here() -> None:
+    assert set(FOUND) == set(EFFECTS)
+
+
+@pytest.mark.parametrize("effect", MODELLED)
+def test_nodes_and_simulator_load_it_as_it_is(effect: str, tmp_path: Path) -> None:
+    """At one wheel only, which needs neutral values for the others."""
+    robot = explained(tmp_path, {effect: FOUND[effect]}, wheels=1)
+    assert robot.everywhere(effect, next(iter(FOUND[effect])))[0] != 0.0
+    assert np.isfinite(predicted(robot, (0.2, 0.0, 0.0), 0.6)).all()
+    assert np.isfinite(simulated(robot, (0.2, 0.0, 0.0), 0.2 + 0.5)).all()
+
+
+def test_all_effects_at_once_cost_the_same_in_nodes_and_simulator(tmp_path: Path) -> None:
+    robot = explained(tmp_path, {effect: FOUND[effect] for effect in MODELLED})
+    twist = (0.0, 0.3, 0.3)
+    expected = predicted(robot, twist, 3.0)
+    before = predicted(load_robot("reference"), twist, 3.0)
+    np.testing.assert_allclose(simulated(robot, twist, 3.0), expected, rtol=0.06)
+    assert expected.sum() > 1.5 * before.sum()
+
+
+def test_what_one_of_them_cannot_do_is_said_in_one_line(tmp_path: Path) -> None:
+    early = explained(tmp_path, {"sensor.clock_offset": {"delay": -0.02}})
+    assert np.isfinite(predicted(early, (0.2, 0.0, 0.0), 0.6)).all()
+    with pytest.raises(InputError, match=r"sensor\.clock_offset: delay = -0\.02 s"):
+        Simulation(early)

@@ -1,0 +1,74 @@
+"""What smooth torques of one variable would show: columns for effects that have no name."""
+
+from collections.abc import Collection, Sequence
+from itertools import pairwise
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_power_model.robot import WHEELS, Robot
+from tomr_reality_gap.alignment.channels import MOTOR_KINDS
+from tomr_reality_gap.fit.noise import Local, rows_of
+from tomr_reality_gap.fit.study import Study
+from tomr_reality_gap.mismatch.probes import Family, families, motion_of
+
+Array = NDArray[np.float64]
+
+_SIZE = 0.1  # of a typical torque, belief about each bump
+
+
+@frozen
+class Probed:
+    """Families of torques and what they do to every channel."""
+
+    families: tuple[Family, ...]
+    responses: tuple[Array, ...]  # of each family, all wheels resisting at once, (n, k)
+    size: float  # N m of each bump
+    rows: tuple[NDArray[np.intp], ...]  # of each wheel's own channels; the total's without any
+
+    @property
+    def local(self) -> list[Local]:
+        """All families' responses, each wheel by itself."""
+        joined = np.concatenate(self.responses, axis=1)
+        wheels = self.rows if len({tuple(rows[:1]) for rows in self.rows}) > 1 else self.rows[:1]
+        return [Local(rows, joined[rows]) for rows in wheels]
+
+
+def probed(
+    study: Study,
+    robot: Robot,
+    torque: float,
+    orders: Sequence[float] = (),
+    only: Collection[str] | None = None,
+) -> Probed:
+    """Simulate families of torques on a robot.
+
+    Args:
+        study: its recordings.
+        robot: as described.
+        torque: typical of it [N m].
+        orders: at which its power swings with wheel angles [1/rev].
+        only: names of variables; None: all.
+    """
+    motions = [motion_of(item, robot, item.run(robot)) for item in study.forwards]
+    tried = tuple(
+        family for family in families(motions, orders) if only is None or family.variable in only
+    )
+    size = _SIZE * torque
+    torques = [np.concatenate([item.torques(one) for item in tried]) * size for one in motions]
+    response = study.respond(robot, torques) - study.predict([robot])[0]
+    edges = np.cumsum([0, *(len(item.knots) for item in tried)])
+    parts = tuple(response[first:last].T for first, last in pairwise(edges))
+    return Probed(tried, parts, size, tuple(own_rows(study)))
+
+
+def own_rows(study: Study) -> Sequence[NDArray[np.intp]]:
+    """Rows of each wheel's own channels; of the total where no wheel is measured by itself."""
+    alone = not any(channel.kind in MOTOR_KINDS for channel in study.channels)
+    found: list[list[NDArray[np.intp]]] = [[] for _ in range(WHEELS)]
+    for channel, part in zip(study.channels, rows_of(study.channels), strict=True):
+        for wheel in range(WHEELS):
+            if channel.kind == "total" if alone else channel.wheel == wheel:
+                found[wheel].append(np.arange(part.start, part.stop))
+    return [np.concatenate(rows) if rows else np.empty(0, dtype=np.intp) for rows in found]
