@@ -85,11 +85,10 @@ def is_true(finding: Finding, truth: Truth) -> bool:
 
 def tells_value(finding: Finding, truth: Truth) -> bool:
     """Whether a `parameter.*` finding tells what the part really is."""
-    key = finding.effect.removeprefix(PARAMETER)
-    nominal = _nominal(truth.nominal, key)
-    if nominal is None:
+    nominal = _nominal(truth.nominal, finding.effect.removeprefix(PARAMETER))
+    actual = actual_value(finding, truth)
+    if nominal is None or actual is None:
         return False
-    actual = nominal * _actual_factor(finding, truth, key, nominal)
     for told in finding.values.values():
         if abs(told.value - actual) <= _CLOSE * abs(nominal):
             return True
@@ -98,6 +97,13 @@ def tells_value(finding: Finding, truth: Truth) -> bool:
             if low <= actual <= high and high - low < _NARROW * abs(nominal):
                 return True
     return False
+
+
+def actual_value(finding: Finding, truth: Truth) -> float | None:
+    """What a parameter that a finding speaks of really is; None if the truth does not know it."""
+    key = finding.effect.removeprefix(PARAMETER)
+    nominal = _nominal(truth.nominal, key)
+    return None if nominal is None else nominal * _actual_factor(finding, truth, key, nominal)
 
 
 def _nominal(nominal: Mapping[str, Any], key: str) -> float | None:
