@@ -10,10 +10,11 @@ from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.fit.linear import Gram, evidence
 from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.fit.probed import probed
+from tomr_reality_gap.fit.screen import _companions
 from tomr_reality_gap.fit.search import Found, search
 from tomr_reality_gap.fit.study import Model, Study
 from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
-from tomr_reality_gap.hypotheses.knobs import Turned, turned
+from tomr_reality_gap.hypotheses.knobs import Hypothesis, Knob, Turned, turned
 from tomr_reality_gap.hypotheses.scales import grips_of, scales_of
 
 from .test_alignment import forward  # noqa: F401 -- the fixture
@@ -116,3 +117,15 @@ def test_a_wheel_that_slides_is_named_with_its_grip(forward: Forward) -> None:  
     assert [item.name for item in best.model.hypotheses] == ["contact.slip at wheel_2_joint"]
     knob, turn = best.model.own[0], best.model.turns[0][0]
     assert best.model.hypotheses[0].start[knob.keys[0]] + turn == pytest.approx(0.2, abs=0.004)
+
+
+def test_a_parameter_that_an_addition_pushes_far_out_of_its_tolerance_comes_along() -> None:
+    key = "motor.wheel_1_joint.resistance"
+    model = Model(Turned({}, "made"), (Knob(key, (key,), "", 1.0, 0.1, -1.25, 1.25),), (0.0,))
+    wrong = Hypothesis(
+        "parameter.motor.resistance", ("wheel_1_joint",), (Knob("value", (key,), "ohm", 1.0, 0.1),)
+    )
+    friction = Knob("torque", ("physics.friction.coulomb.torque",), "N m", 1.0, 0.1)
+    added = Hypothesis("friction.coulomb", ("all_wheels",), (friction,))
+    for turn, expected in ((3.0, (wrong,)), (-3.0, (wrong,)), (1.2, ())):
+        assert _companions(model, [0], np.array([turn]), added, [added, wrong]) == expected
