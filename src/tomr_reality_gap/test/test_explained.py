@@ -12,9 +12,9 @@ from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import Robot, load_robot, read_description
 from tomr_power_model.robot.vocabulary import EFFECTS
+from tomr_reality_gap.described import described
 from tomr_reality_gap.fit.study import Model
 from tomr_reality_gap.hypotheses.knobs import Turned, turned
-from tomr_reality_gap.verdict import _described
 from tomr_sim_bridge.plant.simulation import Simulation
 
 WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
@@ -68,7 +68,7 @@ def explained(folder: Path, effects: Mapping[str, Mapping[str, float]], wheels: 
         study=SimpleNamespace(forwards=()),
     )
     path = folder / "robot_explained.yaml"
-    path.write_text(_described(evidence, Model(Turned(values, "made"), (), ())), encoding="utf-8")
+    path.write_text(described(evidence, Model(Turned(values, "made"), (), ())), encoding="utf-8")
     return load_robot(path)
 
 

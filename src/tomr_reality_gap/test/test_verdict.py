@@ -48,6 +48,7 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> Judged:
             "_shares": [],
             "_variables": {},
             "_unexplained": (unexplained, size),
+            "_left": unexplained,
             "_unnamed": evolve(finding(), effect="unknown", confidence=0.9),
             "_maps": (),
             "_alignment": {},
@@ -62,8 +63,8 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> Judged:
             return evolve(finding(), effect=names[number])
 
         monkeypatch.setattr(verdict, "_finding", found)
-        monkeypatch.setattr(verdict, "_for_users", lambda _, model: model)
-        monkeypatch.setattr(verdict, "_described", lambda _, model: " ".join(model.hypotheses))
+        monkeypatch.setattr(verdict, "for_users", lambda _, model: model)
+        monkeypatch.setattr(verdict, "described", lambda _, model: " ".join(model.hypotheses))
         best = SimpleNamespace(model=_Model(*names), evidence=1000.0 * len(names))
         evidence = SimpleNamespace(
             study=SimpleNamespace(forwards=(), predict=lambda robots: robots, value=()),

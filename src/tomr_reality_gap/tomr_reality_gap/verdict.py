@@ -8,9 +8,9 @@ from attrs import evolve
 from numpy.typing import NDArray
 
 from tomr_power_model.calibration.beliefs import drive_for
-from tomr_power_model.calibration.fitted import fitted_text
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.described import described, for_users
 from tomr_reality_gap.evidence import Evidence, smallest
 from tomr_reality_gap.explanation import (
     Comparison,
@@ -84,14 +84,14 @@ def explanation_of(
         verdict="mismatch" if findings else "match",
         sentence=_sentence(findings),
         findings=tuple(findings),
-        unexplained_share=(unexplained if model.hypotheses else float(bool(unknown))),
+        unexplained_share=_left(evidence, comparisons) if findings else 0.0,
         comparisons=comparisons,
-        maps=_maps(evidence, variables),
+        maps=_maps(evidence, comparisons, variables),
         alignment=_alignment(evidence),
         smallest=smallest(evidence) if not findings else (),
         whiteness=_whiteness(evidence),
         score=score,
-        explained=_described(evidence, _for_users(evidence, model)) if model.hypotheses else "",
+        explained=described(evidence, for_users(evidence, model)) if model.hypotheses else "",
         suggested=suggested(findings),
         notes=notes,
     )
@@ -250,7 +250,7 @@ def _unnamed(
     evidence: Evidence, unknown: Leftover, score: Score | None, variables: Mapping[str, Array]
 ) -> Finding:
     study = evidence.study
-    change = unknown.columns @ np.ones(unknown.columns.shape[1])
+    change = unknown.columns @ (np.concatenate(unknown.turns) / evidence.nameless.size)
     weight = evidence.found.noise.weight
     found = located(
         study.channels, change / weight, weight, _share_of(evidence, unknown), variables
@@ -333,10 +333,23 @@ def _unexplained(evidence: Evidence, after: Array) -> tuple[float, float]:
     return share, drawn / max(count, 1)
 
 
-def _maps(evidence: Evidence, variables: Mapping[str, Array]) -> tuple[Map, ...]:
+def _left(evidence: Evidence, comparisons: Sequence[Comparison]) -> float:
+    """Part of the mismatch that is left after everything, the curve of an unnamed effect too."""
+    return _unexplained(evidence, _after(comparisons))[0]
+
+
+def _after(comparisons: Sequence[Comparison]) -> Array:
+    """Values of the fitted recordings' channels, as explained."""
+    fitted = [item for item in comparisons if not item.held_out]
+    return np.concatenate([values for item in fitted for values in item.after])
+
+
+def _maps(
+    evidence: Evidence, comparisons: Sequence[Comparison], variables: Mapping[str, Array]
+) -> tuple[Map, ...]:
     study, found = evidence.study, evidence.found
     before = study.value - evidence.simulated[0]
-    after = study.value - found.best.value
+    after = study.value - _after(comparisons)
     return maps_of(study.channels, before, after, found.noise.sigma, variables)
 
 
@@ -365,35 +378,6 @@ def _whiteness(evidence: Evidence) -> dict[str, tuple[float, float]]:
 def _next(series: Array) -> float:
     """Autocorrelation at lag one."""
     return float(np.mean(series[:-1] * series[1:]) / max(float(np.mean(series**2)), 1e-300))
-
-
-def _for_users(evidence: Evidence, model: Model) -> Model:
-    """The model for the user's simulation: without what that shows by itself."""
-    names = [item.name for item in evidence.found.best.model.hypotheses]
-    theirs = dict(zip(names, evidence.shared, strict=True))
-    turns = tuple(
-        tuple(turn - other for turn, other in zip(own, theirs[hypothesis.name], strict=True))
-        for hypothesis, own in zip(model.hypotheses, model.turns, strict=True)
-    )
-    return evolve(model, turns=turns)
-
-
-def _described(evidence: Evidence, model: Model) -> str:
-    """Text of robot_explained.yaml: what is alike for all wheels is written once."""
-    values = dict(model.described.values)
-    wheels = evidence.robot.wheel_names
-    for key in [key for key in values if f".{wheels[0]}." in key]:
-        keys = [key.replace(wheels[0], wheel) for wheel in wheels]
-        numbers = {values.get(item) for item in keys}
-        general = key.replace(f".{wheels[0]}.", ".")
-        if len(numbers) == 1:
-            values[general] = values[key]
-            for item in keys:
-                del values[item]
-    findings = ", ".join(item.name for item in model.hypotheses)
-    header = [f"{evidence.source}, with what reality showed besides:", findings]
-    recordings = ", ".join(item.recorded.name for item in evidence.study.forwards)
-    return fitted_text(evidence.source, values, (), (), (), header, {"recordings": recordings})
 
 
 def _sentence(findings: Sequence[Finding]) -> str:

@@ -24,6 +24,7 @@ _MOST_STEPS = 6
 _SETTLED = 0.5  # log evidence that a further step would bring
 _BACK = 0.3  # of a step that made things worse
 LARGEST_STEP = 4.0  # spreads
+_MOST_OFF = 4.0  # spreads of an instrument: farther off it is a finding, and its column not linear
 _HOPELESS = 100.0  # log evidence behind the best, after the step that is expected
 
 
@@ -215,4 +216,4 @@ def moved(model: Model, turns: Array, columns: Columns) -> State:
     last = columns.instruments.stop
     nuisance = turns[:first] * np.array([knob.spread for knob in model.nuisances])
     own = turns[last:] * np.array([knob.spread for knob in model.own])
-    return model.moved(nuisance, own), turns[first:last]
+    return model.moved(nuisance, own), np.clip(turns[first:last], -_MOST_OFF, _MOST_OFF)

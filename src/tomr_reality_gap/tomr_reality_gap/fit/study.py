@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 _DELAY_STEP = 5e-4  # s
 _DELAY_SPREAD = 2e-3  # s, of the response to commands
-_CLOCK_SPREAD = 3e-3  # s, of each power sensor's stamps
+_CLOCK_SPREAD = 1e-3  # s, of each power sensor's stamps
 _GYRO_BIAS = 0.02  # rad/s
 _GYRO_SCALE = 0.01
 
