@@ -59,6 +59,8 @@ class Stretches:
     warm: Array | None = None  # winding temperature above 25 C [K], (v, c, s, 3); None: cold
     prompt: bool = False  # whether the drivers' sum of errors holds the present one already
     torque: Array | None = None  # that resists besides, as a function of time [N m], (v, c, s, 3)
+    # Angles at the start of each period as measured: a simulated wheel is soon a tooth off [rad].
+    told: Array | None = None  # (c, s, 3); None: as simulated
 
 
 @frozen
@@ -192,6 +194,8 @@ class _Stepper:
         shape = (variants, *stretches.speed.shape)
         self.speed = np.broadcast_to(stretches.speed, shape).copy()
         self.turned = np.zeros(shape)
+        self.before = self.turned  # at the start of the period, where the angle was `begin`
+        self.begin = stretches.angle
         self.heading = np.broadcast_to(stretches.heading, shape[:2]).copy()
         self.torque = np.zeros(shape)  # of the motors [N m]
         self.acceleration = np.broadcast_to(stretches.acceleration, shape).copy()
@@ -262,7 +266,7 @@ class _Stepper:
     def _state(self) -> WheelState:
         loops = self._loops
         transmitted = self.torque - loops.rotor * self.acceleration
-        angle = self._stretches.angle + self.turned
+        angle = self.begin + self.turned - self.before
         return WheelState(
             self.speed, self.normal, transmitted, loops.wheel_radius, loops.gear_ratio, angle
         )
@@ -311,6 +315,8 @@ class _Stepper:
         """One driver period; writes its means into the runs."""
         loops, warm = self._loops, self._stretches.warm
         before = self.turned
+        if self._stretches.told is not None:
+            self.before, self.begin = before, self._stretches.told[:, step]
         bus = loops.voltage[..., 0] - self.sag * self.drawn
         volts = self._volts(step) * (bus[..., None] / loops.voltage)
         resistance = loops.resistance

@@ -361,6 +361,7 @@ def _joined(drives: Sequence[Stretches]) -> Stretches:
         warm=None if drives[0].warm is None else along("warm", 1),
         prompt=drives[0].prompt,
         torque=None if drives[0].torque is None else along("torque", 1),
+        told=None if drives[0].told is None else along("told", 0),
     )
 
 

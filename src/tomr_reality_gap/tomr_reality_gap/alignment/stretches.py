@@ -155,7 +155,16 @@ def stretches_of(
         begins, recorded.encoder_time, (turned - turned[0]) @ wheels_to_twist(robot)[2]
     )
     set_speed = timeline.cut(set_twist @ twist_to_wheels(robot, nominal=True).T)
-    return Stretches(set_speed[None], speed, acceleration, angle, heading)
+    every = timeline.start + timeline.period * np.arange(-timeline.warm, timeline.count)
+    told = [np.interp(every, recorded.encoder_time, turned[:, wheel]) for wheel in range(WHEELS)]
+    return Stretches(
+        set_speed[None],
+        speed,
+        acceleration,
+        angle,
+        heading,
+        told=timeline.cut(np.stack(told, axis=1)),
+    )
 
 
 def turned_angle(recorded: Recorded, wheel: int) -> Array:
