@@ -129,3 +129,14 @@ def test_a_parameter_that_an_addition_pushes_far_out_of_its_tolerance_comes_alon
     added = Hypothesis("friction.coulomb", ("all_wheels",), (friction,))
     for turn, expected in ((3.0, (wrong,)), (-3.0, (wrong,)), (1.2, ())):
         assert _companions(model, [0], np.array([turn]), added, [added, wrong]) == expected
+
+
+def test_late_power_sensors_are_told_from_slow_ones(forward: Forward) -> None:  # noqa: F811
+    """15 ms, longer than a step in power lasts: its derivative at none tells nothing."""
+    robot = forward.robot
+    late = ({"delay": 0.015},) * 3
+    real = evolve(robot, physics={**robot.physics, "sensor.clock_offset": late})
+    tried = ("sensor.clock_offset", "sensor.power_lag")
+    best = _found(forward, real, tried).best
+    assert [item.name for item in best.model.hypotheses] == ["sensor.clock_offset at all_wheels"]
+    assert best.model.turns[0][0] == pytest.approx(0.015, abs=0.002)

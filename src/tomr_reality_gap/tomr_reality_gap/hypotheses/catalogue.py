@@ -133,6 +133,7 @@ _ELECTRICAL = frozenset(
 _DELAY_STEP = 0.002  # s
 _ROLLS = 1.05  # of the largest traction over load: with this friction no wheel slides
 _LEAST_GRIP = 0.01
+_LATE = (0.015, 0.03, 0.06, -0.02)  # s
 _EFFECT_PARAMETER = 0.4  # spread of an included effect's parameter, relative to its value
 _WRONG = 1.5  # tolerances that a parameter must be off to be called wrong
 _WRONG_PARAMETER = -math.log(2.0)  # what is left out is likelier than a wrong number
@@ -202,6 +203,7 @@ def catalogue(
         *_effects(base, wheels, scales),
         *_ripples(base, wheels, scales, orders),
         *_slipping(base, wheels, scales),
+        *_late(base, wheels),
         *_wrong_parameters(base, wheels, tolerance),
         *(_leap(base, key, value) for key, value in leaps.items()),
     )
@@ -267,6 +269,19 @@ def _slipping(base: Turned, wheels: Sequence[str], scales: Scales) -> Iterator[H
             leap = grip - start
             low = _LEAST_GRIP - start
             knob = Knob("friction", keys, "", -leap, -_STEP * grip, low, 0.0, leap=leap)
+            yield Hypothesis(effect_id, where, (knob,), dict.fromkeys(keys, start))
+
+
+def _late(base: Turned, wheels: Sequence[str]) -> Iterator[Hypothesis]:
+    """Power sensors that are late, or early, by more than a step in power lasts."""
+    effect_id = "sensor.clock_offset"
+    if any(key.startswith(f"physics.{effect_id}.") for key in base.values):
+        return
+    for where in _places(effect_id, wheels):
+        keys = _keys(effect_id, "delay", where, wheels)
+        for number, leap in enumerate(_LATE):
+            start = 1e-6 * (number + 1)  # what tells hypotheses of one name apart
+            knob = Knob("delay", keys, "s", abs(leap), 0.1 * _LATE[0], leap=leap)
             yield Hypothesis(effect_id, where, (knob,), dict.fromkeys(keys, start))
 
 
