@@ -204,3 +204,20 @@ def test_a_wheel_that_slid_rolls_again(robot: Robot) -> None:
     assert np.abs(rolls.speed - grips.speed)[20:60].max() > 1.0
     np.testing.assert_allclose(grips.speed[-1], rolls.speed[-1], atol=0.05)
     np.testing.assert_allclose(grips.yaw_rate[-1], 0.0, atol=1e-3)
+
+
+def test_a_ripple_follows_the_angle_as_measured(robot: Robot) -> None:
+    """Told half a wave further on, a ripple does the opposite; a whole one, the same."""
+    order = 4.0
+    wavy = ({"torque": 0.05, "order": order, "phase": 0.3},) * 3
+    rough = evolve(robot, physics={**robot.physics, "drivetrain.torque_ripple": wavy})
+    given = stretches(robot, tour())
+    smooth = ManyLoops.of([robot]).run(given)
+    angle = np.cumsum(smooth.speed[:, 0], axis=0).transpose(1, 0, 2) * 0.005
+    started = slice(20, 60)
+    added = [
+        (ManyLoops.of([rough]).run(evolve(given, told=angle + shift)).power - smooth.power)[started]
+        for shift in (0.0, np.pi / order, 2.0 * np.pi / order)
+    ]
+    np.testing.assert_allclose(added[2], added[0], atol=1e-9)
+    assert np.corrcoef(added[0].ravel(), added[1].ravel())[0, 1] < -0.9

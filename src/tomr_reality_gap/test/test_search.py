@@ -10,9 +10,10 @@ from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.fit.linear import Gram, evidence
 from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.fit.probed import probed
+from tomr_reality_gap.fit.refine import moved
 from tomr_reality_gap.fit.screen import _companions
 from tomr_reality_gap.fit.search import Found, search
-from tomr_reality_gap.fit.study import Model, Study
+from tomr_reality_gap.fit.study import Columns, Model, Study
 from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
 from tomr_reality_gap.hypotheses.knobs import Hypothesis, Knob, Turned, turned
 from tomr_reality_gap.hypotheses.scales import grips_of, scales_of
@@ -140,3 +141,27 @@ def test_late_power_sensors_are_told_from_slow_ones(forward: Forward) -> None:  
     best = _found(forward, real, tried).best
     assert [item.name for item in best.model.hypotheses] == ["sensor.clock_offset at all_wheels"]
     assert best.model.turns[0][0] == pytest.approx(0.015, abs=0.002)
+
+
+def test_an_instrument_is_off_by_a_little_or_not_at_all() -> None:
+    """A clock's column is a straight line: far out it would pass for a slow sensor."""
+    nothing = np.empty((0, 3))
+    columns = Columns(
+        Model(Turned({}, "made"), (), ()), *np.empty((2, 0)), nothing, slice(0), slice(3), (), {}
+    )
+    turns = np.array([0.5, 7.0, -20.0])
+    _, instruments = moved(columns.model, turns, columns)
+    np.testing.assert_array_equal(instruments, [0.5, 4.0, -4.0])
+
+
+def test_delays_of_power_sensors_are_tried_far_from_none(forward: Forward) -> None:  # noqa: F811
+    base, run = _base(forward.robot), forward.run(forward.robot)
+    scales = scales_of(forward.robot, run["speed"], run["power"], run["copper"], 30.0)
+    leaps = {
+        item.knobs[0].leap
+        for item in catalogue(base, forward.robot.wheel_names, scales, 0.02)
+        if item.name == "sensor.clock_offset at all_wheels"
+    }
+    assert 0.0 in leaps
+    assert max(leaps) > 0.05
+    assert min(leaps) < -0.01

@@ -165,8 +165,7 @@ class ManyLoops:
         """Run all variants over all stretches; `tick` is called once per driver period."""
         loop = _Stepper(self, stretches)
         count = stretches.set_speed.shape[2]
-        variants = max(len(self.constant), 1 if stretches.torque is None else len(stretches.torque))
-        shape = count * self.substeps, variants, len(stretches.speed)
+        shape = count * self.substeps, *loop.speed.shape[:2]
         runs = Runs(
             speed=np.empty((*shape, 3)),
             power=np.empty((*shape, 3)),
@@ -188,9 +187,8 @@ class _Stepper:
     def __init__(self, loops: ManyLoops, stretches: Stretches) -> None:
         self._loops = loops
         self._stretches = stretches
-        variants = max(
-            len(loops.constant), 1 if stretches.torque is None else len(stretches.torque)
-        )
+        torques = 1 if stretches.torque is None else len(stretches.torque)
+        variants = max(len(loops.constant), torques)
         shape = (variants, *stretches.speed.shape)
         self.speed = np.broadcast_to(stretches.speed, shape).copy()
         self.turned = np.zeros(shape)

@@ -307,10 +307,9 @@ def _predicted(
         found[rows] = np.concatenate([item.read(group, run) for item, run in parts], axis=1)
         if rows[0] == 0:
             for row, delay in enumerate(later, len(robots)):
-                late = [
-                    (evolve(item, delay=item.delay + delay), _first(run)) for item, run in parts
-                ]
-                found[row] = np.concatenate([item.read(group[:1], run)[0] for item, run in late])
+                late = [(evolve(item, delay=item.delay + delay), run) for item, run in parts]
+                first = [item.read(group[:1], _of(run, slice(1)))[0] for item, run in late]
+                found[row] = np.concatenate(first)
         tick(len(group) * len(bundle))
     return found
 
@@ -342,7 +341,7 @@ def _side_by_side(
     found, first = [], 0
     for item in bundle:
         columns = slice(first, first := first + len(item.timeline.first))
-        found.append(_of(together, columns))
+        found.append(_of(together, stretches=columns))
     return found
 
 
@@ -365,14 +364,11 @@ def _joined(drives: Sequence[Stretches]) -> Stretches:
     )
 
 
-def _of(runs: Runs, columns: slice) -> Runs:
-    """Some of the stretches."""
-    return Runs(**{field.name: getattr(runs, field.name)[:, :, columns] for field in fields(Runs)})
-
-
-def _first(runs: Runs) -> Runs:
-    """The first robot alone."""
-    return Runs(**{field.name: getattr(runs, field.name)[:, :1] for field in fields(Runs)})
+def _of(runs: Runs, robots: slice = slice(None), stretches: slice = slice(None)) -> Runs:
+    """Some of the robots and of the stretches."""
+    return Runs(
+        **{item.name: getattr(runs, item.name)[:, robots, stretches] for item in fields(Runs)}
+    )
 
 
 def _bundles(forwards: Sequence[Forward]) -> Iterator[list[Forward]]:
