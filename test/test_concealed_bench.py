@@ -36,9 +36,9 @@ from concealed.score import (
 from concealed.sensing import Measured, SensorSet, clock_of, noise_of
 
 from tomr_power_model.cli import run_main
+from tomr_power_model.effects import EFFECTS
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import load_robot, robot_from_parameters
-from tomr_power_model.robot.vocabulary import EFFECTS
 from tomr_sim_bridge.plant.effects import DriverPower, WheelLoads
 
 W1, W2, W3 = "wheel_1_joint", "wheel_2_joint", "wheel_3_joint"

@@ -8,7 +8,7 @@ from attrs import evolve, frozen
 
 from concealed.beyond import OUTSIDE
 from concealed.recipes import RECIPES
-from tomr_power_model.robot.vocabulary import EFFECTS
+from tomr_power_model.effects import EFFECTS
 
 Where = Literal["all_wheels", "one_wheel", "body", "supply"]
 ALL: Where = "all_wheels"

@@ -19,9 +19,9 @@ from concealed.robots import (
     nominal_value,
 )
 from concealed.scales import Scales
+from tomr_power_model.effects import EFFECTS
 from tomr_power_model.robot import Robot, robot_from_parameters
 from tomr_power_model.robot.tables import ROBOT_PARAMETERS
-from tomr_power_model.robot.vocabulary import EFFECTS
 from tomr_sim_bridge.plant.effects import PlantEffect
 
 

@@ -9,7 +9,7 @@ from attrs import frozen
 
 from concealed.catalogue import PARAMETER, Case
 from concealed.scales import Scales
-from tomr_power_model.robot.vocabulary import EFFECTS
+from tomr_power_model.effects import EFFECTS
 
 Range = tuple[float, float]
 Nested = dict[str, dict[str, Any]]

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 import yaml
 
+from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
 from tomr_power_model.physics.effects import modelled_effects
 from tomr_power_model.robot import load_robot, shipped_robots
-from tomr_power_model.robot.vocabulary import EFFECTS
 
 REFERENCE = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml").read_text()
 

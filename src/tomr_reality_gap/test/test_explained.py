@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import Robot, load_robot, read_description
-from tomr_power_model.robot.vocabulary import EFFECTS
 from tomr_reality_gap.described import described
 from tomr_reality_gap.fit.study import Model
 from tomr_reality_gap.hypotheses.knobs import Turned, turned

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_power_model.robot.vocabulary import EFFECTS
+from tomr_power_model.effects import EFFECTS
 from tomr_reality_gap.explanation import Estimate, Explanation, Shape
 from tomr_reality_gap.report.html import channel_lines, picture_count, report_page
 from tomr_reality_gap.report.json import report_json
@@ -140,7 +140,7 @@ def test_page_shows_the_shape_of_what_has_no_name(with_rest: Callable[..., Expla
     explanation = with_rest(effect="unknown", parameters={}, rivals=(), shape=shape)
     explanation = evolve(explanation, comparisons=(), maps=())
     page = Page(report_page(explanation, "my_robot.yaml"))
-    assert "An effect outside the vocabulary" in page.words
+    assert "Something outside the vocabulary" in page.words
     assert "The unnamed effect at wheel_2_joint" in page.words
     assert len(page.pictures) == picture_count(explanation) == 1
 
@@ -222,4 +222,4 @@ def test_shares_are_not_rounded_to_all_or_nothing(share: float, words: str) -> N
 
 def test_every_effect_of_the_vocabulary_has_words() -> None:
     assert [effect for effect in EFFECTS if effect_words(effect) == effect] == []
-    assert effect_words("parameter.robot.mass") == "wrong value of robot.mass"
+    assert effect_words("parameter.robot.mass") == "Wrong value of robot.mass"

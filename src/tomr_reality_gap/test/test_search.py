@@ -49,7 +49,8 @@ def searched(
     base, wheels = _base(made.robot), made.robot.wheel_names
     run = made.run(base.robot)
     scales = scales_of(made.robot, run["speed"], run["power"], run["copper"], 30.0)
-    scales = evolve(scales, grips=grips_of(made.robot, run["speed"], made.timeline.period))
+    ratios = grips_of(made.robot, run["speed"], made.timeline.period)
+    scales = evolve(scales, traction_ratios=ratios)
     knobs = nuisances(base, wheels, 0.02)
     candidates = [
         item for item in catalogue(base, wheels, scales, 0.02) if item.effect.startswith(tried)

@@ -8,6 +8,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.effects.scales import Scales
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.fit.linear import Gram, solve
 from tomr_reality_gap.fit.mirrored import Mirror, Turns
@@ -15,7 +16,6 @@ from tomr_reality_gap.fit.probed import Probed
 from tomr_reality_gap.fit.search import Found, finding_cost
 from tomr_reality_gap.fit.study import Columns, Study
 from tomr_reality_gap.hypotheses.knobs import Hypothesis, Knob, Turned
-from tomr_reality_gap.hypotheses.scales import Scales
 
 Array = NDArray[np.float64]
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tomr_power_model.calibration.calibrate import names_of, without
 from tomr_power_model.calibration.checks import refuse_little_motion
 from tomr_power_model.calibration.recorded import Recorded, read_recorded
+from tomr_power_model.effects.scales import Scales
 from tomr_power_model.errors import InputError
 from tomr_power_model.recordings import open_recording, resolve_topic
 from tomr_power_model.robot import Robot, read_description, robot_from_parameters
@@ -21,7 +22,7 @@ from tomr_reality_gap.alignment.usable import refuse_dull, refuse_faulty, refuse
 from tomr_reality_gap.fit.likened import Likened, likened
 from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.hypotheses.knobs import Turned, turned
-from tomr_reality_gap.hypotheses.scales import Scales, grips_of, scales_of
+from tomr_reality_gap.hypotheses.scales import grips_of, scales_of
 from tomr_reality_gap.mismatch.probes import motion_of
 from tomr_reality_gap.request import Request
 
@@ -223,4 +224,4 @@ def _scales(
         grips_of(robot, run["speed"], item.timeline.period)
         for item, run in zip(forwards, runs, strict=True)
     ]
-    return evolve(scales, grips=tuple(max(levels) for levels in zip(*grips, strict=True)))
+    return evolve(scales, traction_ratios=tuple(max(levels) for levels in zip(*grips, strict=True)))

@@ -7,7 +7,7 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
-from tomr_power_model.calibration.beliefs import drive_for
+from tomr_power_model.calibration.priors import drive_for
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.described import described, for_users
@@ -32,7 +32,7 @@ from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.fit.refine import Fitted
 from tomr_reality_gap.fit.search import finding_cost
 from tomr_reality_gap.fit.study import Model, columns_at
-from tomr_reality_gap.hypotheses.knobs import NEUTRAL, Hypothesis, bounds_of
+from tomr_reality_gap.hypotheses.knobs import Hypothesis, bounds_of, neutral_of
 from tomr_reality_gap.mismatch.compare import comparison, score_of, simulated
 from tomr_reality_gap.mismatch.locate import located, maps_of, variables_at
 from tomr_reality_gap.suggest import suggested
@@ -198,9 +198,8 @@ def _parameters(evidence: Evidence, number: int, sigma: Array) -> dict[str, Esti
         turn = whole - theirs
         starts = []
         for key in knob.keys:
-            leaf = key.rpartition(".")[2]
             start = hypothesis.start.get(key, evidence.base.values.get(key))
-            starts.append(float(start if start is not None else NEUTRAL.get(leaf, 0.0)))  # type: ignore[arg-type]
+            starts.append(float(start if start is not None else neutral_of(key)))  # type: ignore[arg-type]
             starts[-1] += nuisance.get(key, 0.0) if key not in hypothesis.start else 0.0
         value = sum(starts) / len(starts) + turn
         # The simulator is not exact either: that part of a value is never known, nor all of what

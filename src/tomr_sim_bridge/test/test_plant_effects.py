@@ -7,9 +7,9 @@ import attrs
 import numpy as np
 import pytest
 
+from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import Robot
-from tomr_power_model.robot.vocabulary import EFFECTS
 from tomr_sim_bridge.plant.effects import (
     DriverPower,
     PlantEffect,

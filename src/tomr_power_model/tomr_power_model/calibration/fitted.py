@@ -12,9 +12,9 @@ import yaml
 from numpy.typing import NDArray
 
 from tomr_power_model.calibration.parameters import Free, Values, with_values
+from tomr_power_model.effects import EFFECTS
 from tomr_power_model.robot import read_sections
 from tomr_power_model.robot.files import CALIBRATION, EVERY_NODE, IDENTITY
-from tomr_power_model.robot.vocabulary import EFFECTS
 
 Array = NDArray[np.float64]
 Tree = dict[str, "Tree | object"]

@@ -4,9 +4,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from tomr_power_model.calibration.beliefs import drive_for
 from tomr_power_model.calibration.fit import Fit
 from tomr_power_model.calibration.parameters import Free
+from tomr_power_model.calibration.priors import drive_for
 
 HARDLY = 0.5  # of the belief's spread is left: the value counts as not determined
 _TOGETHER = 0.95  # correlation

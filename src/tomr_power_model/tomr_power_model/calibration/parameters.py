@@ -8,12 +8,16 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.calibration.beliefs import ABSENT, DEFAULT_TOLERANCE, TOLERANCES
+from tomr_power_model.calibration.priors import (
+    DEFAULT_RELATIVE_STD,
+    RELATIVE_STD,
+    absent_prior,
+)
+from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot.description import closest
 from tomr_power_model.robot.parameters import ParameterSpec
 from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
-from tomr_power_model.robot.vocabulary import EFFECTS
 
 Array = NDArray[np.float64]
 Values = dict[str, object]
@@ -214,12 +218,12 @@ def _free(
     choice: Choice,
 ) -> Free:
     """A value with its belief: relative to what robot.yaml says, else that of an absent effect."""
-    center, width = ABSENT.get(general, (0.0, 1.0))
+    center, width = absent_prior(general)
     told = choice.tolerances.get(general)
     if believed is not None:
         center = believed
         if believed:
-            width = abs(believed) * TOLERANCES.get(general, DEFAULT_TOLERANCE)
+            width = abs(believed) * RELATIVE_STD.get(general, DEFAULT_RELATIVE_STD)
     if told is not None and center:
         width = told * abs(center)
     return Free(key, general, wheel, unit, center, width, *bounds)

@@ -14,11 +14,11 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import Robot, robot_from_parameters
 from tomr_power_model.robot.parameters import ParameterSpec, Value
 from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
-from tomr_power_model.robot.vocabulary import EFFECTS
 
 GROUPS = ("robot", "motor", "controller", "supply", "physics", "sensors", "measurement")
 _ROS_OWN = ("use_sim_time", "qos_overrides", "start_type_description_service")

@@ -6,10 +6,10 @@ from typing import cast
 
 from attrs import frozen
 
+from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot.parameters import ParameterSpec, Value, check_all
 from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
-from tomr_power_model.robot.vocabulary import EFFECTS
 
 WHEELS = 3
 GRAVITY = 9.80665  # m/s^2
@@ -42,6 +42,7 @@ class Controller:
     integral: float  # V/rad
     acceleration_limit: float  # m/s^2, 0: none
     delay: float  # s
+    integrator: str = "backward"  # Euler: whether the sum of errors holds the present one
 
 
 @frozen
@@ -140,7 +141,9 @@ def robot_from_parameters(values: Mapping[str, object], place: str) -> Robot:
         inertia_z=number("robot.inertia_z"),
         mass_center=cast(tuple[float, float, float], checked["robot.mass_center"]),
         motors=_motors(checked, values, names, place),
-        controller=Controller(**number.group("controller")),
+        controller=Controller(
+            **number.group("controller"), integrator=str(checked["controller.integrator"])
+        ),
         supply=Supply(**number.group("supply")),
         sensors=Sensors(**number.group("sensors")),
         measurement=Measurement(
@@ -165,9 +168,9 @@ class _Group:
     def group(self, prefix: str) -> dict[str, float]:
         start = prefix + "."
         return {
-            name.removeprefix(start): cast(float, value)
+            name.removeprefix(start): value
             for name, value in self._checked.items()
-            if name.startswith(start)
+            if name.startswith(start) and isinstance(value, float)
         }
 
 

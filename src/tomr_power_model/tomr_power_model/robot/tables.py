@@ -39,6 +39,13 @@ ROBOT_PARAMETERS: tuple[ParameterSpec, ...] = (
         maximum=5.0,
         default=0.0,
     ),
+    _S(
+        "controller.integrator",
+        "whether the sum of errors holds the present one (backward Euler) or not (forward)",
+        kind="str",
+        default="backward",
+        choices=("backward", "forward"),
+    ),
     _S("supply.nominal_voltage", "battery or rail voltage", unit="V", above=0.0),
     _S(
         "supply.auxiliary_power",

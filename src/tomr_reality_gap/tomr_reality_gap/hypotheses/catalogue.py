@@ -1,18 +1,15 @@
 """The hypotheses: every effect of the vocabulary at every place, and every wrong parameter.
 
-A row of the table says how large an effect may be (`spread`, of its size) and which shapes it
-starts from; adding an effect is one row.
+How large an effect may be and which shapes it starts from is part of the effect.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 
-from attrs import frozen
-
-from tomr_power_model.robot.vocabulary import EFFECTS
+from tomr_power_model.effects import EFFECTS, HypothesisPrior
+from tomr_power_model.effects.scales import Scales
 from tomr_reality_gap.hypotheses.knobs import (
-    NEUTRAL,
     Hypothesis,
     Knob,
     Turned,
@@ -20,85 +17,8 @@ from tomr_reality_gap.hypotheses.knobs import (
     unit_of,
     wheel_key,
 )
-from tomr_reality_gap.hypotheses.scales import Scales
 
 ALL, BODY, SUPPLY = "all_wheels", "body", "supply"
-
-Size = Callable[[Scales], float]
-Shapes = Callable[[Scales], Sequence[Mapping[str, float]]]
-
-
-def _no_shape(scales: Scales) -> Sequence[Mapping[str, float]]:
-    return ({},)
-
-
-@frozen
-class Row:
-    """How an effect is tried."""
-
-    sizes: Mapping[str, Size]  # spread of each parameter that starts from neutral
-    shapes: Shapes = _no_shape  # starts of the others, and their spreads relative to them
-    sign: int = 1  # of the permitted side of the sizes; 0: both
-    least: Size = lambda scales: 0.0  # size below which it cannot be told from sampling
-    weight: float = 0.0
-
-
-def _speeds(scales: Scales) -> Sequence[Mapping[str, float]]:
-    return [{"speed": part * scales.speed} for part in (0.06, 0.15, 0.4)]
-
-
-def _times(scales: Scales) -> Sequence[Mapping[str, float]]:
-    return [{"time_constant": part * scales.duration} for part in (0.15, 0.5, 1.5)]
-
-
-def _slips(scales: Scales) -> Sequence[Mapping[str, float]]:
-    """The contract's law, and dry friction against sliding in the rolling direction as well."""
-    return [{}, {"slip": 0.4}]
-
-
-def _azimuths(scales: Scales) -> Sequence[Mapping[str, float]]:
-    return [{"azimuth": part * math.pi / 4.0} for part in range(8)]
-
-
-_TABLE: Mapping[str, Row] = {
-    "friction.coulomb": Row({"torque": lambda s: 0.5 * s.torque}),
-    "friction.viscous": Row({"coefficient": lambda s: 0.5 * s.torque / s.speed}),
-    "friction.stribeck": Row({"torque": lambda s: 0.5 * s.torque}, _speeds),
-    "friction.asymmetric": Row({"torque": lambda s: 0.3 * s.torque}, sign=0),
-    "friction.load_dependent": Row({"coefficient": lambda s: 0.1}),
-    "friction.quadratic": Row({"coefficient": lambda s: 0.5 * s.torque / s.speed**2}),
-    "contact.roller_drag": Row(
-        {"coefficient": lambda s: 0.5 * s.torque / (s.load * s.radius)}, _slips
-    ),
-    "contact.rolling_resistance": Row(
-        {"coefficient": lambda s: 0.5 * s.torque / (s.load * s.radius)}
-    ),
-    "body.payload_mass": Row({"mass": lambda s: 0.2 * s.mass}),
-    "body.slope": Row({"angle": lambda s: 0.05}, _azimuths),
-    "body.mass_center_offset": Row(
-        {"x": lambda s: 0.15 * s.arm, "y": lambda s: 0.15 * s.arm}, sign=0
-    ),
-    "electrical.winding_heating": Row(
-        {"thermal_resistance": lambda s: 0.2 / 0.004 / s.copper, "initial": lambda s: 10.0},
-        _times,
-    ),
-    "electrical.supply_sag": Row({"resistance": lambda s: 0.02 * s.voltage / s.current}),
-    "electrical.driver_standby": Row({"power": lambda s: 0.5 * s.power}),
-    "electrical.switching_loss": Row({"coefficient": lambda s: 0.3 * s.power / s.current}),
-    "electrical.regeneration_loss": Row({"efficiency": lambda s: 0.5}, sign=-1),
-    "electrical.iron_loss": Row(
-        {
-            "hysteresis": lambda s: 0.3 * s.torque / s.gear,
-            "eddy": lambda s: 0.3 * s.torque / s.speed / s.gear**2,
-        }
-    ),
-    "kinematic.wheel_radius": Row({"scale": lambda s: 0.03}, sign=0),
-    "sensor.power_scale": Row({"scale": lambda s: 0.1}, sign=0),
-    "sensor.power_bias": Row({"power": lambda s: 0.3 * s.power}, sign=0),
-    # Within a driver's period power is a sawtooth: timing finer than that is not known.
-    "sensor.power_lag": Row({"time_constant": lambda s: 0.05}, least=lambda s: s.period),
-    "sensor.clock_offset": Row({"delay": lambda s: 0.03}, sign=0, least=lambda s: s.period),
-}
 
 # Parameters that may be wrong, their spread relative to the value, and the place.
 _PARAMETERS: Mapping[str, tuple[float, str]] = {
@@ -116,20 +36,6 @@ _PARAMETERS: Mapping[str, tuple[float, str]] = {
     "supply.nominal_voltage": (0.05, SUPPLY),
     "supply.auxiliary_power": (0.3, SUPPLY),
 }
-# What shows in electrical power alone, and iron loss, which brakes the rotor as Coulomb and viscous
-# friction do: the currents of the motors do not tell it.
-_ELECTRICAL = frozenset(
-    {
-        "electrical.iron_loss",
-        "electrical.driver_standby",
-        "electrical.switching_loss",
-        "electrical.regeneration_loss",
-        "sensor.power_scale",
-        "sensor.power_bias",
-        "sensor.power_lag",
-        "sensor.clock_offset",
-    }
-)
 _DELAY_STEP = 0.002  # s
 _ROLLS = 1.05  # of the largest traction over load: with this friction no wheel slides
 _LEAST_GRIP = 0.01
@@ -209,11 +115,12 @@ def catalogue(
     )
     if not currents_only:
         return found
-    hidden = tuple(f"parameter.physics.{effect}." for effect in _ELECTRICAL)
+    electrical = [name for name, effect in EFFECTS.items() if not effect.in_currents]
+    hidden = tuple(f"parameter.physics.{name}." for name in electrical)
     return tuple(
         item
         for item in found
-        if item.effect not in _ELECTRICAL and not item.effect.startswith(hidden)
+        if item.effect not in electrical and not item.effect.startswith(hidden)
     )
 
 
@@ -258,12 +165,13 @@ def _ripples(
 def _slipping(base: Turned, wheels: Sequence[str], scales: Scales) -> Iterator[Hypothesis]:
     """Grips at which some of what the contacts carry is too much; above all of it nothing shows."""
     effect_id = "contact.slip"
-    if not scales.grips or any(key.startswith(f"physics.{effect_id}.") for key in base.values):
+    ratios = scales.traction_ratios
+    if not ratios or any(key.startswith(f"physics.{effect_id}.") for key in base.values):
         return
-    rolls = max(scales.grips)
+    rolls = max(ratios)
     for where in _places(effect_id, wheels):
         keys = _keys(effect_id, "friction", where, wheels)
-        for number, grip in enumerate(scales.grips[1:]):
+        for number, grip in enumerate(scales.traction_ratios[1:]):
             # Starts differ a little so that hypotheses do; at none of them does a wheel slide.
             start = rolls * (_ROLLS + 0.001 * number)
             leap = grip - start
@@ -286,13 +194,14 @@ def _late(base: Turned, wheels: Sequence[str]) -> Iterator[Hypothesis]:
 
 
 def _effects(base: Turned, wheels: Sequence[str], scales: Scales) -> Iterator[Hypothesis]:
-    for effect_id, row in _TABLE.items():
-        if any(key.startswith(f"physics.{effect_id}.") for key in base.values):
+    for effect_id, effect in EFFECTS.items():
+        prior = effect.prior
+        if prior is None or any(key.startswith(f"physics.{effect_id}.") for key in base.values):
             continue
         for where in _places(effect_id, wheels):
             yield from (
-                _effect(effect_id, row, where, wheels, scales, shape)
-                for shape in row.shapes(scales)
+                _effect(effect_id, prior, where, wheels, scales, shape)
+                for shape in prior.shapes(scales)
             )
 
 
@@ -314,7 +223,7 @@ def _keys(
 
 def _effect(
     effect_id: str,
-    row: Row,
+    prior: HypothesisPrior,
     where: tuple[str, ...],
     wheels: Sequence[str],
     scales: Scales,
@@ -322,17 +231,17 @@ def _effect(
 ) -> Hypothesis:
     knobs, start = [], {}
     parameters = EFFECTS[effect_id].parameters
-    for name, size in row.sizes.items():
+    for name, size in prior.sizes.items():
         keys = _keys(effect_id, name, where, wheels)
-        spread, neutral = size(scales), NEUTRAL.get(name, 0.0)
+        spread, neutral = size(scales), parameters[name].neutral
         start.update(dict.fromkeys(keys, neutral))
         low, high = bounds_of(keys[0])
-        step = (row.sign or 1) * _STEP * spread
+        step = (prior.sign or 1) * _STEP * spread
         unit = parameters[name].unit
         low, high = low - neutral, high - neutral
-        if row.sign > 0:
+        if prior.sign > 0:
             low = max(low, 0.0)
-        elif row.sign < 0:
+        elif prior.sign < 0:
             high = min(high, 0.0)
         knobs.append(Knob(name, keys, unit, spread, step, low, high))
     for name, value in shape.items():
@@ -345,7 +254,7 @@ def _effect(
         spread = _SHAPE_SPREAD * value
         low, high = -0.9 * value, 9.0 * value
         knobs.append(Knob(name, keys, unit, spread, _STEP * spread, low, high, True))
-    return Hypothesis(effect_id, where, tuple(knobs), start, row.weight, row.least(scales))
+    return Hypothesis(effect_id, where, tuple(knobs), start, 0.0, prior.least(scales))
 
 
 def _wrong_parameters(

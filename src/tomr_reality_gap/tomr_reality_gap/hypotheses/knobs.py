@@ -6,15 +6,13 @@ from types import MappingProxyType
 
 from attrs import field, frozen
 
+from tomr_power_model.effects import EFFECTS
 from tomr_power_model.robot import Robot, robot_from_parameters
 from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
-from tomr_power_model.robot.vocabulary import EFFECTS
 
 Values = Mapping[str, object]
 
 _TINY = 1e-9
-# What an absent effect's parameter counts as, where that is not 0.
-NEUTRAL = {"efficiency": 1.0, "scale": 1.0}
 
 
 @frozen
@@ -50,7 +48,7 @@ class Turned:
         for knob, turn in zip(knobs, turns, strict=True):
             for key in knob.keys:
                 low, high = bounds_of(key)
-                before = changed.get(key, NEUTRAL.get(key.rpartition(".")[2], 0.0))
+                before = changed.get(key, neutral_of(key))
                 assert isinstance(before, int | float)
                 changed[key] = min(max(float(before) + float(turn), low), high)
         return Turned(MappingProxyType(changed), self.place)
@@ -94,6 +92,14 @@ def split_effect(key: str) -> tuple[str, str]:
         if key.startswith(prefix):
             return effect_id, key.removeprefix(prefix)
     raise KeyError(key)
+
+
+def neutral_of(key: str) -> float:
+    """What a number counts as where a description leaves it out."""
+    if not key.startswith("physics."):
+        return 0.0
+    effect_id, rest = split_effect(key)
+    return EFFECTS[effect_id].parameters[rest.rpartition(".")[2]].neutral
 
 
 def bounds_of(key: str) -> tuple[float, float]:

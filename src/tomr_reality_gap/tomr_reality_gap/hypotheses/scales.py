@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.effects.scales import Scales
 from tomr_power_model.physics.model import PhysicalModel
 from tomr_power_model.response.many import step_of
 from tomr_power_model.robot import GRAVITY, Robot
@@ -13,26 +13,6 @@ from tomr_power_model.robot import GRAVITY, Robot
 Array = NDArray[np.float64]
 
 _GRIPS = (1.0, 0.8, 0.64, 0.51, 0.41, 0.33, 0.26)  # of what the contacts carry at most
-
-
-@frozen
-class Scales:
-    """Typical sizes of one robot in one recording."""
-
-    torque: float  # N m at a wheel
-    speed: float  # rad/s of a wheel, while it moves
-    current: float  # A of a motor
-    power: float  # W of a motor
-    copper: float  # W of a motor
-    load: float  # N on a wheel
-    radius: float  # m, of a wheel
-    arm: float  # m, robot radius
-    mass: float  # kg
-    gear: float
-    voltage: float  # V
-    duration: float  # s
-    period: float  # of the drivers [s]
-    grips: tuple[float, ...] = ()  # traction over load that a contact carries: most, and less
 
 
 def grips_of(robot: Robot, speed: Array, period: float) -> tuple[float, ...]:

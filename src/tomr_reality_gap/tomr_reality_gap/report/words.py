@@ -1,41 +1,12 @@
 """Effects, places and numbers as a person reads them."""
 
 import math
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Sequence
 
+from tomr_power_model.effects import EFFECTS
 from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.explanation import Estimate, Finding
 
-_EFFECTS: Mapping[str, str] = MappingProxyType(
-    {
-        "friction.coulomb": "Coulomb friction",
-        "friction.viscous": "viscous friction",
-        "friction.stribeck": "Stribeck friction",
-        "friction.asymmetric": "friction that differs with direction",
-        "friction.load_dependent": "gear meshing loss",
-        "friction.quadratic": "friction with the square of speed",
-        "drivetrain.torque_ripple": "torque ripple",
-        "contact.roller_drag": "drag of the rollers",
-        "contact.rolling_resistance": "rolling resistance",
-        "contact.slip": "wheel slip",
-        "body.payload_mass": "payload",
-        "body.mass_center_offset": "displaced mass centre",
-        "body.slope": "sloping floor",
-        "electrical.winding_heating": "heating of the windings",
-        "electrical.supply_sag": "sag of the supply voltage",
-        "electrical.driver_standby": "standby power of the drivers",
-        "electrical.switching_loss": "switching loss of the drivers",
-        "electrical.regeneration_loss": "braking power that is lost",
-        "electrical.iron_loss": "iron loss of the motors",
-        "kinematic.wheel_radius": "effective wheel radius",
-        "sensor.power_scale": "power sensor: wrong scale",
-        "sensor.power_bias": "power sensor: offset",
-        "sensor.power_lag": "power sensor: lag",
-        "sensor.clock_offset": "power sensor: clock offset",
-        "unknown": "an effect outside the vocabulary",
-    }
-)
 _PLACES = {
     "all_wheels": "all wheels",
     "body": "body",
@@ -47,8 +18,10 @@ _ALIKE = 0.2  # of the width, by which the halves of an interval shown as ± may
 def effect_words(effect: str) -> str:
     """What an effect is, in words."""
     if effect.startswith("parameter."):
-        return f"wrong value of {effect.removeprefix('parameter.')}"
-    return _EFFECTS.get(effect, effect)
+        return f"Wrong value of {effect.removeprefix('parameter.')}"
+    if effect == "unknown":
+        return "Something outside the vocabulary"
+    return EFFECTS[effect].label if effect in EFFECTS else effect
 
 
 def place_words(where: Sequence[str]) -> str:
@@ -63,8 +36,7 @@ def channel_name(channel: Channel) -> str:
 
 def title(finding: Finding) -> str:
     """E.g. `Stribeck friction, wheel_2_joint`."""
-    words = effect_words(finding.effect)
-    return f"{words[:1].upper()}{words[1:]}, {place_words(finding.where)}"
+    return f"{effect_words(finding.effect)}, {place_words(finding.where)}"
 
 
 def decimals(estimate: Estimate, digits: int) -> int:

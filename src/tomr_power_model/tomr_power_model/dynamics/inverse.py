@@ -1,0 +1,131 @@
+"""Inverse dynamics: the power of each drive from the motion of its wheels, in scalar Python.
+
+    tau = K^-T (M nu' + c(nu) + drag - floor) + J omega' + friction
+    i = tau / k,  v = R i + k omega,  P = supplied(v i) + driver losses
+
+A wheel at rest may hold any torque up to its dry friction, which motion does not tell: there dry
+friction fades over STICKING_SPEED.
+"""
+
+import math
+
+from tomr_power_model.dynamics.contacts import STICKING_SLIDE, Mutable, Numbers
+from tomr_power_model.dynamics.layout import (
+    ALONG,
+    AXLE_INERTIA,
+    CENTER_X,
+    CENTER_Y,
+    CONSTANT,
+    DRAG,
+    FLOOR_X,
+    FLOOR_Y,
+    GEAR,
+    HEADER,
+    INERTIA,
+    LOAD,
+    LOAD_X,
+    LOAD_Y,
+    MASS,
+    MOTION_ACCELERATION,
+    MOTION_ANGLE,
+    MOTION_HEADER,
+    MOTION_HEADING,
+    MOTION_RESISTING,
+    MOTION_RISE,
+    MOTION_SPEED,
+    MOTION_WHEEL,
+    MOTION_YAW,
+    NOMINAL_RADIUS,
+    POWER_CURRENT,
+    POWER_DRAWN,
+    POWER_TORQUE,
+    POWER_VOLTAGE,
+    POWER_WHEEL,
+    RESISTANCE,
+    ROLLER_SLIP,
+    STRIDE,
+    TO_TWIST,
+    VISCOUS,
+)
+from tomr_power_model.dynamics.step import (
+    COPPER,
+    driver_power,
+    dry_torque,
+    moving_torque,
+    supplied,
+)
+from tomr_power_model.effects.base import Wheel
+
+# Wheel speed below which dry friction fades instead of jumping with the encoder's noise [rad/s].
+STICKING_SPEED = 0.1
+
+
+def carried_force(
+    p: Numbers, m: Numbers, n: int
+) -> tuple[float, float, float, float, float, float, float, float]:
+    """Force that the body's motion takes [N, N, N m], its twist, and how it leans [m/s^2]."""
+    stride = int(p[STRIDE])
+    vx = vy = wz = ax = ay = yaw = 0.0
+    for i in range(n):
+        w, a = HEADER + i * stride, MOTION_HEADER + i * MOTION_WHEEL
+        speed, change = m[a + MOTION_SPEED], m[a + MOTION_ACCELERATION]
+        vx += p[w + TO_TWIST] * speed
+        vy += p[w + TO_TWIST + 1] * speed
+        wz += p[w + TO_TWIST + 2] * speed
+        ax += p[w + TO_TWIST] * change
+        ay += p[w + TO_TWIST + 1] * change
+        yaw += p[w + TO_TWIST + 2] * change
+    if m[MOTION_YAW] == m[MOTION_YAW]:
+        wz = m[MOTION_YAW]
+    mass, x, y, g = p[MASS], p[CENTER_X], p[CENTER_Y], INERTIA
+    fx = p[g] * ax + p[g + 1] * ay + p[g + 2] * yaw - mass * wz * (vy + wz * x)
+    fy = p[g + 3] * ax + p[g + 4] * ay + p[g + 5] * yaw + mass * wz * (vx - wz * y)
+    mz = p[g + 6] * ax + p[g + 7] * ay + p[g + 8] * yaw + mass * wz * (x * vx + y * vy)
+    heading = m[MOTION_HEADING]
+    if heading == heading and (p[FLOOR_X] != 0.0 or p[FLOOR_Y] != 0.0):
+        cos, sin = math.cos(heading), math.sin(heading)
+        pull_x, pull_y = cos * p[FLOOR_X] + sin * p[FLOOR_Y], cos * p[FLOOR_Y] - sin * p[FLOOR_X]
+        fx, fy, mz = fx - pull_x, fy - pull_y, mz - x * pull_y + y * pull_x
+    return fx, fy, mz, vx, vy, wz, ax - wz * vy, ay + wz * vx
+
+
+def drive_power(p: Numbers, m: Numbers, out: Mutable, n: int) -> None:
+    """Torque, current, voltage and power of each drive from one row of motion."""
+    stride = int(p[STRIDE])
+    fx, fy, mz, vx, vy, wz, along_x, along_y = carried_force(p, m, n)
+    for i in range(n):
+        w, a = HEADER + i * stride, MOTION_HEADER + i * MOTION_WHEEL
+        if p[w + DRAG] > 0.0:
+            load = max(p[w + LOAD] + p[w + LOAD_X] * along_x + p[w + LOAD_Y] * along_y, 0.0)
+            along = p[w + ALONG] * vx + p[w + ALONG + 1] * vy + p[w + ALONG + 2] * wz
+            across = p[w + ROLLER_SLIP] * m[a + MOTION_SPEED]
+            sliding = math.sqrt(along * along + across * across)
+            if sliding > 0.0:
+                fade = math.tanh(sliding / STICKING_SLIDE) * along / sliding
+                drag = p[w + DRAG] * load * fade
+                fx += p[w + ALONG] * drag
+                fy += p[w + ALONG + 1] * drag
+                mz += p[w + ALONG + 2] * drag
+    for i in range(n):
+        w, a, o = HEADER + i * stride, MOTION_HEADER + i * MOTION_WHEEL, i * POWER_WHEEL
+        speed = m[a + MOTION_SPEED]
+        carried = p[w + TO_TWIST] * fx + p[w + TO_TWIST + 1] * fy + p[w + TO_TWIST + 2] * mz
+        carried += p[w + AXLE_INERTIA] * m[a + MOTION_ACCELERATION]
+        load = max(p[w + LOAD] + p[w + LOAD_X] * along_x + p[w + LOAD_Y] * along_y, 0.0)
+        wheel = Wheel(speed, load, carried, m[a + MOTION_ANGLE], p[w + NOMINAL_RADIUS], p[w + GEAR])
+        torque = carried + p[w + VISCOUS] * speed + m[a + MOTION_RESISTING]
+        torque += max(dry_torque(p, w, wheel), 0.0) * math.tanh(speed / STICKING_SPEED)
+        torque += moving_torque(p, w, wheel)
+        k = p[w + CONSTANT]
+        current = torque / k
+        volts = p[w + RESISTANCE] * (1.0 + COPPER * m[a + MOTION_RISE]) * current + k * speed
+        out[o + POWER_TORQUE] = torque
+        out[o + POWER_CURRENT] = current
+        out[o + POWER_VOLTAGE] = volts
+        out[o + POWER_DRAWN] = supplied(p, w, volts * current) + driver_power(p, w, current)
+
+
+def drive_powers(p: Numbers, motion: Mutable, out: Mutable, n: int) -> None:
+    """`drive_power` of many rows; p one robot, motion (rows, ..), out (rows, ..)."""
+    for row in range(len(motion)):
+        drive_power(p, motion[row], out[row], n)
