@@ -16,7 +16,7 @@ from faults.closed_loop import MotorPower, Prediction
 from faults.explain import measured
 from faults.play import Played, changes_of, scored_name
 from faults.power import PATHS, compared
-from faults.regimes import Regimes, noise_of, rms, tick_means, tick_speeds
+from faults.regimes import AT_REST, noise_of, regimes_of, rms, tick_means, tick_speeds
 from faults.truth import missed, true_value
 
 from tomr_fault_diag.classifier.stage import Diagnosis
@@ -51,7 +51,7 @@ REAL: dict[str, Any] = {
 def regimes(*speeds: float) -> list[str]:
     """Regime of each tick of one wheel; the other two stand."""
     column = np.array(speeds)
-    masks = Regimes.of(np.stack([column, 0 * column, 0 * column], axis=1), PERIOD).masks
+    masks = regimes_of(np.stack([column, 0 * column, 0 * column], axis=1), PERIOD)
     assert np.all(sum(mask.astype(int) for mask in masks.values()) == 1)
     return [next(name for name, mask in masks.items() if mask[k, 0]) for k in range(len(speeds))]
 
@@ -116,7 +116,7 @@ def test_three_predictions_are_compared_on_the_same_ticks() -> None:
     assert [rms(part) for part in found.residual] == pytest.approx([0.3, 0.2, 0.1])
     assert found.sampled == pytest.approx(0.1 * np.sqrt(5.0))
     assert found.rate == pytest.approx(40.0)
-    assert found.regimes.masks["at rest"].all()
+    assert found.regimes[AT_REST].all()
 
 
 def test_states_are_scored_by_their_names_and_first_stamps() -> None:

@@ -12,7 +12,7 @@ from rich.table import Table
 from faults.closed_loop import Prediction, closed_loop
 from faults.play import JOBS, Played, play
 from faults.recordings import Drive, Recordings
-from faults.regimes import Regimes, noise_of, rms, tick_means, tick_speeds
+from faults.regimes import AT_REST, Mask, noise_of, regimes_of, rms, tick_means, tick_speeds
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import Robot, load_robot
 
@@ -20,7 +20,6 @@ Array = NDArray[np.float64]
 
 PATHS = ("command path", "encoder path", "closed loop")
 _LONG = 120.0  # s, of the long drive
-_REST = "at rest"
 
 
 @frozen
@@ -29,7 +28,7 @@ class Compared:
 
     residual: Array  # W, (3, n, 3): `PATHS`, ticks, wheels
     sampled: float  # RMS of the closed loop's over power samples, not ticks [W]
-    regimes: Regimes
+    regimes: dict[str, Mask]  # of `regimes_of`
     tick_noise: Array  # of each motor's measured power while the robot stands [W], (3,)
     sample_noise: Array  # the same of single samples [W], (3,)
     rate: float  # of power samples [Hz]
@@ -42,8 +41,8 @@ def compared(played: Played, predicted: Prediction) -> Compared:
     residual = np.stack([played.command_path, played.encoder_path, np.stack(means, axis=1)])
     speed = tick_speeds(predicted.encoder_ns, predicted.angle, ticks, period)
     known = np.isfinite(residual).all(axis=(0, 2)) & np.isfinite(speed).all(axis=1)
-    regimes = Regimes.of(speed[known], 1e-9 * period)
-    rest = regimes.masks[_REST].all(axis=1)
+    regimes = regimes_of(speed[known], 1e-9 * period)
+    rest = regimes[AT_REST].all(axis=1)
     standing = ticks[known][rest]
     single = [m.measured[_standing(m.time_ns, standing, period)] for m in predicted.motors]
     return Compared(
@@ -56,9 +55,7 @@ def compared(played: Played, predicted: Prediction) -> Compared:
     )
 
 
-def _standing(
-    time_ns: NDArray[np.int64], resting_ns: NDArray[np.int64], period_ns: int
-) -> NDArray[np.bool_]:
+def _standing(time_ns: NDArray[np.int64], resting_ns: NDArray[np.int64], period_ns: int) -> Mask:
     """Which stamps lie in a tick in which no wheel moves."""
     tick = np.searchsorted(resting_ns, time_ns)
     inside = tick < len(resting_ns)
@@ -140,8 +137,8 @@ def regimes_table(found: list[Compared], robot: Robot) -> Table:
     table.add_column("ticks of wheels", justify="right")
     for head in PATHS:
         table.add_column(head, justify="right")
-    for regime in found[0].regimes.masks:
-        parts = [item.residual[:, item.regimes.masks[regime]] for item in found]
+    for regime in found[0].regimes:
+        parts = [item.residual[:, item.regimes[regime]] for item in found]
         values = np.concatenate(parts, axis=1)
         errors = [rms(part) for part in values]
         cells = [f"{error:.3f} ({error / noise:.1f})" for error in errors]

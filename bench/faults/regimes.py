@@ -1,16 +1,15 @@
 """What each wheel was doing in each tick, and power averaged over ticks."""
 
 import math
-from collections.abc import Mapping
 from itertools import pairwise
-from types import MappingProxyType
 
 import numpy as np
-from attrs import frozen
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+AT_REST = "at rest"
 
 _MOVING = 0.1  # rad/s
 _VARYING = 2.0  # rad/s^2: faster changes of the speed count as acceleration
@@ -20,28 +19,25 @@ _AFTER_STOP = 1.0  # s
 _JUMP = 6.0  # times the median step between neighbours: no noise
 
 
-@frozen
-class Regimes:
-    """Masks over ticks and wheels, (n, 3) each; every tick of a wheel is in exactly one."""
+def regimes_of(speed: Array, period: float) -> dict[str, Mask]:
+    """Masks over ticks and wheels, (n, 3) each; every tick of a wheel is in exactly one.
 
-    masks: Mapping[str, Mask]
-
-    @classmethod
-    def of(cls, speed: Array, period: float) -> "Regimes":
-        """Regimes of wheel speeds [rad/s], (n, 3), means over ticks of `period` [s]."""
-        moving = np.abs(speed) > _MOVING
-        varying = np.abs(np.gradient(speed, period, axis=0)) > _VARYING
-        reversing = np.stack([_reversing(wheel, period) for wheel in speed.T], axis=1)
-        stopped = np.stack([_stopped(wheel, period) for wheel in moving.T], axis=1)
-        calm = ~reversing
-        masks = {
-            "at rest": calm & ~moving & ~stopped,
-            "within 1 s after stops": calm & stopped,
-            "in reversals": reversing,
-            "steady": calm & moving & ~varying,
-            "accelerating": calm & moving & varying,
-        }
-        return cls(MappingProxyType(masks))
+    Args:
+        speed: of the wheels, means over ticks [rad/s], (n, 3).
+        period: of the ticks [s].
+    """
+    moving = np.abs(speed) > _MOVING
+    varying = np.abs(np.gradient(speed, period, axis=0)) > _VARYING
+    reversing = np.stack([_reversing(wheel, period) for wheel in speed.T], axis=1)
+    stopped = np.stack([_stopped(wheel, period) for wheel in moving.T], axis=1)
+    calm = ~reversing
+    return {
+        AT_REST: calm & ~moving & ~stopped,
+        "within 1 s after stops": calm & stopped,
+        "in reversals": reversing,
+        "steady": calm & moving & ~varying,
+        "accelerating": calm & moving & varying,
+    }
 
 
 def _reversing(speed: Array, period: float) -> Mask:
