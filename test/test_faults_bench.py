@@ -17,13 +17,12 @@ from faults.explain import measured
 from faults.play import Played, changes_of, scored_name
 from faults.power import PATHS, compared
 from faults.regimes import AT_REST, noise_of, regimes_of, rms, tick_means, tick_speeds
-from faults.truth import missed, true_value
+from faults.truth import missed, ratios, true_value
 
 from tomr_fault_diag.classifier.stage import Diagnosis
 from tomr_fault_diag.classifier.states import NOT_OBSERVABLE, STATES, UNKNOWN, State
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_power_model.cli import EXIT_BAD_INPUT, run_main
-from tomr_power_model.errors import InputError
 
 PERIOD = 0.05
 PERIOD_NS = 50_000_000
@@ -169,15 +168,28 @@ def test_what_was_not_named_is_listed() -> None:
     ]
 
 
+def test_a_description_is_held_against_the_truth() -> None:
+    values = {
+        "robot.mass": 9.69,
+        "motor.resistance": 2.0,
+        "motor.c.resistance": 2.4,
+        "physics.friction.coulomb.torque": 0.44,
+    }
+    found = ratios(REAL, values)
+    assert found["robot.mass"] == pytest.approx([0.95])
+    assert found["motor.resistance"] == pytest.approx([1 / 0.9, 1.0, 1.0])
+    assert found["physics.friction.coulomb.torque"] == pytest.approx([1.1, 1.0, 1.1])
+
+
 def test_the_cost_of_a_command_is_its_own(tmp_path: Path) -> None:
-    cost = measured([sys.executable, "-c", "b = bytearray(80_000_000)"], tmp_path / "log")
-    assert cost.memory > 80.0
-    assert 0.0 < cost.cpu <= 60.0
-    with pytest.raises(InputError, match="ended with 3: no luck"):
-        measured([sys.executable, "-c", "print('no luck'); exit(3)"], tmp_path / "log")
+    code = "b = bytearray(80_000_000); print('no'); print('luck'); exit(3)"
+    run = measured([sys.executable, "-c", code], tmp_path / "log")
+    assert (run.code, run.last) == (3, "luck")
+    assert 80.0 < run.memory < 400.0
+    assert 0.0 < run.cpu < 60.0
 
 
-@pytest.mark.parametrize("command", ["explain", "diagnose", "power"])
+@pytest.mark.parametrize("command", ["explain", "calibrate", "diagnose", "power"])
 def test_absent_recordings_are_one_line(
     command: str,
     tmp_path: Path,

@@ -22,8 +22,9 @@ exit codes: 0 done, 2 bad input, or the recordings are absent"""
 
 _SUMMARIES = {
     "explain": "run tomr_gap explain on the healthy drives: cost, findings beside the truth, error",
+    "calibrate": "run tomr_calibrate on the same: cost, values over the truth, or why it refused",
     "diagnose": "diagnose all drives with a description and score that",
-    "power": "compare the power residuals of the nodes with those of tomr_gap's simulation",
+    "power": "compare power residuals of the nodes with those of tomr_gap's simulation, by regime",
 }
 
 
@@ -44,14 +45,15 @@ def _parser() -> argparse.ArgumentParser:
             metavar="DIR",
             help="results go here (default %(default)s)",
         )
-        if name == "explain":
+        if name in ("explain", "calibrate"):
             command.add_argument(
                 "--fit", type=int, default=3, metavar="N", help="drives to fit (default 3)"
             )
+        if name == "explain":
             command.add_argument(
                 "--tolerance", metavar="REL", help="how far stated values may be off, for tomr_gap"
             )
-        else:
+        if name in ("diagnose", "power"):
             command.add_argument(
                 "--robot", type=Path, metavar="FILE", help="description (default: the owner's)"
             )
@@ -63,7 +65,7 @@ def main(arguments: Sequence[str] | None) -> int:
     options = _parser().parse_args(arguments)
     # What follows takes seconds to import: --help does without.
     from faults.diagnose import diagnose
-    from faults.explain import explain
+    from faults.explain import calibrate, explain
     from faults.power import power
     from faults.recordings import Recordings
 
@@ -72,10 +74,11 @@ def main(arguments: Sequence[str] | None) -> int:
     if options.command == "explain":
         more = [] if options.tolerance is None else ["--tolerance", options.tolerance]
         explain(recordings, options.out / "explained", options.fit, more, console)
-        return EXIT_OK
-    robot = options.robot or recordings.description
-    if options.command == "diagnose":
+    elif options.command == "calibrate":
+        calibrate(recordings, options.out / "calibrated", options.fit, console)
+    elif options.command == "diagnose":
+        robot = options.robot or recordings.description
         print(diagnose(recordings, robot, options.out / "diagnosed" / robot.stem), end="")
     else:
-        power(recordings, robot, console)
+        power(recordings, options.robot or recordings.description, console)
     return EXIT_OK

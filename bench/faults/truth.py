@@ -48,6 +48,27 @@ def described_value(
     return float(nominal * deviation)
 
 
+def ratios(real: Mapping[str, Any], values: Mapping[str, object]) -> dict[str, list[float]]:
+    """Values of a description over the true ones, by key: of each wheel where they differ.
+
+    Args:
+        real: of `Recordings.real`.
+        values: by dotted key, as `read_description` gives them.
+    """
+    found = {}
+    for key, deviation in real["deviations"].items():
+        group, _, name = key.rpartition(".")
+        wheels = real["nominal"]["robot"]["wheel_names"] if isinstance(deviation, list) else [None]
+        own = []
+        for number, wheel in enumerate(wheels):
+            value = values.get(f"{group}.{wheel}.{name}", values.get(key))
+            true = described_value(real, key, [number])
+            if isinstance(value, int | float) and true:
+                own.append(float(value) / true)
+        found[key] = own
+    return found
+
+
 def _nominal(nominal: Mapping[str, Any], key: str) -> float | None:
     """A number by its dotted key; names of effects have dots themselves."""
     group, _, rest = key.partition(".")
