@@ -46,8 +46,9 @@ def explain(
     fitted, held = _split(recordings, count)
     out.mkdir(parents=True, exist_ok=True)
     console.print(f"fitted {', '.join(bag.name for bag in fitted)}; held out {held.name}")
-    inputs = ["--robot", recordings.description, "--real", *fitted, "--holdout", held]
-    command = [_tool("tomr_gap"), "explain", *inputs, "--out", out, *options]
+    bags: list[str | Path] = ["--real", *fitted, "--holdout", held]
+    command = [_tool("tomr_gap"), "explain", "--robot", recordings.description, *bags]
+    command += ["--out", out, *options]
     run = measured(command, out / "explain.log")
     console.print(run.cost)
     if run.code:
@@ -70,7 +71,7 @@ def calibrate(recordings: Recordings, out: Path, count: int, console: Console) -
     fitted, held = _split(recordings, count)
     out.mkdir(parents=True, exist_ok=True)
     written = out / "calibrated.yaml"
-    inputs = [*fitted, "--robot", recordings.description, "--holdout", held]
+    inputs: list[str | Path] = [*fitted, "--robot", recordings.description, "--holdout", held]
     command = [_tool("tomr_calibrate"), *inputs, "--out", written]
     run = measured(command, out / "calibrate.log")
     console.print(run.cost)
