@@ -16,7 +16,7 @@ from faults.closed_loop import MotorPower, Prediction
 from faults.explain import measured
 from faults.play import Played, changes_of, scored_name
 from faults.power import PATHS, compared
-from faults.regimes import AT_REST, noise_of, regimes_of, rms, tick_means, tick_speeds
+from faults.regimes import AT_REST, noise_of, regimes_of, rms, tick_means, tick_speeds, undisturbed
 from faults.truth import missed, ratios, true_value
 
 from tomr_fault_diag.classifier.stage import Diagnosis
@@ -116,6 +116,13 @@ def test_three_predictions_are_compared_on_the_same_ticks() -> None:
     assert found.sampled == pytest.approx(0.1 * np.sqrt(5.0))
     assert found.rate == pytest.approx(40.0)
     assert found.regimes[AT_REST].all()
+
+
+def test_two_seconds_after_a_bump_are_left_out() -> None:
+    stamps = 10**18 + 500_000_000 * np.arange(10, dtype=np.int64)
+    found = undisturbed(stamps, [10**18 + 1_050_000_000])
+    assert found.tolist() == [True, True, False, False, False, False, False, True, True, True]
+    assert undisturbed(stamps, []).all()
 
 
 def test_states_are_scored_by_their_names_and_first_stamps() -> None:

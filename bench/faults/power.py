@@ -1,5 +1,6 @@
 """Power residuals of the nodes and of `tomr_gap` on the same drives, ticks and regimes."""
 
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -12,7 +13,16 @@ from rich.table import Table
 from faults.closed_loop import Prediction, closed_loop
 from faults.play import JOBS, Played, play
 from faults.recordings import Drive, Recordings
-from faults.regimes import AT_REST, Mask, noise_of, regimes_of, rms, tick_means, tick_speeds
+from faults.regimes import (
+    AT_REST,
+    Mask,
+    noise_of,
+    regimes_of,
+    rms,
+    tick_means,
+    tick_speeds,
+    undisturbed,
+)
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import Robot, load_robot
 
@@ -34,20 +44,23 @@ class Compared:
     rate: float  # of power samples [Hz]
 
 
-def compared(played: Played, predicted: Prediction) -> Compared:
-    """Put the residuals of a drive side by side."""
+def compared(played: Played, predicted: Prediction, bumps_ns: Sequence[int] = ()) -> Compared:
+    """Put the residuals of a drive side by side, without what bumps do to it."""
     ticks, period = played.stamp_ns, played.period_ns
     means = [tick_means(m.time_ns, m.residual, ticks, period) for m in predicted.motors]
     residual = np.stack([played.command_path, played.encoder_path, np.stack(means, axis=1)])
     speed = tick_speeds(predicted.encoder_ns, predicted.angle, ticks, period)
     known = np.isfinite(residual).all(axis=(0, 2)) & np.isfinite(speed).all(axis=1)
-    regimes = regimes_of(speed[known], 1e-9 * period)
+    known &= undisturbed(ticks, bumps_ns)
+    samples = [m.residual[undisturbed(m.time_ns, bumps_ns)] for m in predicted.motors]
+    everywhere = regimes_of(np.nan_to_num(speed), 1e-9 * period)
+    regimes = {name: mask[known] for name, mask in everywhere.items()}
     rest = regimes[AT_REST].all(axis=1)
     standing = ticks[known][rest]
     single = [m.measured[_standing(m.time_ns, standing, period)] for m in predicted.motors]
     return Compared(
         residual=residual[:, known],
-        sampled=rms(np.concatenate([motor.residual for motor in predicted.motors])),
+        sampled=rms(np.concatenate(samples)),
         regimes=regimes,
         tick_noise=np.array([noise_of(wheel) for wheel in played.measured[known][rest].T]),
         sample_noise=np.array([noise_of(values) for values in single]),
@@ -65,7 +78,8 @@ def _standing(time_ns: NDArray[np.int64], resting_ns: NDArray[np.int64], period_
 
 def compare(drive: Drive, robot: Path, seconds: float) -> Compared:
     """Run a drive through nodes' core and simulation."""
-    return compared(play(drive.bag, robot, seconds), closed_loop(drive.bag, robot, seconds))
+    played = play(drive.bag, robot, seconds)
+    return compared(played, closed_loop(drive.bag, robot, seconds), drive.bumps_ns)
 
 
 def compare_all(recordings: Recordings, robot: Path) -> dict[str, Compared | str]:
@@ -101,7 +115,10 @@ def power(recordings: Recordings, robot: Path, console: Console) -> None:
 
 def drives_table(found: dict[str, Compared]) -> Table:
     """RMS of each drive, three motors together."""
-    table = Table(title="RMS of motor power [W], mean over ticks", title_justify="left")
+    table = Table(
+        title="RMS of motor power [W], mean over ticks, 2 s after bumps left out",
+        title_justify="left",
+    )
     table.add_column("drive")
     for head in (*PATHS, "command / closed loop", "encoder / closed loop", "closed loop, samples"):
         table.add_column(head, justify="right")

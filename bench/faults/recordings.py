@@ -20,6 +20,7 @@ class Drive:
     identity: str
     bag: Path
     is_normal: bool  # nothing goes wrong in it, from start to end
+    bumps_ns: tuple[int, ...]  # stamps at which something pushes it
 
 
 @frozen
@@ -61,7 +62,9 @@ class Recordings:
         for bag in sorted((self.folder / "faults" / self.robot / kind).iterdir()):
             told = _json(self.truth / self.robot / f"{bag.name}.json")
             is_normal = told["onset"] is None and told["extended"] == "none"
-            found.append(Drive(bag.name, bag, is_normal))
+            start = int(told["t0_ns"])
+            bumps = [start + round(1e9 * bump["t"]) for bump in told.get("bumps") or ()]
+            found.append(Drive(bag.name, bag, is_normal, tuple(bumps)))
         return tuple(found)
 
     def real(self) -> Mapping[str, Any]:

@@ -1,6 +1,7 @@
 """What each wheel was doing in each tick, and power averaged over ticks."""
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +17,7 @@ _VARYING = 2.0  # rad/s^2: faster changes of the speed count as acceleration
 _PAUSE = 0.3  # s: a wheel that stands for longer between two directions has stopped
 _NEAR = 0.25  # s, before and after the change of sign
 _AFTER_STOP = 1.0  # s
+_BUMP_NS = (-100_000_000, 2_000_000_000)  # from before a bump to when it is over
 _JUMP = 6.0  # times the median step between neighbours: no noise
 
 
@@ -57,6 +59,12 @@ def _stopped(moving: Mask, period: float) -> Mask:
     ticks = np.arange(len(moving))
     last = np.maximum.accumulate(np.where(moving, ticks, -1))
     return np.asarray(~moving & (last >= 0) & ((ticks - last) * period <= _AFTER_STOP + 1e-9))
+
+
+def undisturbed(stamp_ns: NDArray[np.int64], bumps_ns: Sequence[int]) -> Mask:
+    """Stamps that no bump precedes closely, (n,): no model knows of a push."""
+    since = stamp_ns[:, None] - np.array(bumps_ns, dtype=np.int64)
+    return np.asarray(~((since > _BUMP_NS[0]) & (since < _BUMP_NS[1])).any(axis=1))
 
 
 def tick_speeds(
