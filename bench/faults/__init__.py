@@ -1,0 +1,1 @@
+"""Recordings with and without faults: explained, diagnosed, and power residuals by regime."""

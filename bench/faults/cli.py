@@ -1,0 +1,84 @@
+"""The command line of the benchmark on robots with and without faults."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from tomr_power_model.cli import EXIT_OK
+
+_DESCRIPTION = """\
+Judge the suite on the recordings `faults_practice`: one robot of an independent plant, healthy and
+with faults, and its truth. They lie under $TOMR_RECORDINGS (default ../shared/recordings)."""
+
+_EPILOG = """\
+examples:
+  faults_practice.py explain
+  faults_practice.py diagnose --robot build/faults_practice/explained/robot_explained.yaml
+  faults_practice.py power --robot build/faults_practice/explained/robot_explained.yaml
+
+exit codes: 0 done, 2 bad input, or the recordings are absent"""
+
+_SUMMARIES = {
+    "explain": "run tomr_gap explain on the healthy drives: cost, findings beside the truth, error",
+    "calibrate": "run tomr_calibrate on the same: cost, values over the truth, or why it refused",
+    "diagnose": "diagnose all drives with a description and score that",
+    "power": "compare power residuals of the nodes with those of tomr_gap's simulation, by regime",
+}
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="faults_practice.py",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
+    for name, summary in _SUMMARIES.items():
+        command = commands.add_parser(name, help=summary, description=summary)
+        command.add_argument(
+            "--out",
+            type=Path,
+            default=Path("build/faults_practice"),
+            metavar="DIR",
+            help="results go here (default %(default)s)",
+        )
+        if name in ("explain", "calibrate"):
+            command.add_argument(
+                "--fit", type=int, default=3, metavar="N", help="drives to fit (default 3)"
+            )
+        if name == "explain":
+            command.add_argument(
+                "--tolerance", metavar="REL", help="how far stated values may be off, for tomr_gap"
+            )
+        if name in ("diagnose", "power"):
+            command.add_argument(
+                "--robot", type=Path, metavar="FILE", help="description (default: the owner's)"
+            )
+    return parser
+
+
+def main(arguments: Sequence[str] | None) -> int:
+    """Run one of the commands. Raises InputError, also where the recordings are absent."""
+    options = _parser().parse_args(arguments)
+    # What follows takes seconds to import: --help does without.
+    from faults.diagnose import diagnose
+    from faults.explain import calibrate, explain
+    from faults.power import power
+    from faults.recordings import Recordings
+
+    recordings = Recordings.find()
+    console = Console(width=160, highlight=False)
+    if options.command == "explain":
+        more = [] if options.tolerance is None else ["--tolerance", options.tolerance]
+        explain(recordings, options.out / "explained", options.fit, more, console)
+    elif options.command == "calibrate":
+        calibrate(recordings, options.out / "calibrated", options.fit, console)
+    elif options.command == "diagnose":
+        robot = options.robot or recordings.description
+        print(diagnose(recordings, robot, options.out / "diagnosed" / robot.stem), end="")
+    else:
+        power(recordings, options.robot or recordings.description, console)
+    return EXIT_OK

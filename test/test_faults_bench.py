@@ -1,0 +1,210 @@
+"""The benchmark on robots with and without faults: regimes, means over ticks, states, truth."""
+# ruff: noqa: E402 (bench/ is no package)
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT / "bench"))
+
+from faults.cli import main
+from faults.closed_loop import MotorPower, Prediction
+from faults.explain import measured
+from faults.play import Played, changes_of, scored_name
+from faults.power import PATHS, compared
+from faults.regimes import AT_REST, noise_of, regimes_of, rms, tick_means, tick_speeds, undisturbed
+from faults.truth import missed, ratios, true_value
+
+from tomr_fault_diag.classifier.stage import Diagnosis
+from tomr_fault_diag.classifier.states import NOT_OBSERVABLE, STATES, UNKNOWN, State
+from tomr_fault_diag.residuals.frame import ResidualFrame
+from tomr_power_model.cli import EXIT_BAD_INPUT, run_main
+
+PERIOD = 0.05
+PERIOD_NS = 50_000_000
+WHEELS = ["a", "b", "c"]
+REAL: dict[str, Any] = {
+    "nominal": {
+        "robot": {"wheel_names": WHEELS, "mass": 10.0},
+        "motor": {"resistance": 2.0},
+        "physics": {"friction.coulomb": {"torque": 0.4}},
+    },
+    "deviations": {
+        "robot.mass": 1.02,
+        "motor.resistance": [0.9, 1.0, 1.2],
+        "physics.friction.coulomb.torque": [1.0, 1.1, 1.0],
+    },
+    "effects": [
+        {"effect": "friction.stribeck", "where": ["a"], "parameters": {"torque": 0.1}},
+        {"effect": "friction.stribeck", "where": ["b"], "parameters": {"torque": 0.2}},
+        {"effect": "contact.slip", "where": ["all_wheels"], "parameters": {"friction": 0.6}},
+    ],
+    "heating": [6.0, 250.0],
+}
+
+
+def regimes(*speeds: float) -> list[str]:
+    """Regime of each tick of one wheel; the other two stand."""
+    column = np.array(speeds)
+    masks = regimes_of(np.stack([column, 0 * column, 0 * column], axis=1), PERIOD)
+    assert np.all(sum(mask.astype(int) for mask in masks.values()) == 1)
+    return [next(name for name, mask in masks.items() if mask[k, 0]) for k in range(len(speeds))]
+
+
+def test_a_wheel_that_starts_runs_and_stops_passes_through_the_regimes() -> None:
+    found = regimes(*[0.0] * 5, 2.0, 4.0, *[5.0] * 10, 2.0, *[0.0] * 25)
+    assert found[:5] == ["at rest"] * 5  # never moved before: this is no stop
+    assert found[5:8] == ["accelerating"] * 3
+    assert found[8:16] == ["steady"] * 8
+    assert found[16:18] == ["accelerating"] * 2
+    assert found[18:38] == ["within 1 s after stops"] * 20
+    assert found[38:] == ["at rest"] * 5
+
+
+def test_a_change_of_sign_is_a_reversal_unless_the_wheel_stands_between() -> None:
+    swift = regimes(*[3.0] * 10, *[0.0] * 2, *[-3.0] * 10)
+    assert swift == ["steady"] * 5 + ["in reversals"] * 12 + ["steady"] * 5
+    slow = regimes(*[3.0] * 10, *[0.0] * 8, *[-3.0] * 10)
+    assert "in reversals" not in slow
+    assert slow[10:18] == ["within 1 s after stops"] * 8
+    assert "in reversals" not in regimes(*[3.0] * 10, *[0.0] * 2, *[3.0] * 10)
+
+
+def test_samples_belong_to_the_tick_that_ends_after_them() -> None:
+    stamps = np.array([100, 150, 300], dtype=np.int64)  # a tick is missing before the last
+    times = np.array([50, 51, 100, 101, 150, 240, 251, 299, 301], dtype=np.int64)
+    values = np.array([9.0, 1.0, 3.0, 4.0, 6.0, 9.0, 7.0, 8.0, 9.0])
+    assert tick_means(times, values, stamps, 50).tolist() == [2.0, 5.0, 7.5]
+    assert np.isnan(tick_means(times[:3], values[:3], stamps, 50)).tolist() == [False, True, True]
+
+
+def test_speeds_of_ticks_are_differences_of_angles() -> None:
+    times = np.arange(0, 11, dtype=np.int64) * 10_000_000 + 10**18
+    angle = np.outer(1e-9 * (times - times[0]), [2.0, -3.0, 0.0])
+    angle[4, 0] = np.nan  # a lost sample between others
+    stamps = times[0] + np.array([20_000_000, 70_000_000, 120_000_000])
+    speed = tick_speeds(times, angle, stamps, PERIOD_NS)
+    np.testing.assert_allclose(speed[1], [2.0, -3.0, 0.0], atol=1e-9)
+    assert np.isnan(speed[[0, 2]]).all()  # begin before, or end after, the encoders
+
+
+def test_noise_is_of_neighbours_and_no_jump() -> None:
+    noise = np.random.default_rng(3).normal(0.0, 0.1, 4000)
+    noise[2000:] += 50.0
+    assert noise_of(noise) == pytest.approx(0.1, rel=0.05)
+    assert rms(np.array([3.0, np.nan, -3.0])) == 3.0
+    assert np.isnan(noise_of(np.zeros(1)))
+
+
+def test_three_predictions_are_compared_on_the_same_ticks() -> None:
+    stamps = 10**18 + PERIOD_NS * np.arange(1, 101, dtype=np.int64)
+    times = 10**18 + PERIOD_NS // 2 * np.arange(1, 201, dtype=np.int64)
+    ones = np.ones((100, 3))
+    command = 0.3 * ones
+    command[:10] = np.nan  # the nodes' first ticks: of no prediction's count
+    power = MotorPower(times, np.full(200, 2.0), 2.0 + 0.1 * np.tile([1.0, -3.0], 100))
+    encoders = np.arange(10**18, 10**18 + 101 * PERIOD_NS, PERIOD_NS, dtype=np.int64)
+    predicted = Prediction((power,) * 3, encoders, np.zeros((101, 3)))
+    played = Played((), stamps, PERIOD_NS, 2.0 * ones, command, -0.2 * ones)
+    found = compared(played, predicted)
+    assert found.residual.shape == (len(PATHS), 90, 3)
+    assert [rms(part) for part in found.residual] == pytest.approx([0.3, 0.2, 0.1])
+    assert found.sampled == pytest.approx(0.1 * np.sqrt(5.0))
+    assert found.rate == pytest.approx(40.0)
+    assert found.regimes[AT_REST].all()
+
+
+def test_two_seconds_after_a_bump_are_left_out() -> None:
+    stamps = 10**18 + 500_000_000 * np.arange(10, dtype=np.int64)
+    found = undisturbed(stamps, [10**18 + 1_050_000_000])
+    assert found.tolist() == [True, True, False, False, False, False, False, True, True, True]
+    assert undisturbed(stamps, []).all()
+
+
+def test_states_are_scored_by_their_names_and_first_stamps() -> None:
+    names = [scored_name(state.name) for state in (*STATES, NOT_OBSERVABLE, UNKNOWN)]
+    assert names == [
+        *("normal", "slip", "control_system"),
+        *("motor_system_1", "motor_system_2", "motor_system_3", "not_observable", "stale"),
+    ]
+
+    def said(seconds: int, state: State, wheel: int | None) -> Diagnosis:
+        stamp = seconds * 10**9
+        frame = ResidualFrame(stamp, ())
+        # Named now, though it began two seconds ago.
+        return Diagnosis(stamp, state, stamp - 2 * 10**9, (), frame, False, wheel)
+
+    told = [(3, STATES[0], None), (4, STATES[0], None), (5, STATES[2], 1), (6, STATES[2], 0)]
+    assert changes_of(said(*item) for item in told) == (
+        (3.0, "normal", None),
+        (5.0, "control_system", 2),
+        (6.0, "control_system", 1),
+    )
+
+
+@pytest.mark.parametrize(
+    ("effect", "where", "parameter", "value"),
+    [
+        ("friction.stribeck", ["b"], "torque", 0.2),
+        ("friction.stribeck", ["a", "b"], "torque", 0.15),
+        ("friction.stribeck", ["c"], "torque", None),
+        ("contact.slip", ["all_wheels"], "friction", 0.6),
+        ("electrical.winding_heating", ["all_wheels"], "time_constant", 250.0),
+        ("parameter.robot.mass", ["body"], "value", 10.2),
+        ("parameter.motor.resistance", ["c"], "value", 2.4),
+        ("friction.coulomb", ["b"], "torque", 0.44),
+        ("parameter.physics.friction.coulomb.torque", ["b"], "value", 0.44),
+        ("electrical.iron_loss", ["all_wheels"], "eddy", None),
+    ],
+)
+def test_findings_are_held_against_the_real_robot(
+    effect: str, where: list[str], parameter: str, value: float | None
+) -> None:
+    found = true_value(REAL, effect, where, parameter)
+    assert found is None if value is None else found == pytest.approx(value)
+
+
+def test_what_was_not_named_is_listed() -> None:
+    assert missed(REAL, ["contact.slip", "unknown"]) == [
+        "electrical.winding_heating",
+        "friction.stribeck",
+    ]
+
+
+def test_a_description_is_held_against_the_truth() -> None:
+    values = {
+        "robot.mass": 9.69,
+        "motor.resistance": 2.0,
+        "motor.c.resistance": 2.4,
+        "physics.friction.coulomb.torque": 0.44,
+    }
+    found = ratios(REAL, values)
+    assert found["robot.mass"] == pytest.approx([0.95])
+    assert found["motor.resistance"] == pytest.approx([1 / 0.9, 1.0, 1.0])
+    assert found["physics.friction.coulomb.torque"] == pytest.approx([1.1, 1.0, 1.1])
+
+
+def test_the_cost_of_a_command_is_its_own(tmp_path: Path) -> None:
+    code = "b = bytearray(80_000_000); print('no'); print('luck'); exit(3)"
+    run = measured([sys.executable, "-c", code], tmp_path / "log")
+    assert (run.code, run.last) == (3, "luck")
+    assert 80.0 < run.memory < 400.0
+    assert 0.0 < run.cpu < 60.0
+
+
+@pytest.mark.parametrize("command", ["explain", "calibrate", "diagnose", "power"])
+def test_absent_recordings_are_one_line(
+    command: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("TOMR_RECORDINGS", str(tmp_path))
+    assert run_main(main, [command]) == EXIT_BAD_INPUT
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert "is absent: set TOMR_RECORDINGS" in told
