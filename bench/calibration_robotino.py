@@ -25,8 +25,8 @@ from tomr_power_model.calibrate_cli import main as tomr_calibrate
 from tomr_power_model.calibration.problem import modelled_power
 from tomr_power_model.calibration.recorded import Recorded, read_recorded
 from tomr_power_model.calibration.samples import Samples, samples_of
+from tomr_power_model.dynamics.drives import InverseDynamics
 from tomr_power_model.model.scores import accuracy
-from tomr_power_model.physics.model import PhysicalModel
 from tomr_power_model.robot import Robot, load_robot
 from tomr_sim_bridge.cli.import_robotino import import_robotino
 from tomr_sim_bridge.importers.dataset import default_dataset
@@ -90,7 +90,7 @@ def figures_of(recorded: Recorded, samples: Samples, robot: Robot) -> dict[str, 
     total = np.column_stack([measured.sum(axis=1), model.sum(axis=1)])
     by_second = np.column_stack([np.bincount(second, column) for column in total.T])
     steady = samples.time > _STARTING
-    current = np.abs(PhysicalModel.of(robot).power(samples.mean_motion).current)
+    current = np.abs(InverseDynamics.of(robot).power(samples.mean_motion).current)
     rows = np.isin(recorded.power_time, samples.time[steady])
     return {
         "sample": accuracy(total[:, 0], total[:, 1]),

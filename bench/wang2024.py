@@ -28,9 +28,9 @@ from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, TOTAL, ResidualFrame
 from tomr_fault_diag.training.drives import every_value
 from tomr_power_model.cli import run_main
+from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.messages.bag import bag_message
 from tomr_power_model.model.scores import accuracy, nrmse
-from tomr_power_model.physics.model import WheelMotion
 from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import Robot, load_robot
 from tomr_power_model.wang2024 import Coefficients, Samples, fit_wang2024

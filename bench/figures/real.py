@@ -19,7 +19,7 @@ from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_power_model.calibration.recorded import read_recorded
 from tomr_power_model.calibration.samples import Samples, samples_of
-from tomr_power_model.physics.model import WheelMotion
+from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import Robot, load_robot, read_node_sections
 from tomr_power_model.wang2024 import Samples as PaperSamples

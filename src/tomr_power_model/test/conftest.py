@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from tomr_power_model.calibration.problem import modelled_power
 from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.geometry.kinematics import twist_to_wheels
-from tomr_power_model.physics.model import WheelMotion
 from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]

@@ -15,8 +15,8 @@ from tomr_power_model.calibration.parameters import Choice, choose, with_values
 from tomr_power_model.calibration.problem import Problem, modelled_power
 from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.calibration.samples import Samples, samples_of
+from tomr_power_model.dynamics.drives import InverseDynamics, WheelMotion
 from tomr_power_model.errors import InputError
-from tomr_power_model.physics.model import PhysicalModel, WheelMotion
 from tomr_power_model.response.closed_loop import ClosedLoop
 from tomr_power_model.robot import (
     GRAVITY,
@@ -166,7 +166,7 @@ def test_motor_currents_without_sign_and_total_power_alone(make_drive: MakeDrive
     motion = samples_of(drive, ROBOT, TIMING.span, TIMING.window)
     rows = np.isin(drive.power_time, motion.time)
     current = empty.copy()
-    current[rows] = np.abs(PhysicalModel.of(ROBOT).power(motion.motion).current)
+    current[rows] = np.abs(InverseDynamics.of(ROBOT).power(motion.motion).current)
     currents = evolve(drive, power=current, total=drive.total[:0], total_time=drive.total_time[:0])
     found = calibrate({**heavier, **unsigned}, "test", align([currents], robot, TIMING), (), choice)
     assert found.fitted.numbers[0] == pytest.approx(0.06, rel=0.02)
@@ -223,7 +223,7 @@ def test_roller_drag_turns_with_the_slip_by_hand() -> None:
     # u, 0.5 v): 1, and 0.2 / hypot(0.2, 0.1732) = 0.7559. Along x: 14.71 (1 + 0.7559) = 25.83 N.
     force = 0.3 * 15.0 * GRAVITY / 3.0 * (1.0 + 0.2 / np.hypot(0.2, 0.5 * 0.4 * np.sqrt(0.75)))
     robot = dragged(0.5)
-    model = PhysicalModel.of(robot)
+    model = InverseDynamics.of(robot)
     speed = np.array([[0.0, 0.4 * np.sqrt(0.75) / 0.05, -0.4 * np.sqrt(0.75) / 0.05]])
     torque = model.power(WheelMotion(speed, np.zeros((1, 3)))).torque
     np.testing.assert_allclose(
@@ -234,7 +234,7 @@ def test_roller_drag_turns_with_the_slip_by_hand() -> None:
 @pytest.mark.parametrize("slip", [0.0, 0.4])
 def test_closed_loop_feels_the_same_roller_drag(slip: float) -> None:
     robot = dragged(slip)
-    model = PhysicalModel.of(robot)
+    model = InverseDynamics.of(robot)
     speed = (3.0, -5.0, 1.0)
     torque = model.power(WheelMotion(np.array([speed]), np.zeros((1, 3)))).torque[0]
     loop = ClosedLoop.of(robot, model, 0.005)

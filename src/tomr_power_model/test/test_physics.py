@@ -8,9 +8,9 @@ from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tomr_power_model.dynamics.drives import InverseDynamics, WheelMotion
 from tomr_power_model.geometry.kinematics import twist_to_wheels, wheels_to_twist
 from tomr_power_model.physics.body import wheel_loads
-from tomr_power_model.physics.model import PhysicalModel, WheelMotion
 from tomr_power_model.robot import GRAVITY, Robot, shipped_robot
 
 SPEEDS = st.floats(-2.0, 2.0)
@@ -42,7 +42,7 @@ def test_steady_power_by_hand(robot: Robot) -> None:
     # Along +x at 0.4 m/s wheel 2 turns at 0.4 * 0.866 / 0.05 = 6.9282 rad/s against 0.06 +
     # 0.004 * 6.9282 = 0.087713 N m; k = 0.7 N m/A, R = 0.8 ohm, standby 1.2 W.
     speed = twist_to_wheels(robot) @ [0.4, 0.0, 0.0]
-    power = PhysicalModel.of(robot).power(WheelMotion(speed[None, :], np.zeros((1, 3))))
+    power = InverseDynamics.of(robot).power(WheelMotion(speed[None, :], np.zeros((1, 3))))
     current = 0.087713 / 0.7
     expected = current * (0.8 * current + 0.7 * 6.9282) + 1.2
     np.testing.assert_allclose(power.power[0], [1.2, expected, expected], rtol=1e-4)
@@ -52,7 +52,7 @@ def test_accelerating_force_by_hand(robot: Robot) -> None:
     # Without friction: torques are K^-T (m a, 0, 0) + J omega_dot, here for 1 m/s^2 along +x.
     bare = evolve(robot, physics={})
     acceleration = twist_to_wheels(bare) @ [1.0, 0.0, 0.0]
-    power = PhysicalModel.of(bare).power(WheelMotion(np.zeros((1, 3)), acceleration[None, :]))
+    power = InverseDynamics.of(bare).power(WheelMotion(np.zeros((1, 3)), acceleration[None, :]))
     inertia = 6.0e-4 + 20.0**2 * 5.0e-6
     wheel = 15.0 * 0.05 / math.sqrt(3.0) + inertia * acceleration[1]
     np.testing.assert_allclose(power.torque[0], [0.0, wheel, -wheel], atol=1e-12)
@@ -62,7 +62,7 @@ def test_turning_while_driving_needs_the_side_force(robot: Robot) -> None:
     # In the body frame a robot that drives along x and yaws feels m omega v sideways.
     bare = evolve(robot, physics={})
     speed = twist_to_wheels(bare) @ [0.5, 0.0, 1.0]
-    torque = PhysicalModel.of(bare).power(WheelMotion(speed[None, :], np.zeros((1, 3)))).torque
+    torque = InverseDynamics.of(bare).power(WheelMotion(speed[None, :], np.zeros((1, 3)))).torque
     side = 15.0 * 1.0 * 0.5
     np.testing.assert_allclose(torque[0], wheels_to_twist(bare).T @ [0.0, side, 0.0])
 
@@ -81,7 +81,7 @@ def test_a_turn_by_120_degrees_only_moves_the_labels(
 ) -> None:
     """Rotate the command by 120 degrees: each wheel's power passes to the next wheel."""
     robot = shipped_robot("reference")
-    model, matrix = PhysicalModel.of(robot), twist_to_wheels(robot)
+    model, matrix = InverseDynamics.of(robot), twist_to_wheels(robot)
     turn = 2.0 * math.pi / 3.0
     cosine, sine = math.cos(turn), math.sin(turn)
     rotation = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
@@ -104,7 +104,7 @@ def test_energy_is_conserved(
     robot = evolve(shipped_robot("reference"), mass_center=(0.02, -0.01, 0.1))
     physics = {k: v for k, v in robot.physics.items() if k != "electrical.driver_standby"}
     robot = evolve(robot, physics=physics)
-    model, matrix = PhysicalModel.of(robot), twist_to_wheels(robot)
+    model, matrix = InverseDynamics.of(robot), twist_to_wheels(robot)
     twist, rate = np.array([vx, vy, wz]), np.array([ax, ay, az])
     speed, acceleration = (matrix @ twist)[None, :], (matrix @ rate)[None, :]
     drives = model.power(WheelMotion(speed, acceleration))
@@ -119,7 +119,7 @@ def test_energy_is_conserved(
 def test_one_row_or_many_give_the_same_numbers(robot: Robot) -> None:
     random = np.random.default_rng(1)
     motion = WheelMotion(random.normal(0.0, 5.0, (50, 3)), random.normal(0.0, 20.0, (50, 3)))
-    model = PhysicalModel.of(robot)
+    model = InverseDynamics.of(robot)
     together = model.power(motion).power
     for row in range(50):
         alone = WheelMotion(motion.speed[[row]], motion.acceleration[[row]])

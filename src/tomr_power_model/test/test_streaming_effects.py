@@ -6,14 +6,14 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 from attrs import evolve
+from tomr_power_model.model.slow_states import Monitors, Surroundings, Windings
 
+from tomr_power_model.dynamics.drives import InverseDynamics
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.model.encoders import Triple, WheelEstimate
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.predictor import PowerPredictor
-from tomr_power_model.model.slow_states import Monitors, Surroundings, Windings
 from tomr_power_model.physics.effects import COPPER, effects_of
-from tomr_power_model.physics.model import PhysicalModel
 from tomr_power_model.response.closed_loop import ClosedLoop, LoopState
 from tomr_power_model.robot import Robot, shipped_robot
 
@@ -114,7 +114,7 @@ def test_heat_by_hand() -> None:
     # 2 A through 0.8 ohm: 3.2 W, settled 6.4 K; after 0.05 s of 10 s 6.4 (1 - e^-0.005). Wheel 2
     # has no encoder: its command says 1 A. Of wheel 3 nothing is known.
     heating = {"thermal_resistance": 2.0, "time_constant": 10.0}
-    model = PhysicalModel.of(_robot({"electrical.winding_heating": heating}))
+    model = InverseDynamics.of(_robot({"electrical.winding_heating": heating}))
     windings = Windings.of(model, PERIOD)
     assert windings is not None
     windings.heat(np.array([4.0, math.nan, math.nan]), np.array([0.0, 1.0, math.nan]))
@@ -136,7 +136,7 @@ def test_warm_windings_draw_more() -> None:
 def test_warm_windings_start_slower() -> None:
     """Windings of twice the resistance halve the first step from standstill."""
     robot = evolve(shipped_robot("reference"), physics={})
-    loop = ClosedLoop.of(robot, PhysicalModel.of(robot), 0.005)
+    loop = ClosedLoop.of(robot, InverseDynamics.of(robot), 0.005)
     cold = loop.step(LoopState(), UPHILL)
     warm = loop.step(LoopState(), UPHILL, None, (1.0 / COPPER,) * 3)
     assert abs(cold.speed[2]) > 0.0
@@ -185,7 +185,7 @@ def test_the_slope_turns_against_the_heading() -> None:
     # 15 kg * 9.80665 m/s^2 * sin 0.05 = 7.35192 N. Downhill ahead the wheels hold
     # F r / sqrt 3 = 0.212231 N m; after a turn by 90 degrees, with downhill at the right,
     # F r / 3 (-2, 1, 1).
-    model = PhysicalModel.of(_robot({"body.slope": EVERY["body.slope"]}))
+    model = InverseDynamics.of(_robot({"body.slope": EVERY["body.slope"]}))
     slope = Surroundings.of(model, PERIOD, 10)
     assert slope is not None
     still = WheelEstimate(np.zeros(3), np.zeros(3))

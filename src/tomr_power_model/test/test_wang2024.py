@@ -8,9 +8,9 @@ from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.physics.body import wheel_loads
-from tomr_power_model.physics.model import WheelMotion
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_power_model.wang2024 import Coefficients, Wang2024Model
 from tomr_power_model.wang2024 import angles as a

@@ -9,13 +9,13 @@ from attrs import evolve, fields
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.errors import InputError
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.model.power_models import POWER_MODELS, own_parameters
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.model.settings import MODEL_PARAMETERS, ModelSettings
-from tomr_power_model.physics.model import WheelMotion
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import shipped_robot
 from tomr_power_model.robot.parameters import check_all

@@ -3,6 +3,7 @@
 Each check looks at one recording and returns what it found, where, and what to do about it.
 """
 
+import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 
@@ -14,11 +15,9 @@ from scipy.ndimage import gaussian_filter1d
 from tomr_power_model.calibration.motion import median_period
 from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.errors import InputError
-from tomr_power_model.geometry.kinematics import twist_to_wheels
-from tomr_power_model.model.expected import ExpectedMotion
-from tomr_power_model.model.settings import ModelSettings
-from tomr_power_model.model.ticks import TickSettings, to_ns
-from tomr_power_model.physics.model import PhysicalModel
+from tomr_power_model.geometry.kinematics import twist_to_wheels, wheels_to_twist
+from tomr_power_model.model.commanded import CommandPath, CommandTiming, Seen
+from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
@@ -176,19 +175,20 @@ def _not_following(item: Recorded, robot: Robot) -> Iterator[Finding]:
 
 def _expected(item: Recorded, robot: Robot) -> tuple[Array, Array]:
     """Wheel speeds that the commands lead to, by the description as it is: (n,), (n, 3)."""
-    settings = ModelSettings(ticks=TickSettings(period=to_ns(_TICK)))
-    motion = ExpectedMotion(robot, PhysicalModel.of(robot), settings)
+    motion = CommandPath(robot, CommandTiming(to_ns(_TICK)))
+    to_twist = wheels_to_twist(robot)
     pending = deque(zip(item.command_time, item.command, strict=True))
     time = np.arange(item.encoder_time[0], item.encoder_time[-1], _TICK) + _TICK
     speeds = np.full((len(time), WHEELS), np.nan)
-    first = measured_speed(item)[0]
+    x, y, yaw = (float(value) for value in to_twist @ measured_speed(item)[0])
+    first = Seen((x, y, yaw), (math.nan,) * WHEELS, math.nan)
     for row, tick in enumerate(time):
         while pending and pending[0][0] <= tick:
             stamp, (vx, vy, wz) = pending.popleft()
             motion.command(to_ns(stamp), (float(vx), float(vy), float(wz)))
         step = motion.over(to_ns(tick), first)
         if step is not None:
-            speeds[row] = step.speed.mean(axis=0)
+            speeds[row] = step.speed
     return time, speeds
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tomr_power_model.physics.model import WheelMotion
+from tomr_power_model.dynamics.drives import WheelMotion
 
 Array = NDArray[np.float64]
 Index = NDArray[np.signedinteger]

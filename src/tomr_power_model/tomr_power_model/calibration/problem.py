@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tomr_power_model.calibration.parameters import Free, Values, with_values
 from tomr_power_model.calibration.samples import CHANNELS, TOTAL, Samples, motor_power
-from tomr_power_model.physics.model import PhysicalModel, WheelMotion
+from tomr_power_model.dynamics.drives import InverseDynamics, WheelMotion
 from tomr_power_model.robot import WHEELS, Robot, robot_from_parameters
 
 Array = NDArray[np.float64]
@@ -19,7 +19,7 @@ def modelled_power(robot: Robot, motion: WheelMotion, parts: int = 1) -> Array:
 
     The mean over each `parts` rows of the motion: the power sensor's window.
     """
-    drives = PhysicalModel.of(robot).power(motion)
+    drives = InverseDynamics.of(robot).power(motion)
     power = drives.power
     if robot.measurement.quantity == "motor_current":
         power = motor_power(robot, drives.current, motion.speed)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tomr_power_model.calibration.motion import median_period, wheel_motion
 from tomr_power_model.calibration.recorded import Recorded
-from tomr_power_model.physics.model import WheelMotion
+from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]

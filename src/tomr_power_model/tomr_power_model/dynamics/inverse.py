@@ -4,7 +4,7 @@
     i = tau / k,  v = R i + k omega,  P = supplied(v i) + driver losses
 
 A wheel at rest may hold any torque up to its dry friction, which motion does not tell: there dry
-friction fades over STICKING_SPEED.
+friction fades over STICKING_SPEED, unless the voltage that its driver holds is known.
 """
 
 import math
@@ -33,6 +33,7 @@ from tomr_power_model.dynamics.layout import (
     MOTION_RESISTING,
     MOTION_RISE,
     MOTION_SPEED,
+    MOTION_VOLTAGE,
     MOTION_WHEEL,
     MOTION_YAW,
     NOMINAL_RADIUS,
@@ -113,12 +114,17 @@ def drive_power(p: Numbers, m: Numbers, out: Mutable, n: int) -> None:
         carried += p[w + AXLE_INERTIA] * m[a + MOTION_ACCELERATION]
         load = max(p[w + LOAD] + p[w + LOAD_X] * along_x + p[w + LOAD_Y] * along_y, 0.0)
         wheel = Wheel(speed, load, carried, m[a + MOTION_ANGLE], p[w + NOMINAL_RADIUS], p[w + GEAR])
+        k, hot = p[w + CONSTANT], p[w + RESISTANCE] * (1.0 + COPPER * m[a + MOTION_RISE])
         torque = carried + p[w + VISCOUS] * speed + m[a + MOTION_RESISTING]
-        torque += max(dry_torque(p, w, wheel), 0.0) * math.tanh(speed / STICKING_SPEED)
         torque += moving_torque(p, w, wheel)
-        k = p[w + CONSTANT]
+        dry, moves = max(dry_torque(p, w, wheel), 0.0), math.tanh(speed / STICKING_SPEED)
+        held = m[a + MOTION_VOLTAGE]
+        rests = 0.0
+        if held == held:
+            rests = (1.0 - abs(moves)) * min(max(k / hot * held - torque, -dry), dry)
+        torque += dry * moves + rests
         current = torque / k
-        volts = p[w + RESISTANCE] * (1.0 + COPPER * m[a + MOTION_RISE]) * current + k * speed
+        volts = hot * current + k * speed
         out[o + POWER_TORQUE] = torque
         out[o + POWER_CURRENT] = current
         out[o + POWER_VOLTAGE] = volts

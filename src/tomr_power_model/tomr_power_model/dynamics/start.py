@@ -21,6 +21,7 @@ from tomr_power_model.dynamics.layout import (
     MOTION_RESISTING,
     MOTION_RISE,
     MOTION_SPEED,
+    MOTION_VOLTAGE,
     MOTION_WHEEL,
     MOTION_YAW,
     POWER_VOLTAGE,
@@ -58,7 +59,7 @@ def begin(p: Numbers, s: Mutable, motion: Mutable, power: Mutable, n: int) -> No
         s[z + WHEEL_LOAD], s[z + TURNED], s[z + COUNTED] = p[w + LOAD], 0.0, 0.0
         motion[a + MOTION_SPEED], motion[a + MOTION_ACCELERATION] = speed, change
         motion[a + MOTION_ANGLE], motion[a + MOTION_RESISTING] = s[z + ANGLE], 0.0
-        motion[a + MOTION_RISE] = p[w + INITIAL_RISE]
+        motion[a + MOTION_RISE], motion[a + MOTION_VOLTAGE] = p[w + INITIAL_RISE], math.nan
     drive_power(p, motion, power, n)
     for i in range(n):
         z = STATE_HEADER + i * STATE_WHEEL

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.intake import Unusable, WheelFinder, battery_of, stamp_of
 from tomr_power_model.model.encoders import EncoderSample, EncoderWindow
 from tomr_power_model.model.ticks import TickSettings, to_ns
-from tomr_power_model.physics.model import WheelMotion
 from tomr_power_model.recordings import Recording, require_topic, resolve_topic
 from tomr_power_model.robot import Robot
 from tomr_power_model.wang2024.fit import Samples

@@ -1,0 +1,69 @@
+"""The voltages that drivers hold while their wheels are at rest, from what the drivers see.
+
+A wheel at rest may hold any torque up to its dry friction: its motion does not tell. Its driver's
+law does, on the measured speeds:
+
+    v = k_p (asked - omega) + k_i I,   I = integral of (asked - omega) = I_sim + theta_sim - theta
+
+for simulation and driver are asked for the same, and both sum up. What saturation or a start in
+motion left different is found again while the wheel turns, where inverse dynamics tell v.
+"""
+
+from collections.abc import Sequence
+
+from tomr_power_model.dynamics import layout as at
+from tomr_power_model.model.commanded import CommandPath
+from tomr_power_model.robot import Controller
+
+_MOVING = 1.0  # rad/s: a wheel whose motion tells its torque
+_CORRECTED = 0.02  # share of the difference that is taken off in a tick in motion
+_UNKNOWN = float("nan")
+
+
+class RestingDrivers:
+    """Sums of the drivers, one per wheel."""
+
+    def __init__(self, controller: Controller, wheels: int) -> None:
+        self._proportional = controller.proportional
+        self._integral = controller.integral
+        self._wheels = wheels
+        self.clear()
+
+    def clear(self) -> None:
+        """What the drivers' sums hold is not known until the next command."""
+        self._offset = [_UNKNOWN] * self._wheels  # rad
+
+    def voltages(
+        self, path: CommandPath, angle: Sequence[float], speed: Sequence[float]
+    ) -> list[float]:
+        """Voltage that each driver holds [V], NaN before the first command.
+
+        Args:
+            path: that simulates what the drivers are asked for.
+            angle: of the wheels at the end of the tick [rad], NaN where not known.
+            speed: of the wheels [rad/s].
+        """
+        if path.state is None:
+            return [_UNKNOWN] * self._wheels
+        found = []
+        asked, sums = path.asked(), path.wheel(at.INTEGRAL)
+        turned = path.wheel(at.TURNED)
+        for wheel in range(self._wheels):
+            ahead = turned[wheel] - angle[wheel]
+            if ahead != ahead:
+                ahead, self._offset[wheel] = 0.0, 0.0
+            if self._offset[wheel] != self._offset[wheel]:
+                self._offset[wheel] = -ahead
+            total = sums[wheel] + ahead + self._offset[wheel]
+            error = asked[wheel] - speed[wheel]
+            found.append(self._proportional * error + self._integral * total)
+        return found
+
+    def correct(
+        self, held: Sequence[float], voltage: Sequence[float], speed: Sequence[float]
+    ) -> None:
+        """Learn from wheels that turn: `voltage` is what inverse dynamics say of them [V]."""
+        for wheel in range(self._wheels):
+            error = voltage[wheel] - held[wheel]
+            if abs(speed[wheel]) > _MOVING and error == error and self._integral > 0.0:
+                self._offset[wheel] += _CORRECTED * error / self._integral
