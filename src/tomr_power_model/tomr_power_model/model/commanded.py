@@ -42,16 +42,19 @@ class Seen:
 
 @frozen
 class Commanded:
-    """Means over the periods of a tick, one number per wheel."""
+    """The steps that belong to a tick; at least one, but for drivers slower than the ticks."""
 
-    speed: list[float]  # rad/s
-    torque: list[float]  # of the motors at the wheels [N m]
-    current: list[float]  # A
-    at_motor: list[float]  # voltage * current [W]
-    power: list[float]  # drawn [W]
-    voltage: float  # of the supply [V]
-    rows: tuple[tuple[float, ...], ...]  # wheel speeds in each step [rad/s]
+    speed: list[float]  # of the wheels, mean of the tick [rad/s]
+    torque: list[float]  # of the motors at the wheels, likewise [N m]
+    voltage: float  # of the supply, likewise [V]
+    starts: tuple[int, ...]  # of each step [ns]
+    length: int  # of a step [ns]
+    rows: tuple[list[float], ...]  # outputs of each step, see `layout`
     edge: tuple[float, ...]  # wheel speeds before the first of them [rad/s]
+
+    def wheels(self, row: Sequence[float], field: int) -> Sequence[float]:
+        """A field of the wheels' outputs."""
+        return row[at.OUT_HEADER + field :: at.OUT_WHEEL]
 
 
 class CommandPath:
@@ -59,8 +62,8 @@ class CommandPath:
 
     def __init__(self, robot: Robot, timing: CommandTiming) -> None:
         self._simulation = Simulation(vehicle_of(robot))
-        self._constant = [motor.wheel_constant for motor in robot.motors]
         self._step = to_ns(self._simulation.period_s)
+        self._part = self._step // self._simulation.steps
         self._timing = timing
         self._delay = to_ns(robot.controller.delay)
         self._pending: deque[tuple[int, Triple]] = deque()
@@ -74,12 +77,8 @@ class CommandPath:
         self._given = 0
         self._next = 0  # when the next period begins [ns]
         self._taken = 0  # commands
-        self._held: Commanded | None = None
-
-    @property
-    def step_s(self) -> float:
-        """Duration of a simulated step [s]."""
-        return self._simulation.period_s / self._simulation.steps
+        resting = [0.0] * self._simulation.wheels
+        self._means = resting, resting, self._simulation.numbers[at.VOLTAGE]
 
     def command(self, stamp_ns: int, twist: Triple) -> None:
         """Take a command; one that comes too late for its stamp acts from the next period on."""
@@ -111,13 +110,21 @@ class CommandPath:
         assert self.state is not None
         self._see(seen)
         edge = tuple(self.wheel(at.SPEED))
-        outputs: list[float] = []
+        starts: list[int] = []
+        rows: list[list[float]] = []
+        width = self._simulation.row
         while self._next + self._step // 2 <= tick_ns:
             self._take()
-            outputs += self._simulation.advance(self.state, self._inputs)
+            out = self._simulation.advance(self.state, self._inputs)
+            for k in range(self._simulation.steps):
+                starts.append(self._next + k * self._part)
+                rows.append(out[k * width : (k + 1) * width])
             self._see(None)
             self._next += self._step
-        return self._means(outputs, edge)
+        if rows:
+            self._means = self._mean_of(rows)
+        speed, torque, voltage = self._means
+        return Commanded(speed, torque, voltage, tuple(starts), self._part, tuple(rows), edge)
 
     def _started(self, tick_ns: int, seen: Seen) -> bool:
         if not self._pending or self._pending[0][0] > tick_ns:
@@ -152,38 +159,12 @@ class CommandPath:
         if self._timing.timeout and self._next > self._given + self._timing.timeout:
             self._inputs[at.COMMAND : at.COMMAND + 3] = _STOP
 
-    def _means(self, outputs: list[float], edge: tuple[float, ...]) -> Commanded | None:
-        width = self._simulation.row
-        count = len(outputs) // width
-        if not count:  # a driver slower than the ticks
-            return self._held
-
-        def mean(first: int) -> float:
-            return sum(outputs[first::width]) / count
-
-        def of_wheels(field: int) -> list[float]:
-            starts = range(at.OUT_HEADER + field, width, at.OUT_WHEEL)
-            return [mean(start) for start in starts]
-
-        at_motor = []
-        for wheel, constant in enumerate(self._constant):
-            own = at.OUT_HEADER + wheel * at.OUT_WHEEL
-            speed = outputs[own + at.OUT_SPEED :: width]
-            current = outputs[own + at.OUT_CURRENT :: width]
-            emf = sum([w * i for w, i in zip(speed, current, strict=True)]) * constant / count
-            at_motor.append(emf + mean(own + at.OUT_COPPER))
-        rows = [
-            tuple(outputs[row + at.OUT_HEADER + at.OUT_SPEED : row + width : at.OUT_WHEEL])
-            for row in range(0, len(outputs), width)
-        ]
-        self._held = Commanded(
-            speed=of_wheels(at.OUT_SPEED),
-            torque=of_wheels(at.OUT_TORQUE),
-            current=of_wheels(at.OUT_CURRENT),
-            at_motor=at_motor,
-            power=of_wheels(at.OUT_POWER),
-            voltage=mean(at.OUT_VOLTAGE),
-            rows=tuple(rows),
-            edge=edge,
+    def _mean_of(self, rows: Sequence[Sequence[float]]) -> tuple[list[float], list[float], float]:
+        """Mean wheel speeds and motor torques, and the supply's voltage."""
+        first = at.OUT_HEADER
+        means = [sum(column) / len(rows) for column in zip(*rows, strict=True)]
+        return (
+            means[first + at.OUT_SPEED :: at.OUT_WHEEL],
+            means[first + at.OUT_TORQUE :: at.OUT_WHEEL],
+            means[at.OUT_VOLTAGE],
         )
-        return self._held

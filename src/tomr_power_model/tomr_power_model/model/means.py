@@ -18,6 +18,7 @@ class Means:
     power: Sequence[float]  # W
     other: float | None = None  # of computer and sensors [W]; None: as described
     voltage: float | None = None  # of the supply [V]; None: nominal, less what sags
+    drives: float | None = None  # of all drives, where it is known by itself [W]
 
     @classmethod
     def of(cls, drives: DrivePower) -> Self:
@@ -33,4 +34,4 @@ class Means:
     @property
     def total(self) -> float:
         """Power of all drives [W]."""
-        return sum(self.power)
+        return sum(self.power) if self.drives is None else self.drives

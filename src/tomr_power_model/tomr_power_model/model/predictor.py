@@ -1,6 +1,7 @@
 """The model stage: commands and encoders in, one prediction per tick out."""
 
 import math
+from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,11 +17,11 @@ from tomr_power_model.model.commanded import Commanded, CommandPath, CommandTimi
 from tomr_power_model.model.encoders import UNKNOWN, EncoderSample, EncoderWindow, Triple
 from tomr_power_model.model.means import Means
 from tomr_power_model.model.monitors import Monitors
-from tomr_power_model.model.power_models import POWER_MODELS, MeasuredMotion
+from tomr_power_model.model.power_models import POWER_MODELS, MeasuredMotion, Windows
 from tomr_power_model.model.prediction import Prediction, Readings
 from tomr_power_model.model.resting import RestingDrivers
 from tomr_power_model.model.settings import ModelSettings
-from tomr_power_model.model.ticks import Arrival, TickClock
+from tomr_power_model.model.ticks import Arrival, TickClock, of_tick, to_ns
 from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
@@ -50,6 +51,7 @@ class PowerPredictor:
         self._path = CommandPath(robot, timing)
         self._resting = RestingDrivers(robot.controller, WHEELS)
         self._encoders = EncoderWindow(given.encoder_window, given.ticks.period, given.stale)
+        self._window = to_ns(robot.sensors.power_window)
         self._reads_motor = robot.measurement.quantity == "motor_current"
         numbers = plant_numbers(vehicle_of(robot))
         self._drop, self._cold = numbers.voltage_drop, numbers.initial_rise
@@ -57,7 +59,6 @@ class PowerPredictor:
         self._to_twist = Body.of(robot).to_twist.tolist()
         # The paper's coefficients are fitted to what the monitors showed.
         physical = given.power_model == "physical"
-        self._commanded = Monitors.of(robot, period_s) if physical else None
         self._measured = Monitors.of(robot, period_s) if physical else None
         self._clear()
 
@@ -67,9 +68,10 @@ class PowerPredictor:
         self._encoders.clear()
         self._gyro: tuple[int, float] | None = None
         self._heading = 0.0  # at the start of the next tick, against the first [rad]
-        for monitors in (self._commanded, self._measured):
-            if monitors is not None:
-                monitors.clear()
+        self._model.clear()
+        self._stamps: list[deque[int]] = [deque() for _ in range(WHEELS + 1)]
+        if self._measured is not None:
+            self._measured.clear()
 
     def command(self, stamp_ns: int, twist: Triple) -> Arrival:
         """Take a commanded twist (v_x, v_y [m/s], omega_z [rad/s]) in base_link."""
@@ -90,6 +92,13 @@ class PowerPredictor:
         arrival = self._arrive(IMU, stamp_ns)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
             self._gyro = (stamp_ns, yaw_rate)
+        return arrival
+
+    def measured(self, wheel: int, stamp_ns: int) -> Arrival:
+        """Take note of when a wheel's power was measured, or, as one more wheel, the whole's."""
+        arrival = self._arrive(f"power {wheel}", stamp_ns)
+        if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
+            self._stamps[wheel].append(stamp_ns)
         return arrival
 
     def due(self) -> list[Prediction]:
@@ -115,26 +124,38 @@ class PowerPredictor:
         held = self._resting.voltages(self._path, after, speed)
         rise = self._path.wheel(at.RISE) or self._cold
         turned = self._period_s * self._turning(speed, gyro, commanded)
+        windows = self._windows(tick)
         motion = MeasuredMotion(
-            speed, change, angle, gyro, self._heading + 0.5 * turned, rise, held
+            speed,
+            change,
+            angle,
+            gyro,
+            self._heading + 0.5 * turned,
+            rise,
+            held,
+            windows.offset_s,
         )
         self._heading += turned
         measured = self._model.measured(motion)
         self._resting.correct(held, _voltages(measured), speed)
         from_encoders = self._readings(self._where_known(measured, motion), self._measured)
         if commanded is None:
-            if self._commanded is not None:
-                self._commanded.shown(UNKNOWN)
             return Prediction(tick, UNKNOWN, UNKNOWN, _UNKNOWN, UNKNOWN_READING, from_encoders)
-        means = self._model.commanded(commanded)
+        means = self._model.commanded(commanded, windows)
         return Prediction(
             stamp_ns=tick,
             speed=_triple(commanded.speed),
             torque=_triple(means.torque),
-            motors=self._readings(means, self._commanded),
+            motors=self._readings(means),
             total=self._total(means),
             from_encoders=from_encoders,
         )
+
+    def _windows(self, tick: int) -> Windows:
+        """In which windows the power was measured that a tick compares."""
+        period, stale = self.settings.ticks.period, self.settings.stale
+        ends = [of_tick(stamps, tick, period, stale) for stamps in self._stamps]
+        return Windows(ends[:WHEELS], ends[WHEELS], self._window, tick, period)
 
     def _where_known(self, means: Means, motion: MeasuredMotion) -> Means:
         """NaN for a wheel at rest that may hold any torque up to its dry friction."""
@@ -181,7 +202,7 @@ class PowerPredictor:
         nominal = self._robot.supply.nominal_voltage
         return nominal - self._drop * power / nominal
 
-    def _readings(self, means: Means, monitors: Monitors | None) -> Readings:
+    def _readings(self, means: Means, monitors: Monitors | None = None) -> Readings:
         if self._reads_motor:
             if monitors is not None:
                 means = self._as_shown(means, monitors)

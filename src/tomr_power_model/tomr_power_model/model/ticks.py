@@ -9,6 +9,7 @@ not depend on the order in which topics happen to arrive. It is given as soon as
 """
 
 import math
+from collections import deque
 from collections.abc import Collection, Sequence
 from enum import Enum
 
@@ -30,6 +31,18 @@ class TickSettings:
     settle: int = to_ns(0.02)
     patience: int = to_ns(0.25)
     gap: int = to_ns(1.0)  # a longer silence or a jump starts the stage afresh
+
+
+def of_tick(stamps: deque[int], tick: int, period: int, stale: int) -> list[int]:
+    """Stamps of the samples that a tick compares: those in (tick - period, tick].
+
+    Nothing is filled in: a window without a sample takes the newest one that is not stale. Forgets
+    what no later tick asks for.
+    """
+    while len(stamps) > 1 and stamps[1] <= tick - period:
+        stamps.popleft()
+    inside = [stamp for stamp in stamps if tick - period < stamp <= tick]
+    return inside or [stamp for stamp in stamps if tick - stale < stamp <= tick][-1:]
 
 
 class Arrival(Enum):
