@@ -8,13 +8,13 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.calibration.problem import modelled_power
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.physics.model import WheelMotion
 from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
-MakeDrive = Callable[..., Recorded]
+MakeDrive = Callable[..., Drive]
 
 _ENCODER_STEP = 0.01  # s
 _POWER_EVERY = 4  # encoder samples
@@ -47,7 +47,7 @@ def make_drive() -> MakeDrive:
 
     def make(
         robot: Robot, seed: int = 1, seconds: float = 40.0, noise: float = 0.05, name: str = "tour"
-    ) -> Recorded:
+    ) -> Drive:
         tour = Tour.of(seed, seconds)
         speed = tour.twist @ twist_to_wheels(robot).T
         acceleration = np.gradient(speed, _ENCODER_STEP, axis=0)
@@ -57,7 +57,7 @@ def make_drive() -> MakeDrive:
         power = modelled_power(robot, WheelMotion(speed[rows], acceleration[rows]))
         random = np.random.default_rng(seed + 1000)
         power = power + noise * random.standard_normal(power.shape)
-        return Recorded(
+        return Drive(
             name=name,
             encoder_time=tour.time,
             position=position,

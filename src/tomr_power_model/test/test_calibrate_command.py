@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 import yaml
 from attrs import evolve
+from tomr_power_model.calibration.checks import refuse_faults, refuse_little_motion
 
 from tomr_power_model.calibrate_cli import main
 from tomr_power_model.calibration.calibrate import Timing, align, calibrate
-from tomr_power_model.calibration.checks import refuse_faults, refuse_little_motion
 from tomr_power_model.calibration.parameters import Choice
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.bag import bag_header, bag_message
 from tomr_power_model.recordings import RecordingWriter
 from tomr_power_model.robot import load_robot, read_description, shipped_robot
 
-MakeDrive = Callable[..., Recorded]
+MakeDrive = Callable[..., Drive]
 ROBOT = shipped_robot("reference")
 FAULTY_BAG = Path(__file__).resolve().parents[3] / "bags" / "circle_encoder_lost"
 _START_NS = 1_700_000_000 * 1_000_000_000
@@ -29,7 +29,7 @@ def during(time: np.ndarray, start: float = 10.0, end: float = 16.0) -> np.ndarr
     return (time >= start) & (time <= end)
 
 
-def lose_encoder(drive: Recorded) -> Recorded:
+def lose_encoder(drive: Drive) -> Drive:
     """Wheel 3 as its encoder tells it when it is cut off: still, while its driver gives all."""
     position, velocity, power = drive.position.copy(), drive.velocity.copy(), drive.power.copy()
     rows = during(drive.encoder_time)
@@ -39,26 +39,26 @@ def lose_encoder(drive: Recorded) -> Recorded:
     return evolve(drive, position=position, velocity=velocity, power=power)
 
 
-def lose_drive(drive: Recorded) -> Recorded:
+def lose_drive(drive: Drive) -> Drive:
     """Wheel 2 hardly turns."""
     velocity = drive.velocity.copy()
     velocity[during(drive.encoder_time), 1] *= 0.1
     return evolve(drive, velocity=velocity)
 
 
-def stick(drive: Recorded) -> Recorded:
+def stick(drive: Drive) -> Drive:
     reading = drive.reading.copy()
     reading[during(drive.power_time), 0] = 0.25
     return evolve(drive, reading=reading)
 
 
-def saturate(drive: Recorded) -> Recorded:
+def saturate(drive: Drive) -> Drive:
     reading = drive.reading.copy()
     reading[:, 1] = np.minimum(reading[:, 1], 0.2 * reading[:, 1].max())
     return evolve(drive, reading=reading)
 
 
-def reverse(drive: Recorded) -> Recorded:
+def reverse(drive: Drive) -> Drive:
     return evolve(drive, power=drive.power * np.array([1.0, 1.0, -1.0]))
 
 
@@ -74,7 +74,7 @@ def reverse(drive: Recorded) -> Recorded:
 )
 def test_faults_are_refused_with_wheel_interval_and_remedy(
     make_drive: MakeDrive,
-    damage: Callable[[Recorded], Recorded],
+    damage: Callable[[Drive], Drive],
     wheel: int,
     seen: str,
     remedy: str,
@@ -119,7 +119,7 @@ def test_power_unlike_the_rest_is_refused_after_the_fit(make_drive: MakeDrive) -
         calibrate(read_description("reference"), "test", samples, (), Choice())
 
 
-def write_bag(drive: Recorded, path: Path) -> Path:
+def write_bag(drive: Drive, path: Path) -> Path:
     """A recording in the contract's form."""
     messages = []
     for time, angle, speed in zip(drive.encoder_time, drive.position, drive.velocity, strict=True):

@@ -10,11 +10,11 @@ from scipy.ndimage import maximum_filter1d
 from tomr_power_model.calibration.calibrate import Result, Timing, align, calibrate
 from tomr_power_model.calibration.fit import fit
 from tomr_power_model.calibration.intervals import autocorrelation_time
-from tomr_power_model.calibration.motion import wheel_motion
 from tomr_power_model.calibration.parameters import Choice, choose, with_values
 from tomr_power_model.calibration.problem import Problem, modelled_power
-from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.calibration.samples import Samples, samples_of
+from tomr_power_model.drive.motion import wheel_motion
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
 from tomr_power_model.physics.model import PhysicalModel, WheelMotion
 from tomr_power_model.response.closed_loop import ClosedLoop
@@ -26,7 +26,7 @@ from tomr_power_model.robot import (
     shipped_robot,
 )
 
-MakeDrive = Callable[..., Recorded]
+MakeDrive = Callable[..., Drive]
 VALUES = read_description("reference")
 ROBOT = shipped_robot("reference")
 # Samples without a window: the drives of these tests are sampled in an instant.
@@ -38,9 +38,7 @@ FRICTION = (
 )
 
 
-def calibrated(
-    recorded: list[Recorded], choice: Choice, held_out: tuple[Recorded, ...] = ()
-) -> Result:
+def calibrated(recorded: list[Drive], choice: Choice, held_out: tuple[Drive, ...] = ()) -> Result:
     """A calibration of the reference robot on recordings."""
     return calibrate(
         VALUES, "test", align(recorded, ROBOT, TIMING), align(held_out, ROBOT, TIMING), choice

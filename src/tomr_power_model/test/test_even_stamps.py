@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from tomr_power_model.model.even_stamps import EvenStamps
 
 from tomr_power_model.model.encoders import EncoderSample, EncoderWindow
-from tomr_power_model.model.even_stamps import EvenStamps
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS

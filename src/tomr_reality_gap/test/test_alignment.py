@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 from attrs import evolve
+from tomr_reality_gap.alignment.steady import steadied, steady
 
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.commands import shift_between
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
-from tomr_reality_gap.alignment.commands import shift_between
 from tomr_reality_gap.alignment.forward import Forward
-from tomr_reality_gap.alignment.steady import steadied, steady
 
 
 def test_jitter_is_taken_off_and_gaps_are_kept() -> None:
@@ -25,7 +25,7 @@ def test_stamps_without_a_grid_are_left_alone() -> None:
     np.testing.assert_array_equal(steady(time), time)
 
 
-def _recorded(robot: Robot) -> Recorded:
+def _recorded(robot: Robot) -> Drive:
     """Thirty seconds of starts, turns and stops, as the simulation itself would record them."""
     command_time = np.arange(0.0, 30.0, 0.05)
     phase = command_time // 2.5
@@ -41,7 +41,7 @@ def _recorded(robot: Robot) -> Recorded:
     speed = held @ twist_to_wheels(robot).T
     power_time = np.arange(0.02, 30.0, 0.02)
     blank = np.zeros((len(power_time), 3))
-    return Recorded(
+    return Drive(
         name="made",
         encoder_time=encoder_time,
         position=np.cumsum(speed, axis=0) * 0.01,

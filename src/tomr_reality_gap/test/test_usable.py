@@ -5,13 +5,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from attrs import evolve
-
-from tomr_power_model.calibration.recorded import Recorded
-from tomr_power_model.errors import InputError
-from tomr_power_model.geometry.kinematics import twist_to_wheels
-from tomr_power_model.robot import Robot, shipped_robot
-from tomr_reality_gap.alignment.channels import channels_of
-from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.alignment.usable import (
     refuse_dull,
     refuse_faulty,
@@ -19,10 +12,17 @@ from tomr_reality_gap.alignment.usable import (
     usable,
 )
 
+from tomr_power_model.drive.record import Drive
+from tomr_power_model.errors import InputError
+from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.robot import Robot, shipped_robot
+from tomr_reality_gap.alignment.channels import channels_of
+from tomr_reality_gap.alignment.forward import Forward
+
 from .test_alignment import _recorded as recorded_drive
 from .test_alignment import forward  # noqa: F401 -- the fixture
 
-Changed = Callable[[Recorded], Recorded]
+Changed = Callable[[Drive], Drive]
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def robot() -> Robot:
 
 
 @pytest.fixture
-def recorded(robot: Robot) -> Recorded:
+def recorded(robot: Robot) -> Drive:
     """The made drive, with a power that belongs to it and noise."""
     made = recorded_drive(robot)
     speed = np.stack(
@@ -45,20 +45,20 @@ def recorded(robot: Robot) -> Recorded:
     return evolve(made, velocity=velocity, power=power, reading=power / 24.0, total=total)
 
 
-def test_a_healthy_recording_is_used_as_it_is(recorded: Recorded, robot: Robot) -> None:
+def test_a_healthy_recording_is_used_as_it_is(recorded: Drive, robot: Robot) -> None:
     found = usable(recorded, robot)
     assert found.notes == ()
     assert len(found.power) == len(recorded.power)
     refuse_faulty([recorded], robot)
 
 
-def test_clocks_that_never_meet_are_refused(recorded: Recorded, robot: Robot) -> None:
+def test_clocks_that_never_meet_are_refused(recorded: Drive, robot: Robot) -> None:
     later = evolve(recorded, power_time=recorded.power_time + 1e4)
     with pytest.raises(InputError, match=r"motor power \(10000\.0 to 10030\.0 s\) and encoders"):
         usable(later, robot)
 
 
-def test_stray_stamps_are_left_out_and_told(recorded: Recorded, robot: Robot) -> None:
+def test_stray_stamps_are_left_out_and_told(recorded: Drive, robot: Robot) -> None:
     """One sample an hour late must not make the simulation an hour long."""
     time = recorded.total_time.copy()
     time[-1] += 3600.0
@@ -70,7 +70,7 @@ def test_stray_stamps_are_left_out_and_told(recorded: Recorded, robot: Robot) ->
     )
 
 
-def test_blank_stretches_are_told(recorded: Recorded, robot: Robot) -> None:
+def test_blank_stretches_are_told(recorded: Drive, robot: Robot) -> None:
     power, position = recorded.power.copy(), recorded.position.copy()
     power[300:600, 1] = np.nan
     position[:300, 2] = np.nan
@@ -82,7 +82,7 @@ def test_blank_stretches_are_told(recorded: Recorded, robot: Robot) -> None:
     )
 
 
-def test_a_recording_that_begins_in_motion_begins_later(recorded: Recorded, robot: Robot) -> None:
+def test_a_recording_that_begins_in_motion_begins_later(recorded: Drive, robot: Robot) -> None:
     """Cut at 1 s, in the middle of a move: what was commanded before is not in it."""
 
     def later(time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -116,14 +116,14 @@ def test_a_recording_that_begins_in_motion_begins_later(recorded: Recorded, robo
     assert "it begins in motion" in found.notes[0]
 
 
-def test_a_wheel_that_tells_next_to_nothing_is_refused(recorded: Recorded, robot: Robot) -> None:
+def test_a_wheel_that_tells_next_to_nothing_is_refused(recorded: Drive, robot: Robot) -> None:
     blank = np.where(np.arange(3) == 0, np.nan, recorded.position)
     dead = evolve(recorded, position=blank, velocity=blank)
     with pytest.raises(InputError, match="wheel_1_joint: 100 % of the encoder's samples are NaN"):
         usable(dead, robot)
 
 
-def _steady(robot: Robot, twist: tuple[float, float, float]) -> Recorded:
+def _steady(robot: Robot, twist: tuple[float, float, float]) -> Drive:
     """Thirty seconds of one motion, after two at rest."""
     made = recorded_drive(robot)
     moving = made.encoder_time >= 2.0
@@ -131,7 +131,7 @@ def _steady(robot: Robot, twist: tuple[float, float, float]) -> Recorded:
     return evolve(made, velocity=speed, position=np.cumsum(speed, axis=0) * 0.01)
 
 
-def test_one_speed_and_heading_tells_nothing(recorded: Recorded, robot: Robot) -> None:
+def test_one_speed_and_heading_tells_nothing(recorded: Drive, robot: Robot) -> None:
     creep, other = _steady(robot, (0.05, 0.02, 0.0)), _steady(robot, (0.3, 0.0, 0.0))
     with pytest.raises(InputError, match=r"made: the wheels turn at one speed .* 100 % of the"):
         refuse_dull([creep])
@@ -139,12 +139,12 @@ def test_one_speed_and_heading_tells_nothing(recorded: Recorded, robot: Robot) -
     refuse_dull([recorded])
 
 
-def _clipped(item: Recorded) -> Recorded:
+def _clipped(item: Drive) -> Drive:
     reading = np.minimum(item.reading, 0.12)
     return evolve(item, reading=reading, power=24.0 * reading)
 
 
-def _turned(item: Recorded) -> Recorded:
+def _turned(item: Drive) -> Drive:
     return evolve(item, velocity=item.velocity[:, [1, 2, 0]], position=item.position[:, [1, 2, 0]])
 
 
@@ -157,7 +157,7 @@ def _turned(item: Recorded) -> Recorded:
     ],
 )
 def test_faulty_sensors_and_other_robots_are_refused(
-    changed: Changed, said: str, recorded: Recorded, robot: Robot
+    changed: Changed, said: str, recorded: Drive, robot: Robot
 ) -> None:
     with pytest.raises(InputError, match=said):
         refuse_faulty([changed(recorded)], robot)

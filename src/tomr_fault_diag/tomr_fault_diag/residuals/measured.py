@@ -6,6 +6,7 @@ from collections import deque
 from attrs import frozen
 
 from tomr_fault_diag.residuals.frame import Unit
+from tomr_power_model.drive.sources import PowerReading
 from tomr_power_model.messages.readings import NAN
 
 
@@ -33,10 +34,10 @@ class SupplyWindow:
         """Forget all samples."""
         self._samples.clear()
 
-    def add(self, stamp_ns: int, voltage: float, current: float) -> None:
-        """Take a reading: voltage [V] or NaN, current [A] negative while drawing."""
-        drawn = -current if self._signed else abs(current)
-        self._samples.append((stamp_ns, -voltage * current, drawn))
+    def add(self, reading: PowerReading) -> None:
+        """Take a reading newer than those before."""
+        drawn = reading.current if self._signed else abs(reading.current)
+        self._samples.append((reading.stamp_ns, reading.power, drawn))
 
     def at(self, tick_ns: int) -> Measured:
         """Mean over (tick - period, tick]: power, or current if the voltage is unknown."""

@@ -7,10 +7,10 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from tomr_power_model.calibration.checks import Finding, runs
-from tomr_power_model.calibration.motion import median_period
 from tomr_power_model.calibration.problem import modelled_power
 from tomr_power_model.calibration.samples import TOTAL, Samples
+from tomr_power_model.drive.motion import median_period
+from tomr_power_model.drive.quality import Finding, runs
 from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.robot import WHEELS, Robot
 

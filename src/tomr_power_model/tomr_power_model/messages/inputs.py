@@ -13,17 +13,10 @@ from tomr_power_model.messages.intake import (
     twist_of,
     yaw_rate_of,
 )
+from tomr_power_model.messages.types import IMU, JOINT_STATE, TWIST, TWIST_STAMPED
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.robot import Robot
-
-TWIST_STAMPED = "geometry_msgs/msg/TwistStamped"
-TWIST = "geometry_msgs/msg/Twist"
-JOINT_STATE = "sensor_msgs/msg/JointState"
-BATTERY = "sensor_msgs/msg/BatteryState"
-IMU = "sensor_msgs/msg/Imu"
-MULTI_ARRAY = "std_msgs/msg/Float64MultiArray"
-DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 
 
 @frozen

@@ -9,10 +9,13 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.model.even_stamps import EvenStamps
+from tomr_power_model.drive.dejitter import Grid, grid_of, is_jitter
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
+_KEPT = 200  # samples whose stamps are looked at
+_LEAST = 50
+_EVERY = 25  # samples: how often
 UNKNOWN: Triple = (float("nan"), float("nan"), float("nan"))
 
 
@@ -33,6 +36,43 @@ class WheelEstimate:
     acceleration: Array  # rad/s^2
 
 
+class RecentStamps:
+    """The stamps of the last moments, dejittered; driven by samples alone."""
+
+    def __init__(self) -> None:
+        self._samples: deque[tuple[int, Triple]] = deque(maxlen=_KEPT)
+        self._count = 0
+        self._jitter = False
+        self._grid: Grid | None = None
+        self._origin = 0  # of the grid [ns]
+
+    def add(self, stamp_ns: int, position: Triple) -> None:
+        """Take a sample newer than those before."""
+        self._samples.append((stamp_ns, position))
+        self._count += 1
+        if self._count % _EVERY == 0 and len(self._samples) >= _LEAST:
+            self._look()
+
+    def times(self, stamps_ns: list[int]) -> list[int]:
+        """When samples with such stamps were taken [ns]: the stamps, where they can be trusted."""
+        if self._grid is None:
+            return stamps_ns
+        seconds = [1e-9 * (stamp - self._origin) for stamp in stamps_ns]
+        times = [self._origin + round(1e9 * self._grid.nearest(stamp)) for stamp in seconds]
+        return times if len(set(times)) == len(times) else stamps_ns
+
+    def _look(self) -> None:
+        self._origin = self._samples[0][0]
+        stamps = 1e-9 * np.array([stamp - self._origin for stamp, _ in self._samples])
+        grid = grid_of(stamps)
+        if grid is not None:
+            positions = np.array([position for _, position in self._samples])
+            found = is_jitter(stamps, grid, positions)
+            # At rest nothing can be seen: what was known stays.
+            self._jitter = self._jitter if found is None else found
+        self._grid = grid if self._jitter else None
+
+
 class EncoderWindow:
     """Keeps the samples of the last moments and fits a motion of constant acceleration to them.
 
@@ -46,12 +86,12 @@ class EncoderWindow:
         self._period = period_ns
         self._stale = stale_ns
         self._samples: deque[EncoderSample] = deque()
-        self._stamps = EvenStamps()
+        self._stamps = RecentStamps()
 
     def clear(self) -> None:
         """Forget all samples."""
         self._samples.clear()
-        self._stamps = EvenStamps()
+        self._stamps = RecentStamps()
 
     def add(self, sample: EncoderSample) -> None:
         """Take a sample newer than those before."""

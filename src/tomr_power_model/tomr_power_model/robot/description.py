@@ -42,6 +42,7 @@ class Controller:
     integral: float  # V/rad
     acceleration_limit: float  # m/s^2, 0: none
     delay: float  # s
+    integrator: str  # backward: the sum holds the present error; forward: it does not yet
 
 
 @frozen
@@ -60,6 +61,7 @@ class Sensors:
     encoder_resolution: float  # rad at the wheel
     velocity_resolution: float  # rad/s at the wheel
     power_rate: float  # Hz
+    power_window: float  # s, averaged before the stamp
     voltage_resolution: float  # V
     current_resolution: float  # A
     voltage_noise: float  # V
@@ -140,7 +142,9 @@ def robot_from_parameters(values: Mapping[str, object], place: str) -> Robot:
         inertia_z=number("robot.inertia_z"),
         mass_center=cast(tuple[float, float, float], checked["robot.mass_center"]),
         motors=_motors(checked, values, names, place),
-        controller=Controller(**number.group("controller")),
+        controller=Controller(
+            **number.group("controller"), integrator=str(checked["controller.integrator"])
+        ),
         supply=Supply(**number.group("supply")),
         sensors=Sensors(**number.group("sensors")),
         measurement=Measurement(
@@ -165,9 +169,9 @@ class _Group:
     def group(self, prefix: str) -> dict[str, float]:
         start = prefix + "."
         return {
-            name.removeprefix(start): cast(float, value)
+            name.removeprefix(start): value
             for name, value in self._checked.items()
-            if name.startswith(start)
+            if name.startswith(start) and isinstance(value, float)
         }
 
 

@@ -39,6 +39,13 @@ ROBOT_PARAMETERS: tuple[ParameterSpec, ...] = (
         maximum=5.0,
         default=0.0,
     ),
+    _S(
+        "controller.integrator",
+        "whether the drivers' sum holds the present error already: backward, or not yet: forward",
+        kind="str",
+        default="backward",
+        choices=("backward", "forward"),
+    ),
     _S("supply.nominal_voltage", "battery or rail voltage", unit="V", above=0.0),
     _S(
         "supply.auxiliary_power",
@@ -63,6 +70,14 @@ ROBOT_PARAMETERS: tuple[ParameterSpec, ...] = (
         minimum=0.0,
     ),
     _S("sensors.power_rate", "power topics", unit="Hz", default=50.0, above=0.0, maximum=1e4),
+    _S(
+        "sensors.power_window",
+        "average of the power sensors before their stamp",
+        unit="s",
+        default=0.005,
+        minimum=0.0,
+        maximum=1.0,
+    ),
     _S("sensors.voltage_resolution", "quantum", unit="V", default=1.25e-3, minimum=0.0),
     _S("sensors.current_resolution", "quantum", unit="A", default=1.25e-3, minimum=0.0),
     _S("sensors.voltage_noise", "standard deviation", unit="V", default=2e-3, minimum=0.0),
