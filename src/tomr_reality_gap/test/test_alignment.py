@@ -3,26 +3,12 @@
 import numpy as np
 import pytest
 from attrs import evolve
-from tomr_reality_gap.alignment.steady import steadied, steady
 
-from tomr_power_model.drive.commands import shift_between
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
 from tomr_reality_gap.alignment.forward import Forward
-
-
-def test_jitter_is_taken_off_and_gaps_are_kept() -> None:
-    grid = np.delete(np.arange(500) * 0.01, np.arange(200, 230))
-    noisy = grid + np.random.default_rng(1).normal(0.0, 5e-4, len(grid))
-    assert np.abs(steady(noisy) - grid).max() < 1e-4
-    assert np.diff(steady(noisy)).max() == pytest.approx(0.31, abs=1e-3)
-
-
-def test_stamps_without_a_grid_are_left_alone() -> None:
-    time = np.sort(np.random.default_rng(2).uniform(0.0, 5.0, 300))
-    np.testing.assert_array_equal(steady(time), time)
 
 
 def _recorded(robot: Robot) -> Drive:
@@ -64,7 +50,7 @@ def _recorded(robot: Robot) -> Drive:
 def forward() -> Forward:
     robot = shipped_robot("reference")
     recorded = _recorded(robot)
-    return Forward.of(recorded, robot, channels_of(recorded, robot, 0.005))
+    return Forward.of(recorded, robot, channels_of(recorded, robot))
 
 
 def test_stretches_side_by_side_are_the_recording_in_one_piece(forward: Forward) -> None:
@@ -100,22 +86,3 @@ def test_flaws_of_a_sensor_change_what_it_reports_and_nothing_else(forward: Forw
         part = slice(at, at := at + len(channel.time))
         factor = 1.1 if channel.name == "wheel_1/power" else 1.0
         np.testing.assert_allclose(values[1, part], factor * values[0, part], rtol=1e-6, atol=1e-9)
-
-
-def test_jittered_recordings_are_told_from_steady_ones() -> None:
-    recorded = _recorded(shipped_robot("reference"))
-    jitter = np.random.default_rng(3).normal(0.0, 4e-4, len(recorded.encoder_time))
-    assert not steadied(recorded)[1]
-    even, changed = steadied(evolve(recorded, encoder_time=recorded.encoder_time + jitter))
-    assert changed
-    assert np.abs(even.encoder_time - recorded.encoder_time).max() < 1e-4
-
-
-def test_the_shift_between_recordings_of_the_same_commands(forward: Forward) -> None:
-    later = evolve(forward.recorded, command_time=forward.recorded.command_time + 0.7)
-    assert shift_between(forward.recorded, later) == pytest.approx(0.7, abs=1e-6)
-
-
-def test_other_commands_are_no_simulation_of_a_recording(forward: Forward) -> None:
-    other = evolve(forward.recorded, command=forward.recorded.command[::-1])
-    assert shift_between(forward.recorded, other) is None

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from attrs import evolve
-from tomr_reality_gap.alignment.steady import steadied, steady
 
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.robot import Robot, shipped_robot
@@ -26,7 +25,7 @@ def recorded(robot: Robot) -> Drive:
 
 
 def _channel(recorded: Drive, robot: Robot, name: str) -> Channel:
-    return next(item for item in channels_of(recorded, robot, 0.005) if item.name == name)
+    return next(item for item in channels_of(recorded, robot) if item.name == name)
 
 
 def test_a_gap_of_the_encoders_stays_a_gap(recorded: Drive, robot: Robot) -> None:
@@ -66,29 +65,6 @@ def test_a_gap_of_the_gyro_stays_a_gap(recorded: Drive, robot: Robot) -> None:
     assert set(np.abs(found.value)) == {1.0}
     assert found.span == pytest.approx(np.full(len(found.time), 0.05))
     assert not ((found.time > 2.1) & (found.time < 2.5)).any()
-
-
-def test_standing_still_says_nothing_about_the_stamps(recorded: Drive) -> None:
-    """Jitter shows in motion only: a robot that mostly stands has it, too."""
-    jitter = np.random.default_rng(3).normal(0.0, 4e-4, len(recorded.encoder_time))
-    moving = recorded.encoder_time < 2.5
-    position = np.where(moving[:, None], recorded.position, recorded.position[moving][-1])
-    standing = evolve(recorded, position=position)
-    assert steadied(evolve(standing, encoder_time=recorded.encoder_time + jitter))[1]
-
-
-def test_samples_that_really_come_unevenly_keep_their_stamps(recorded: Drive) -> None:
-    """Taken when they say: on an even grid their motion would be rougher."""
-    random = np.random.default_rng(3)
-    time = recorded.encoder_time + random.normal(0.0, 4e-4, 3000)
-    position = np.stack(
-        [np.interp(time, recorded.encoder_time, column) for column in recorded.position.T], axis=1
-    )
-    position += random.normal(0.0, 1e-3, position.shape)
-    found, changed = steadied(evolve(recorded, encoder_time=time, position=position))
-    assert not changed
-    np.testing.assert_array_equal(found.encoder_time, time)
-    assert np.abs(steady(time) - time).max() > 1e-3
 
 
 def test_power_within_a_step_runs_straight_through_its_mean(forward: Forward) -> None:  # noqa: F811

@@ -13,6 +13,7 @@ from tomr_power_model.calibration.parameters import Choice, Free, Values, choose
 from tomr_power_model.calibration.problem import Problem
 from tomr_power_model.calibration.samples import TOTAL, Samples, samples_of
 from tomr_power_model.calibration.scoring import Scores, score, suspicious
+from tomr_power_model.calibration.structure import structure_warnings
 from tomr_power_model.drive.clean import cleaned
 from tomr_power_model.drive.cut import Skips, names_of, without
 from tomr_power_model.drive.quality import Finding
@@ -112,7 +113,7 @@ def calibrate(
     fitted = fit(problem, robust, tick)
     robot = problem.robot(fitted.numbers)
     findings = [found for item in samples for found in suspicious(item, robot)]
-    odd = _odd_share(findings, samples)
+    _refuse_episode(findings, samples)
     elsewhere = [found for item in held_out for found in suspicious(item, robot)]
     return Result(
         robot=robot,
@@ -124,7 +125,10 @@ def calibrate(
         scores_before=score(samples, believed),
         held_out_scores=score(held_out, robot),
         held_out_scores_before=score(held_out, believed),
-        warnings=tuple(warnings_of(free, fitted, robot.wheel_names)),
+        warnings=(
+            *structure_warnings((*samples, *held_out), robot),
+            *warnings_of(free, fitted, robot.wheel_names),
+        ),
         notes=_told([*findings, *elsewhere]),
     )
 
@@ -137,11 +141,10 @@ def _told(findings: Sequence[Finding]) -> tuple[str, ...]:
     return (*notes, f"{more} shorter stretches are like that") if more > 0 else tuple(notes)
 
 
-def _odd_share(findings: Sequence[Finding], samples: Sequence[Samples]) -> float:
-    """Share of the time in which the fitted model is out of line.
+def _refuse_episode(findings: Sequence[Finding], samples: Sequence[Samples]) -> None:
+    """Raise InputError where much of the time is out of line, and mostly in one piece.
 
-    Raises InputError where that is much and mostly in one piece: something happened there. What a
-    model leaves out comes back wherever the robot drives alike.
+    Something happened there; what a model leaves out comes back wherever the robot drives alike.
     """
     total = sum(float(item.time[-1] - item.time[0]) for item in samples)
     odd = sum(found.end - found.start for found in findings)
@@ -149,4 +152,3 @@ def _odd_share(findings: Sequence[Finding], samples: Sequence[Samples]) -> float
         longest = max(findings, key=lambda found: found.end - found.start)
         if longest.end - longest.start > _ONE_PIECE * odd:
             raise InputError(f"{longest} ({odd:.0f} s of {total:.0f} s are like that)")
-    return odd / total

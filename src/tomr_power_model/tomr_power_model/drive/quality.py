@@ -185,6 +185,7 @@ def _stuck_power(item: Drive, robot: Robot) -> Iterator[Finding]:
             rows = slice(first, last + 1)
             equal = reading[rows] == reading[first]
             changes = np.ptp(speed[rows]) > 0.2 * np.abs(speed).max() + _MOVING
+            changes = changes and _changes(time, reading, speed, repeats, rows)
             noisy = usual < 0.5 and np.median(np.abs(speed[rows])) > _MOVING
             if equal.all() and (changes or noisy):
                 seen = f"its power sensor repeats {reading[first]:.3g} while the wheel turns"
@@ -203,8 +204,8 @@ def _saturated_power(item: Drive, robot: Robot) -> Iterator[Finding]:
             top = float(levels[end])
             at_top = reading == top
             held = [run for run in runs(at_top, time, 0.0) if run[1] - run[0] + 1 >= _CLIPPED_RUN]
-            quantum = float(np.median(np.diff(levels)))
-            if held and _passes(time, reading, speed, at_top, np.sign(-0.5 - end) * quantum):
+            way = 1.0 if end else -1.0  # of the peak: upper or lower
+            if held and _passes(time, reading, speed, at_top, way):
                 rows = slice(held[0][0], held[-1][1] + 1)
                 seen = (
                     f"its power sensor is saturated: it never passes {top:.3g}, which it reads "
@@ -213,22 +214,41 @@ def _saturated_power(item: Drive, robot: Robot) -> Iterator[Finding]:
                 yield _found(item, name, rows, time, seen)
 
 
-def _passes(time: Array, reading: Array, speed: Array, at_top: Mask, quantum: float) -> bool:
-    """Whether by the wheel's motion readings would pass their peak by several quanta.
+def _passes(time: Array, reading: Array, speed: Array, at_top: Mask, way: float) -> bool:
+    """Whether by the wheel's motion readings would pass their peak, upwards or downwards (-1).
 
     Readings of a coarse sensor repeat at their peak, too, but have nothing to hide there.
     """
+    expected = _by_motion(time, reading, speed, ~at_top)
+    if expected is None:
+        return bool(np.ptp(speed[at_top]) > 0.1 * np.abs(speed).max())
+    rest = float(np.std((reading - expected)[~at_top]))
+    beyond = float(np.percentile(way * (expected - reading)[at_top], 75))
+    return beyond > max(_HIDDEN * _quantum(reading), rest)
+
+
+def _changes(time: Array, reading: Array, speed: Array, repeats: Mask, rows: slice) -> bool:
+    """Whether by the wheel's motion readings would change by more than a coarse sensor's quanta."""
+    expected = _by_motion(time, reading, speed, ~repeats)
+    return expected is None or float(np.ptp(expected[rows])) > _HIDDEN * _quantum(reading)
+
+
+def _by_motion(time: Array, reading: Array, speed: Array, fitted: Mask) -> Array | None:
+    """Readings as the wheel's speed and acceleration explain the fitted; None: too few."""
     acceleration = np.gradient(speed, time)
     features = np.stack(
         [np.ones_like(speed), np.abs(speed), speed**2, speed * acceleration], axis=1
     )
-    below = ~at_top
-    if np.count_nonzero(below) < 2 * features.shape[1]:
-        return bool(np.ptp(speed[at_top]) > 0.1 * np.abs(speed).max())
-    shape, *_ = np.linalg.lstsq(features[below], reading[below], rcond=None)
-    beyond = (features[at_top] @ shape - reading[at_top]) * np.sign(quantum)
-    rest = float(np.std(reading[below] - features[below] @ shape))
-    return bool(np.percentile(beyond, 75) > max(_HIDDEN * abs(quantum), rest))
+    if np.count_nonzero(fitted) < 5 * features.shape[1]:
+        return None
+    shape, *_ = np.linalg.lstsq(features[fitted], reading[fitted], rcond=None)
+    return np.asarray(features @ shape)
+
+
+def _quantum(reading: Array) -> float:
+    """Usual step between the levels that a sensor reads."""
+    steps = np.diff(np.unique(reading))
+    return float(np.median(steps)) if len(steps) else 0.0
 
 
 def _wrong_sign(item: Drive, robot: Robot) -> Iterator[Finding]:
