@@ -107,19 +107,26 @@ def test_too_little_motion_is_refused(make_drive: MakeDrive) -> None:
         check_excitation([evolve(drive, velocity=idle)], ROBOT)
 
 
-def coarse(drive: Drive, quantum: float, top: float = np.inf) -> Drive:
-    reading = np.minimum(np.round(drive.reading / quantum) * quantum, top)
-    return evolve(drive, reading=reading)
+def coarse(drive: Drive, quantum: float, top: float) -> Drive:
+    """Mostly at full speed, which a coarse sensor sees as one and the same reading."""
+    speed = np.clip(3.0 * drive.velocity, -4.0, 4.0)
+    seen = np.stack(
+        [np.interp(drive.power_time, drive.encoder_time, own) for own in speed.T], axis=1
+    )
+    noise = np.random.default_rng(1).normal(0.0, 0.003, seen.shape)
+    reading = quantum * np.round((0.05 + 0.02 * np.abs(seen) + noise) / quantum)
+    return evolve(drive, velocity=speed, reading=np.minimum(reading, top))
 
 
-def test_a_coarse_sensor_is_not_saturated(make_drive: MakeDrive) -> None:
-    """Its readings repeat at their peak, and would not pass it."""
-    drive = make_drive(ROBOT, 1)
-    quantum = 0.25 * float(drive.reading.max())
-    repeated = coarse(drive, quantum)
-    assert faults(repeated) == []
-    clipped = coarse(drive, 0.1 * quantum, 1.2 * quantum)
-    assert any("saturated" in str(found) for found in faults(clipped))
+@pytest.mark.parametrize(("quantum", "top", "told"), [(0.05, np.inf, False), (0.01, 0.08, True)])
+def test_a_coarse_sensor_is_not_a_saturated_one(
+    make_drive: MakeDrive, quantum: float, top: float, told: bool
+) -> None:
+    """Its readings repeat at their peak, too, but would not pass it."""
+    drive = coarse(make_drive(ROBOT, 1), quantum, top)
+    _, counts = np.unique(drive.reading[:, 0], return_counts=True)
+    assert counts[-1] > 3 * counts[-2:].min()
+    assert any("saturated" in str(found) for found in faults(drive)) == told
 
 
 def uniform(drive: Drive, twist: tuple[float, float, float]) -> Drive:

@@ -9,6 +9,8 @@ from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
 from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.fit.noise import rows_of
+from tomr_reality_gap.prepared import integrator_of
 
 
 def _recorded(robot: Robot) -> Drive:
@@ -86,3 +88,13 @@ def test_flaws_of_a_sensor_change_what_it_reports_and_nothing_else(forward: Forw
         part = slice(at, at := at + len(channel.time))
         factor = 1.1 if channel.name == "wheel_1/power" else 1.0
         np.testing.assert_allclose(values[1, part], factor * values[0, part], rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("way", ["backward", "forward"])
+def test_the_drivers_sum_is_found_whatever_is_described(forward: Forward, way: str) -> None:
+    robot = forward.robot
+    real = evolve(robot, controller=evolve(robot.controller, integrator=way))
+    value = evolve(forward, robot=real).predict([real])[0]
+    parts = zip(forward.channels, rows_of(forward.channels), strict=True)
+    channels = tuple(evolve(channel, value=value[part]) for channel, part in parts)
+    assert integrator_of(evolve(forward, channels=channels)) == way

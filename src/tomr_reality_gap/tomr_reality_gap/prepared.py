@@ -55,7 +55,7 @@ def prepared(request: Request) -> Prepared:
     refuse(found for item in (*real, *held) for found in sensor_faults(item, robot))
     sim = _read_all((request.sim,), request, robot) if request.sim else ()
     _check_alike(real, sim, robot)
-    values["controller.integrator"] = _integrator(_forward((*sim, *real)[0], robot))
+    values["controller.integrator"] = integrator_of(_forward((*sim, *real)[0], robot))
     robot = robot_from_parameters(values, place)
     base = turned(values, robot.wheel_names, place)
     forwards, held_out, simulations = (
@@ -130,7 +130,7 @@ def _with(alike: Likened | None, forward: Forward, robot: Robot) -> Forward:
     return evolve(forward, resisting=alike.torque(motion))
 
 
-def _integrator(forward: Forward) -> str:
+def integrator_of(forward: Forward) -> str:
     """Whether the drivers add the present error before they use the sum: which fits better.
 
     It counts as much as a few percent of the proportional gain.

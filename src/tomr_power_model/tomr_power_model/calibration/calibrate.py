@@ -71,7 +71,7 @@ def read_all(
     found = []
     for path, name in zip(paths, names_of(paths), strict=True):
         drive = evolve(read_drive(path, robot, namespace), name=name)
-        found.append(cleaned(without(drive, skips.get(name, ())), robot))
+        found.append(without(cleaned(drive, robot), skips.get(name, ())))
         tick()
     return tuple(found)
 
