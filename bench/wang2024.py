@@ -90,8 +90,7 @@ def samples_of(bags: Sequence[Path], robot: Robot) -> Samples:
     """All that is known of some recordings, one after the other."""
     parts = []
     for bag in bags:
-        with open_recording(bag) as recording:
-            parts.append(read_samples(recording, robot).known())
+        parts.append(read_samples(bag, robot).known())
     totals = [part.total for part in parts if part.total is not None]
     return Samples(
         WheelMotion(

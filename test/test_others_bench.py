@@ -22,8 +22,8 @@ from others.library import columns_of, series_of, shape_of
 from others.refit import Fit, Refit, fitted, half_widths, knobs_of
 from others.sparse import Equation, Sparse
 
-from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.cli import run_main
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import read_description, robot_from_parameters
 from tomr_reality_gap.alignment.channels import channels_of
@@ -55,7 +55,7 @@ def forward(base: Turned) -> Forward:
     speed = held @ twist_to_wheels(robot).T
     power_time = np.arange(0.02, SECONDS, 0.02)
     blank = np.zeros((len(power_time), 3))
-    recorded = Recorded(
+    recorded = Drive(
         name="made",
         encoder_time=encoder_time,
         position=np.cumsum(speed, axis=0) * 0.01,
@@ -72,7 +72,7 @@ def forward(base: Turned) -> Forward:
         yaw_time=encoder_time,
         yaw_rate=np.zeros(len(encoder_time)),
     )
-    return Forward.of(recorded, robot, channels_of(recorded, robot, 0.005))
+    return Forward.of(recorded, robot, channels_of(recorded, robot))
 
 
 def measuring(forward: Forward, real: Turned) -> Forward:

@@ -16,6 +16,7 @@ from tomr_fault_diag.training.planar.plant import Motion, Plant
 from tomr_fault_diag.training.planar.residuals import compare
 from tomr_fault_diag.training.planar.schedule import STEPS, TICK, Schedule
 from tomr_fault_diag.training.planar.sensors import Signals
+from tomr_power_model.drive.sources import PowerReading
 from tomr_power_model.errors import InputError
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import shipped_robot
@@ -79,9 +80,8 @@ def test_the_same_residuals_as_the_streaming_stages(seed: int) -> None:
             predictor.encoders(stamp, values, unknown)  # type: ignore[arg-type]
             stage.encoders(stamp, values, unknown)  # type: ignore[arg-type]
         else:
-            for wheel, (voltage, drawn) in enumerate(values[:3]):  # type: ignore[misc]
-                stage.motor(wheel, stamp, voltage, -drawn)
-            stage.supply(stamp, values[3][0], -values[3][1])  # type: ignore[index]
+            for wheel, (voltage, drawn) in enumerate(values):  # type: ignore[misc]
+                stage.power(PowerReading(wheel, stamp, voltage * drawn, drawn, voltage))
         for prediction in predictor.due():
             stage.prediction(prediction)
         frames.extend(stage.due())

@@ -1,6 +1,7 @@
 """Drives made up for the tests of calibration: motion and power known exactly."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,13 +9,19 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.calibration.problem import modelled_power
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.geometry.kinematics import twist_to_wheels
-from tomr_power_model.robot import Robot
+from tomr_power_model.messages.bag import bag_header, bag_message
+from tomr_power_model.messages.types import BATTERY, JOINT_STATE, TWIST, TWIST_STAMPED
+from tomr_power_model.recordings import RecordingWriter
+from tomr_power_model.robot import Robot, shipped_robot
 
 Array = NDArray[np.float64]
-MakeDrive = Callable[..., Recorded]
+MakeDrive = Callable[..., Drive]
+WriteBag = Callable[..., Path]
+ROBOT = shipped_robot("reference")
+_START_NS = 1_700_000_000 * 1_000_000_000
 
 _ENCODER_STEP = 0.01  # s
 _POWER_EVERY = 4  # encoder samples
@@ -47,7 +54,7 @@ def make_drive() -> MakeDrive:
 
     def make(
         robot: Robot, seed: int = 1, seconds: float = 40.0, noise: float = 0.05, name: str = "tour"
-    ) -> Recorded:
+    ) -> Drive:
         tour = Tour.of(seed, seconds)
         speed = tour.twist @ twist_to_wheels(robot).T
         acceleration = np.gradient(speed, _ENCODER_STEP, axis=0)
@@ -57,7 +64,7 @@ def make_drive() -> MakeDrive:
         power = modelled_power(robot, WheelMotion(speed[rows], acceleration[rows]))
         random = np.random.default_rng(seed + 1000)
         power = power + noise * random.standard_normal(power.shape)
-        return Recorded(
+        return Drive(
             name=name,
             encoder_time=tour.time,
             position=position,
@@ -94,3 +101,47 @@ def other_values() -> Callable[[Robot], Robot]:
         return evolve(robot, mass=robot.mass * 1.06, physics=physics)
 
     return changed
+
+
+@pytest.fixture
+def write_bag() -> WriteBag:
+    """Writes a recording in the contract's form.
+
+    `late` [s] shifts the stamps of topics, `voltage` is that of every supply, `received` says when
+    a message that was sent at some time [s] reaches the recorder.
+    """
+
+    def write(
+        drive: Drive,
+        path: Path,
+        late: Mapping[str, float | Array] = {},
+        voltage: float = 24.0,
+        received: Callable[[float], float] = lambda time: time,
+    ) -> Path:
+        names = list(ROBOT.wheel_names)
+        messages: list[tuple[float, str, str, dict[str, object]]] = []
+        for time, angle, speed in zip(
+            drive.encoder_time, drive.position, drive.velocity, strict=True
+        ):
+            fields: dict[str, object] = {"name": names, "position": angle, "velocity": speed}
+            messages.append((time, "joint_states", JOINT_STATE, fields))
+        for time, power, total in zip(drive.power_time, drive.power, drive.total, strict=True):
+            topics = [*(f"{name}/power" for name in ROBOT.wheel_topics), "battery_state"]
+            for topic, drawn in zip(topics, (*power, total), strict=True):
+                fields = {"voltage": voltage, "current": -float(drawn) / 24.0}
+                messages.append((time, topic, BATTERY, fields))
+        for time, (vx, vy, wz) in zip(drive.command_time, drive.command, strict=True):
+            twist = bag_message(TWIST)
+            twist.linear.x, twist.linear.y, twist.angular.z = float(vx), float(vy), float(wz)
+            messages.append((time, "cmd_vel", TWIST_STAMPED, {"twist": twist}))
+        counts: dict[str, int] = {}
+        with RecordingWriter(path) as writer:
+            for time, topic, kind, fields in sorted(messages, key=lambda item: item[:2]):
+                number = counts[topic] = counts.get(topic, -1) + 1
+                off = np.atleast_1d(late.get(topic, 0.0))
+                stamp = _START_NS + round(1e9 * (time + float(off[number % len(off)])))
+                message = bag_message(kind, header=bag_header(stamp), **fields)
+                writer.write(topic, kind, message, _START_NS + round(1e9 * received(time)))
+        return path
+
+    return write

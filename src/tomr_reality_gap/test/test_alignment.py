@@ -4,28 +4,16 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
-from tomr_reality_gap.alignment.commands import shift_between
 from tomr_reality_gap.alignment.forward import Forward
-from tomr_reality_gap.alignment.steady import steadied, steady
+from tomr_reality_gap.fit.noise import rows_of
+from tomr_reality_gap.prepared import integrator_of
 
 
-def test_jitter_is_taken_off_and_gaps_are_kept() -> None:
-    grid = np.delete(np.arange(500) * 0.01, np.arange(200, 230))
-    noisy = grid + np.random.default_rng(1).normal(0.0, 5e-4, len(grid))
-    assert np.abs(steady(noisy) - grid).max() < 1e-4
-    assert np.diff(steady(noisy)).max() == pytest.approx(0.31, abs=1e-3)
-
-
-def test_stamps_without_a_grid_are_left_alone() -> None:
-    time = np.sort(np.random.default_rng(2).uniform(0.0, 5.0, 300))
-    np.testing.assert_array_equal(steady(time), time)
-
-
-def _recorded(robot: Robot) -> Recorded:
+def _recorded(robot: Robot) -> Drive:
     """Thirty seconds of starts, turns and stops, as the simulation itself would record them."""
     command_time = np.arange(0.0, 30.0, 0.05)
     phase = command_time // 2.5
@@ -41,7 +29,7 @@ def _recorded(robot: Robot) -> Recorded:
     speed = held @ twist_to_wheels(robot).T
     power_time = np.arange(0.02, 30.0, 0.02)
     blank = np.zeros((len(power_time), 3))
-    return Recorded(
+    return Drive(
         name="made",
         encoder_time=encoder_time,
         position=np.cumsum(speed, axis=0) * 0.01,
@@ -64,7 +52,7 @@ def _recorded(robot: Robot) -> Recorded:
 def forward() -> Forward:
     robot = shipped_robot("reference")
     recorded = _recorded(robot)
-    return Forward.of(recorded, robot, channels_of(recorded, robot, 0.005))
+    return Forward.of(recorded, robot, channels_of(recorded, robot))
 
 
 def test_stretches_side_by_side_are_the_recording_in_one_piece(forward: Forward) -> None:
@@ -102,20 +90,11 @@ def test_flaws_of_a_sensor_change_what_it_reports_and_nothing_else(forward: Forw
         np.testing.assert_allclose(values[1, part], factor * values[0, part], rtol=1e-6, atol=1e-9)
 
 
-def test_jittered_recordings_are_told_from_steady_ones() -> None:
-    recorded = _recorded(shipped_robot("reference"))
-    jitter = np.random.default_rng(3).normal(0.0, 4e-4, len(recorded.encoder_time))
-    assert not steadied(recorded)[1]
-    even, changed = steadied(evolve(recorded, encoder_time=recorded.encoder_time + jitter))
-    assert changed
-    assert np.abs(even.encoder_time - recorded.encoder_time).max() < 1e-4
-
-
-def test_the_shift_between_recordings_of_the_same_commands(forward: Forward) -> None:
-    later = evolve(forward.recorded, command_time=forward.recorded.command_time + 0.7)
-    assert shift_between(forward.recorded, later) == pytest.approx(0.7, abs=1e-6)
-
-
-def test_other_commands_are_no_simulation_of_a_recording(forward: Forward) -> None:
-    other = evolve(forward.recorded, command=forward.recorded.command[::-1])
-    assert shift_between(forward.recorded, other) is None
+@pytest.mark.parametrize("way", ["backward", "forward"])
+def test_the_drivers_sum_is_found_whatever_is_described(forward: Forward, way: str) -> None:
+    robot = forward.robot
+    real = evolve(robot, controller=evolve(robot.controller, integrator=way))
+    value = evolve(forward, robot=real).predict([real])[0]
+    parts = zip(forward.channels, rows_of(forward.channels), strict=True)
+    channels = tuple(evolve(channel, value=value[part]) for channel, part in parts)
+    assert integrator_of(evolve(forward, channels=channels)) == way

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
@@ -17,16 +17,17 @@ from tomr_reality_gap.explanation import Explanation
 from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.request import Request
 from tomr_sim_bridge.importers.dataset import choose, default_dataset, import_files, open_dataset
-from tomr_sim_bridge.importers.robotino import Drive, Run, write_run
+from tomr_sim_bridge.importers.robotino import Drive as RobotinoDrive
+from tomr_sim_bridge.importers.robotino import Run, write_run
 
 QUANTUM = 1.0 / 39.0  # A
 START_NS = 1_672_531_200_000_000_000
 
 
-def _recorded(robot: Robot, command: np.ndarray, time: np.ndarray) -> Recorded:
+def _recorded(robot: Robot, command: np.ndarray, time: np.ndarray) -> Drive:
     """A recording of commands, all else blank."""
     blank = np.zeros((len(time), 3))
-    return Recorded(
+    return Drive(
         name="made",
         encoder_time=time,
         position=np.full((len(time), 3), np.nan),
@@ -47,7 +48,7 @@ def _recorded(robot: Robot, command: np.ndarray, time: np.ndarray) -> Recorded:
 
 def _forward(robot: Robot, command: np.ndarray) -> Forward:
     recorded = _recorded(robot, command, 0.0312 * np.arange(len(command)))
-    return Forward.of(recorded, robot, channels_of(recorded, robot, 0.005))
+    return Forward.of(recorded, robot, channels_of(recorded, robot))
 
 
 def _to_and_fro(heading: float, speed: float, seconds: float = 13.0) -> np.ndarray:
@@ -127,7 +128,7 @@ def _written(path: Path, robot: Robot, command: np.ndarray, seed: int) -> Path:
     time = 0.0312 * np.arange(len(command))
     recorded = _recorded(robot, command, time)
     recorded = evolve(recorded, velocity=command @ twist_to_wheels(robot).T)
-    forward = Forward.of(recorded, robot, channels_of(recorded, robot, 0.005))
+    forward = Forward.of(recorded, robot, channels_of(recorded, robot))
     run, line = forward.run(robot), forward.timeline
     middle = line.start + line.period * (np.arange(line.count) + 0.5)
     speed = np.stack([np.interp(time, middle, column) for column in run["speed"].T], axis=1)
@@ -137,7 +138,7 @@ def _written(path: Path, robot: Robot, command: np.ndarray, seed: int) -> Path:
     stamps = tuple(START_NS + int(1e9 * stamp) for stamp in time)
     rounded = np.abs(np.round(current / QUANTUM)) * QUANTUM
     angle = np.cumsum(speed, axis=0) * 0.0312
-    drive = Drive(command, np.zeros_like(command), np.zeros_like(command))
+    drive = RobotinoDrive(command, np.zeros_like(command), np.zeros_like(command))
     write_run(Run(stamps, angle, told, np.zeros_like(told), rounded, drive), path, "mcap")
     return path
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.robot import shipped_robot
 from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.alignment.forward import Forward
@@ -50,7 +50,7 @@ def test_a_ripple_is_found_by_its_order_and_noise_has_none() -> None:
     speed = 5.0 + 3.0 * np.sin(0.4 * POWER_TIME)
     angle = np.cumsum(speed) * 0.02
     noise = np.random.default_rng(1).standard_normal(len(angle))
-    made: Recorded = evolve(
+    made: Drive = evolve(
         recorded_drive(shipped_robot("reference")),
         encoder_time=POWER_TIME - 0.0025,
         position=np.stack([angle] * 3, axis=1),

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import Channel, channels_of
 from tomr_reality_gap.alignment.forward import Forward
-from tomr_reality_gap.alignment.steady import steadied, steady
 from tomr_reality_gap.alignment.stretches import Timeline
 
 from .test_alignment import _recorded as recorded_drive
@@ -21,15 +20,15 @@ def robot() -> Robot:
 
 
 @pytest.fixture
-def recorded(robot: Robot) -> Recorded:
+def recorded(robot: Robot) -> Drive:
     return recorded_drive(robot)
 
 
-def _channel(recorded: Recorded, robot: Robot, name: str) -> Channel:
-    return next(item for item in channels_of(recorded, robot, 0.005) if item.name == name)
+def _channel(recorded: Drive, robot: Robot, name: str) -> Channel:
+    return next(item for item in channels_of(recorded, robot) if item.name == name)
 
 
-def test_a_gap_of_the_encoders_stays_a_gap(recorded: Recorded, robot: Robot) -> None:
+def test_a_gap_of_the_encoders_stays_a_gap(recorded: Drive, robot: Robot) -> None:
     """Nothing is said about the second between 10 and 11 s, and no mean bridges it."""
     kept = (recorded.encoder_time < 10.0) | (recorded.encoder_time >= 11.0)
     holed = evolve(
@@ -46,7 +45,7 @@ def test_a_gap_of_the_encoders_stays_a_gap(recorded: Recorded, robot: Robot) -> 
     assert not ((found.time - found.span < 10.5) & (found.time > 10.5)).any()
 
 
-def test_what_is_not_a_number_is_left_out(recorded: Recorded, robot: Robot) -> None:
+def test_what_is_not_a_number_is_left_out(recorded: Drive, robot: Robot) -> None:
     power = recorded.power.copy()
     power[100:200, 0] = np.nan
     position = recorded.position.copy()
@@ -59,36 +58,13 @@ def test_what_is_not_a_number_is_left_out(recorded: Recorded, robot: Robot) -> N
     assert not ((speed.time > 10.1) & (speed.time < 10.9)).any()
 
 
-def test_a_gap_of_the_gyro_stays_a_gap(recorded: Recorded, robot: Robot) -> None:
+def test_a_gap_of_the_gyro_stays_a_gap(recorded: Drive, robot: Robot) -> None:
     time = np.delete(np.arange(0.0, 4.0, 0.01), np.arange(202, 250))
     rate = np.where(time < 2.1, 1.0, -1.0)
     found = _channel(evolve(recorded, yaw_time=time, yaw_rate=rate), robot, "imu/data")
     assert set(np.abs(found.value)) == {1.0}
     assert found.span == pytest.approx(np.full(len(found.time), 0.05))
     assert not ((found.time > 2.1) & (found.time < 2.5)).any()
-
-
-def test_standing_still_says_nothing_about_the_stamps(recorded: Recorded) -> None:
-    """Jitter shows in motion only: a robot that mostly stands has it, too."""
-    jitter = np.random.default_rng(3).normal(0.0, 4e-4, len(recorded.encoder_time))
-    moving = recorded.encoder_time < 2.5
-    position = np.where(moving[:, None], recorded.position, recorded.position[moving][-1])
-    standing = evolve(recorded, position=position)
-    assert steadied(evolve(standing, encoder_time=recorded.encoder_time + jitter))[1]
-
-
-def test_samples_that_really_come_unevenly_keep_their_stamps(recorded: Recorded) -> None:
-    """Taken when they say: on an even grid their motion would be rougher."""
-    random = np.random.default_rng(3)
-    time = recorded.encoder_time + random.normal(0.0, 4e-4, 3000)
-    position = np.stack(
-        [np.interp(time, recorded.encoder_time, column) for column in recorded.position.T], axis=1
-    )
-    position += random.normal(0.0, 1e-3, position.shape)
-    found, changed = steadied(evolve(recorded, encoder_time=time, position=position))
-    assert not changed
-    np.testing.assert_array_equal(found.encoder_time, time)
-    assert np.abs(steady(time) - time).max() > 1e-3
 
 
 def test_power_within_a_step_runs_straight_through_its_mean(forward: Forward) -> None:  # noqa: F811

@@ -7,18 +7,19 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.calibration.calibrate import names_of, without
-from tomr_power_model.calibration.checks import refuse_little_motion
-from tomr_power_model.calibration.recorded import Recorded, read_recorded
+from tomr_power_model.drive.clean import check_duration, cleaned
+from tomr_power_model.drive.commands import shift_between
+from tomr_power_model.drive.cut import names_of, without
+from tomr_power_model.drive.excitation import check_excitation
+from tomr_power_model.drive.quality import not_following, refuse, sensor_faults
+from tomr_power_model.drive.read import read_drive
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.effects.scales import Scales
 from tomr_power_model.errors import InputError
 from tomr_power_model.recordings import open_recording, resolve_topic
 from tomr_power_model.robot import Robot, read_description, robot_from_parameters
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS, channels_of
-from tomr_reality_gap.alignment.commands import shift_between
 from tomr_reality_gap.alignment.forward import Forward
-from tomr_reality_gap.alignment.steady import steadied
-from tomr_reality_gap.alignment.usable import refuse_dull, refuse_faulty, refuse_unfollowed, usable
 from tomr_reality_gap.fit.likened import Likened, likened
 from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.hypotheses.knobs import Turned, turned
@@ -27,10 +28,6 @@ from tomr_reality_gap.mismatch.probes import motion_of
 from tomr_reality_gap.request import Request
 
 Array = NDArray[np.float64]
-
-_WINDOW = 0.005  # s, over which power sensors average
-_SHORTEST = 10.0  # s, of all recordings together
-_SINGLE = 2.0  # s, of each
 
 
 @frozen
@@ -49,22 +46,25 @@ class Prepared:
 
 def prepared(request: Request) -> Prepared:
     """Read and align everything. Raises InputError with one line for bad input."""
-    base, robot = _described(request)
+    place = str(request.robot)
+    values = _described(request)
+    robot = robot_from_parameters(values, place)
     real = _read_all(request.real, request, robot)
-    _refuse_short(real)
+    check_duration(real)
     held = _read_all(request.holdout, request, robot)
-    refuse_little_motion(real, robot)
-    refuse_dull(real)
-    refuse_faulty((*real, *held), robot)
+    check_excitation(real, robot)
+    refuse(found for item in (*real, *held) for found in sensor_faults(item, robot))
     sim = _read_all((request.sim,), request, robot) if request.sim else ()
     _check_alike(real, sim, robot)
-    prompt = _is_prompt(_forward((*sim, *real)[0], robot))
+    values["controller.integrator"] = integrator_of(_forward((*sim, *real)[0], robot))
+    robot = robot_from_parameters(values, place)
+    base = turned(values, robot.wheel_names, place)
     forwards, held_out, simulations = (
-        tuple(evolve(_forward(item, robot), prompt=prompt) for item in group)
-        for group in (real, held, sim)
+        tuple(_forward(item, robot) for item in group) for group in (real, held, sim)
     )
     runs = tuple(item.run(base.robot) for item in forwards)
-    refuse_unfollowed(forwards, runs)
+    for item, run in zip(forwards, runs, strict=True):
+        refuse(not_following(item.recorded, robot, item.timeline.middle, run["speed"]))
     scales = _scales(forwards, runs, robot)
     alike = likened(simulations, base.robot, scales.torque)
     notes = [note for item in (*real, *held) for note in item.notes]
@@ -80,19 +80,19 @@ def prepared(request: Request) -> Prepared:
     )
 
 
-def _described(request: Request) -> tuple[Turned, Robot]:
+def _described(request: Request) -> dict[str, object]:
+    """Flat values of the description."""
     values = dict(read_description(request.robot))
     place = str(request.robot)
     robot = robot_from_parameters(values, place)
     if robot.measurement.source == "battery_state" and _has_total_only(request.real, robot):
         values["measurement.source"] = "total_only"
-        robot = robot_from_parameters(values, place)
     for key in request.tolerances:
         if key not in values:
             raise InputError(
                 f"--tolerance {key}: {place} has no such value: give a key as it stands there"
             )
-    return turned(values, robot.wheel_names, place), robot
+    return values
 
 
 def _has_total_only(paths: tuple[Path, ...], robot: Robot) -> bool:
@@ -105,47 +105,22 @@ def _has_total_only(paths: tuple[Path, ...], robot: Robot) -> bool:
     return True
 
 
-def _read_all(paths: tuple[Path, ...], request: Request, robot: Robot) -> tuple[Recorded, ...]:
+def _read_all(paths: tuple[Path, ...], request: Request, robot: Robot) -> tuple[Drive, ...]:
     names = dict(zip(request.recordings, names_of(request.recordings), strict=True))
     return tuple(
-        without(evolve(_read(path, robot), name=names[path]), request.skips.get(names[path], ()))
-        for path in paths
+        _read(path, robot, names[path], request.skips.get(names[path], ())) for path in paths
     )
 
 
-def _read(path: Path, robot: Robot) -> Recorded:
-    recorded = read_recorded(path, robot)
-    if not len(recorded.command_time):
+def _read(path: Path, robot: Robot, name: str, skipped: Sequence[tuple[float, float]]) -> Drive:
+    drive = evolve(read_drive(path, robot), name=name)
+    if not len(drive.command_time):
         raise InputError(f"{path}: no cmd_vel: record it too, the simulation is driven with it")
-    if recorded.duration < _SINGLE:
-        raise InputError(
-            f"{path}: {recorded.duration:.1f} s are too short for a recording: leave it out"
-        )
-    first, last = recorded.command_time[0], recorded.command_time[-1]
-    if first > recorded.duration or last < 0.0:
-        raise InputError(
-            f"{path}: commands ({first:.1f} to {last:.1f} s) and encoders (0 to "
-            f"{recorded.duration:.1f} s) do not overlap: are both stamped by the same clock?"
-        )
-    power = np.concatenate([recorded.power.ravel(), recorded.total])
-    if len(power) and not np.isfinite(power).any():
-        raise InputError(f"{path}: every power sample is NaN: check the power sensors' driver")
-    return usable(recorded, robot)
+    return without(cleaned(drive, robot), skipped)
 
 
-def _refuse_short(real: tuple[Recorded, ...]) -> None:
-    duration = sum(item.duration for item in real)
-    if duration < _SHORTEST:
-        names = ", ".join(item.name for item in real)
-        raise InputError(
-            f"{names}: {duration:.1f} s are too short to decide anything: record at least "
-            f"{_SHORTEST:g} s, better three minutes"
-        )
-
-
-def _forward(recorded: Recorded, robot: Robot) -> Forward:
-    even, jitters = steadied(recorded)
-    return Forward.of(even, robot, channels_of(even, robot, _WINDOW, jitters))
+def _forward(drive: Drive, robot: Robot) -> Forward:
+    return Forward.of(drive, robot, channels_of(drive, robot))
 
 
 def _with(alike: Likened | None, forward: Forward, robot: Robot) -> Forward:
@@ -156,26 +131,27 @@ def _with(alike: Likened | None, forward: Forward, robot: Robot) -> Forward:
     return evolve(forward, resisting=alike.torque(motion))
 
 
-def _is_prompt(forward: Forward) -> bool:
+def integrator_of(forward: Forward) -> str:
     """Whether the drivers add the present error before they use the sum: which fits better.
 
-    The contract leaves it open; it counts as much as a few percent of the proportional gain.
+    It counts as much as a few percent of the proportional gain.
     """
-    errors = []
-    for prompt in (False, True):
-        value = evolve(forward, prompt=prompt).predict([forward.robot])[0]
+    errors = {}
+    for way in ("backward", "forward"):
+        controller = evolve(forward.robot.controller, integrator=way)
+        value = evolve(forward, robot=evolve(forward.robot, controller=controller)).predict(
+            [forward.robot]
+        )[0]
         parts = zip(forward.channels, rows_of(forward.channels), strict=True)
-        errors.append(
-            sum(
-                float(np.mean(np.abs(channel.value - value[part])))
-                for channel, part in parts
-                if channel.kind == "speed"
-            )
+        errors[way] = sum(
+            float(np.mean(np.abs(channel.value - value[part])))
+            for channel, part in parts
+            if channel.kind == "speed"
         )
-    return errors[1] < errors[0]
+    return min(errors, key=errors.__getitem__)
 
 
-def _check_alike(real: tuple[Recorded, ...], sim: tuple[Recorded, ...], robot: Robot) -> None:
+def _check_alike(real: tuple[Drive, ...], sim: tuple[Drive, ...], robot: Robot) -> None:
     """A simulation must have been driven with the commands of a real recording."""
     for item in sim:
         moved = np.nanmax(np.abs(item.position - item.position[:1]), initial=0.0)

@@ -8,6 +8,7 @@ from attrs import evolve
 from numpy.typing import NDArray
 
 from tomr_power_model.calibration.priors import drive_for
+from tomr_power_model.estimation.statistics import robust_scale
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.described import described, for_users
@@ -319,7 +320,7 @@ def _unexplained(evidence: Evidence, after: Array) -> tuple[float, float]:
         value = channel.value
         residuals = value - before[part], value - after[part]
         steps = np.abs(np.diff(residuals[1]))
-        noise = (1.4826 * float(np.median(steps))) ** 2 / 2.0
+        noise = robust_scale(steps) ** 2 / 2.0
         noise = max(noise, 0.5 * float(np.mean(np.minimum(steps, 5.0 * np.median(steps)) ** 2)))
         noise = max(noise, channel.quantum**2 / 12.0)
         known = noise + (_UNSURE * float(np.std(value))) ** 2

@@ -15,8 +15,8 @@ from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_fault_diag.residuals.messages import residual_message
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.bag import bag_header, bag_message
-from tomr_power_model.messages.inputs import DIAGNOSTICS
 from tomr_power_model.messages.to_bag import to_bag
+from tomr_power_model.messages.types import DIAGNOSTICS
 from tomr_power_model.recordings import RecordingWriter
 from tomr_power_model.robot import shipped_robot
 from tomr_sim_bridge.demo import acts

@@ -15,10 +15,11 @@ from attrs import frozen
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from tomr_power_model.calibration.intervals import Spread, autocorrelation_time, spread_of
+from tomr_power_model.calibration.intervals import Spread, pieces_of, spread_of
 from tomr_power_model.calibration.loss import bent
 from tomr_power_model.calibration.problem import Problem
 from tomr_power_model.calibration.samples import CHANNELS
+from tomr_power_model.estimation.statistics import autocorrelation_time, robust_scale
 
 Array = NDArray[np.float64]
 
@@ -87,7 +88,9 @@ def _weights(problem: Problem, residual: Array) -> tuple[Array, Array]:
     for channel in range(CHANNELS):
         known = residual[np.isfinite(residual[:, channel]), channel]
         if len(known):
-            scale[channel] = max(1.4826 * float(np.median(np.abs(known))), _LEAST_SCALE)
+            scale[channel] = max(robust_scale(known), _LEAST_SCALE)
             series = residual[:, channel] / scale[channel]
-            weight[channel] = autocorrelation_time(problem.samples, bent(series, True)) ** -0.5
+            weight[channel] = (
+                autocorrelation_time(pieces_of(problem.samples, bent(series, True))) ** -0.5
+            )
     return scale, weight

@@ -17,6 +17,7 @@ from scipy.stats import t as student
 from tomr_power_model.calibration.loss import influence
 from tomr_power_model.calibration.problem import Problem
 from tomr_power_model.calibration.samples import CHANNELS, Samples
+from tomr_power_model.estimation.statistics import autocorrelation_time
 
 Array = NDArray[np.float64]
 
@@ -100,7 +101,7 @@ def block_length(samples: tuple[Samples, ...], psi: Array) -> float:
         return max(durations)
     period = float(np.median(np.concatenate([np.diff(item.time) for item in samples])))
     times = [
-        autocorrelation_time(samples, psi[:, channel])
+        autocorrelation_time(pieces_of(samples, psi[:, channel]))
         for channel in range(CHANNELS)
         if np.isfinite(psi[:, channel]).any()
     ]
@@ -122,27 +123,11 @@ def blocks(samples: tuple[Samples, ...], length: float) -> NDArray[np.int64]:
     return np.concatenate(numbers)
 
 
-def autocorrelation_time(samples: tuple[Samples, ...], series: Array) -> float:
-    """1 + 2 sum_k rho_k in samples, summed until two lags in a row leave nothing (Geyer 1992).
-
-    The mean is not taken off: an offset that lasts a whole drive is the most correlated of all.
-    """
+def pieces_of(samples: tuple[Samples, ...], series: Array) -> list[Array]:
+    """A series of all samples, cut into uninterrupted stretches."""
     pieces, start = [], 0
     for item in samples:
         values = series[start : start + len(item.time)]
         start += len(item.time)
-        for stretch in np.unique(item.stretch):
-            piece = values[item.stretch == stretch]
-            pieces.append(np.where(np.isfinite(piece), piece, 0.0))
-    longest = max(len(piece) for piece in pieces)
-    products = np.zeros(longest)
-    for piece in pieces:
-        size = 1 << (2 * len(piece) - 1).bit_length()
-        power = np.abs(np.fft.rfft(piece, size)) ** 2
-        products[: len(piece)] += np.fft.irfft(power, size)[: len(piece)]
-    if products[0] <= 0.0:
-        return 1.0
-    rho = products[: max(2, longest // 2)] / products[0]
-    pairs = rho[: len(rho) // 2 * 2].reshape(-1, 2).sum(axis=1)
-    stop = int(np.argmax(pairs <= 0.0)) if np.any(pairs <= 0.0) else len(pairs)
-    return max(1.0, 2.0 * float(pairs[:stop].sum()) - 1.0)
+        pieces += [values[item.stretch == stretch] for stretch in np.unique(item.stretch)]
+    return pieces

@@ -13,6 +13,9 @@ from tomr_power_model.robot import WHEELS, Robot, robot_from_parameters
 
 Array = NDArray[np.float64]
 
+_STILL = 0.15  # rad/s
+_DRY = ("friction.coulomb", "friction.stribeck", "contact.rolling_resistance")
+
 
 def modelled_power(robot: Robot, motion: WheelMotion, parts: int = 1) -> Array:
     """Power of motors 1-3 and of the whole robot [W] as it would be measured, (n, 4).
@@ -27,6 +30,19 @@ def modelled_power(robot: Robot, motion: WheelMotion, parts: int = 1) -> Array:
     rows[:, :WHEELS] = power
     rows[:, TOTAL] = drives.power.sum(axis=1) + robot.supply.auxiliary_power
     return rows if parts == 1 else np.asarray(rows.reshape(-1, parts, CHANNELS).mean(axis=1))
+
+
+def determined(samples: Samples, robot: Robot) -> Array:
+    """Measured power without that of standing wheels that may hold any torque, (n, 4) [W].
+
+    Where a wheel stops in dry friction, the sum of its driver's errors goes on holding a voltage.
+    """
+    dry = any(robot.effect(effect, wheel) for effect in _DRY for wheel in range(WHEELS))
+    if not (robot.controller.integral and dry):
+        return samples.measured
+    held = np.abs(samples.mean_motion.speed) < _STILL
+    unknown = np.column_stack([held, held.any(axis=1)])
+    return np.where(unknown, np.nan, samples.measured)
 
 
 @frozen
@@ -46,7 +62,8 @@ class Problem:
             np.concatenate([item.motion.acceleration for item in self.samples]),
         )
         object.__setattr__(self, "_motion", joined)
-        measured = np.concatenate([item.measured for item in self.samples])
+        robot = robot_from_parameters(self.values, self.place)
+        measured = np.concatenate([determined(item, robot) for item in self.samples])
         object.__setattr__(self, "measured", measured)
 
     @property

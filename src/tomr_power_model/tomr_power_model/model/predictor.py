@@ -69,7 +69,7 @@ class PowerPredictor:
         self._gyro: tuple[int, float] | None = None
         self._heading = 0.0  # at the start of the next tick, against the first [rad]
         self._model.clear()
-        self._stamps: list[deque[int]] = [deque() for _ in range(WHEELS + 1)]
+        self._stamps: list[deque[tuple[int]]] = [deque() for _ in range(WHEELS + 1)]
         if self._measured is not None:
             self._measured.clear()
 
@@ -98,7 +98,7 @@ class PowerPredictor:
         """Take note of when a wheel's power was measured, or, as one more wheel, the whole's."""
         arrival = self._arrive(f"power {wheel}", stamp_ns)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
-            self._stamps[wheel].append(stamp_ns)
+            self._stamps[wheel].append((stamp_ns,))
         return arrival
 
     def due(self) -> list[Prediction]:
@@ -114,7 +114,7 @@ class PowerPredictor:
     def _predict(self, tick: int) -> Prediction:
         estimate = self._encoders.at(tick)
         speed, change = estimate.speed.tolist(), estimate.acceleration.tolist()
-        angle = self._encoders.angle(tick).tolist()
+        angle = estimate.angle.tolist()
         gyro = self._yaw_rate(tick)
         before, after = (
             [a + t * (w + 0.5 * c * t) for a, w, c in zip(angle, speed, change, strict=True)]
@@ -154,7 +154,9 @@ class PowerPredictor:
     def _windows(self, tick: int) -> Windows:
         """In which windows the power was measured that a tick compares."""
         period, stale = self.settings.ticks.period, self.settings.stale
-        ends = [of_tick(stamps, tick, period, stale) for stamps in self._stamps]
+        ends = [
+            [stamp for (stamp,) in of_tick(stamps, tick, period, stale)] for stamps in self._stamps
+        ]
         return Windows(ends[:WHEELS], ends[WHEELS], self._window, tick, period)
 
     def _where_known(self, means: Means, motion: MeasuredMotion) -> Means:

@@ -12,6 +12,7 @@ import math
 from collections import deque
 from collections.abc import Collection, Sequence
 from enum import Enum
+from typing import TypeVar
 
 from attrs import frozen
 
@@ -33,16 +34,19 @@ class TickSettings:
     gap: int = to_ns(1.0)  # a longer silence or a jump starts the stage afresh
 
 
-def of_tick(stamps: deque[int], tick: int, period: int, stale: int) -> list[int]:
-    """Stamps of the samples that a tick compares: those in (tick - period, tick].
+Sample = TypeVar("Sample", bound=tuple[int, *tuple[float, ...]])  # stamp [ns] and values
+
+
+def of_tick(samples: deque[Sample], tick: int, period: int, stale: int) -> list[Sample]:
+    """The samples that a tick compares: those stamped in (tick - period, tick].
 
     Nothing is filled in: a window without a sample takes the newest one that is not stale. Forgets
     what no later tick asks for.
     """
-    while len(stamps) > 1 and stamps[1] <= tick - period:
-        stamps.popleft()
-    inside = [stamp for stamp in stamps if tick - period < stamp <= tick]
-    return inside or [stamp for stamp in stamps if tick - stale < stamp <= tick][-1:]
+    while len(samples) > 1 and samples[1][0] <= tick - period:
+        samples.popleft()
+    inside = [sample for sample in samples if tick - period < sample[0] <= tick]
+    return inside or [sample for sample in samples if tick - stale < sample[0] <= tick][-1:]
 
 
 class Arrival(Enum):

@@ -14,7 +14,7 @@ from attrs import evolve, fields, frozen
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.physics.effects import COPPER, Effect, acting, stacked_effects
 from tomr_power_model.response.many import ManyLoops, Runs, Stretches
 from tomr_power_model.robot import WHEELS, Robot
@@ -49,16 +49,15 @@ _RUN: Mapping[Kind, str] = MappingProxyType(
 class Forward:
     """Simulates the channels of one recording; `robot` is what the drivers believe."""
 
-    recorded: Recorded
+    recorded: Drive
     robot: Robot
     channels: tuple[Channel, ...]
     timeline: Timeline
     delay: float = 0.0  # of the response to commands, beyond the description [s]
-    prompt: bool = False  # see `response.many.Stretches`
     resisting: Array | None = None  # torques that no description holds [N m], (count, 3)
 
     @classmethod
-    def of(cls, recorded: Recorded, robot: Robot, channels: tuple[Channel, ...]) -> "Forward":
+    def of(cls, recorded: Drive, robot: Robot, channels: tuple[Channel, ...]) -> "Forward":
         """Prepare a recording."""
         line = timeline_of(recorded, robot)
         end = line.start + line.period * line.count
@@ -100,7 +99,8 @@ class Forward:
         twist = ramped(self.recorded, believed, self.timeline)
         found = stretches_of(self.recorded, self.robot, self.timeline, twist)
         torque = None if self.resisting is None else self._cut(self.resisting[None])
-        return evolve(found, prompt=self.prompt, torque=torque)
+        prompt = self.robot.controller.integrator == "backward"
+        return evolve(found, prompt=prompt, torque=torque)
 
     def late(self, robot: Robot) -> float:
         """How much later than described the commands of a robot come, in whole `_GRID` [s]."""

@@ -6,8 +6,8 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.calibration.motion import wheel_motion
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.motion import turned_angle, wheel_motion
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.geometry.kinematics import twist_to_wheels, wheels_to_twist
 from tomr_power_model.response.many import Stretches, step_of
 from tomr_power_model.robot import WHEELS, Robot
@@ -42,6 +42,11 @@ class Timeline:
         """When each stretch starts to run, warm-up included [s], (c,)."""
         return np.asarray(self.start + self.period * (self.first - self.warm))
 
+    @property
+    def middle(self) -> Array:
+        """Middles of the periods that count [s], (count,)."""
+        return np.asarray(self.start + self.period * (np.arange(self.count) + 0.5))
+
     def cut(self, series: Array) -> Array:
         """(warm + count, ...) -> (c, warm + length, ...); the end is repeated."""
         rows = self.first[:, None] + np.arange(self.warm + self.length)
@@ -56,7 +61,7 @@ class Timeline:
         return np.asarray(pieces[rows, :, owner])
 
 
-def timeline_of(recorded: Recorded, robot: Robot) -> Timeline:
+def timeline_of(recorded: Drive, robot: Robot) -> Timeline:
     """Driver periods from the first encoder sample to the last measurement."""
     period = step_of(robot)
     last = max(float(time[-1]) for time in _times(recorded))
@@ -78,7 +83,7 @@ def timeline_of(recorded: Recorded, robot: Robot) -> Timeline:
     return Timeline(start, period, count, warm, np.array(first, dtype=np.intp), length)
 
 
-def _times(recorded: Recorded) -> list[Array]:
+def _times(recorded: Drive) -> list[Array]:
     found = [recorded.encoder_time, recorded.power_time, recorded.total_time, recorded.yaw_time]
     return [time for time in found if len(time)]
 
@@ -91,7 +96,7 @@ def _memory(robot: Robot) -> float:
     return float(np.clip(_FORGETS * slow, *_WARM_UP))
 
 
-def ramped(recorded: Recorded, robot: Robot, timeline: Timeline) -> Array:
+def ramped(recorded: Drive, robot: Robot, timeline: Timeline) -> Array:
     """Set point of the body twist in each period, from `warm` periods before the start, (m, 3)."""
     wanted = _held(recorded, timeline, robot.controller.delay)
     limit = robot.controller.acceleration_limit
@@ -111,7 +116,7 @@ def ramped(recorded: Recorded, robot: Robot, timeline: Timeline) -> Array:
     return ramp
 
 
-def _held(recorded: Recorded, timeline: Timeline, delay: float) -> Array:
+def _held(recorded: Drive, timeline: Timeline, delay: float) -> Array:
     """Command of each period, (warm + count, 3): from the period that begins nearest to it on."""
     begins = timeline.start + timeline.period * np.arange(-timeline.warm, timeline.count)
     times = recorded.command_time + delay
@@ -127,9 +132,7 @@ def _phase(times: Array, period: float) -> float:
     return float(np.angle(turn) / (2.0 * np.pi) % 1.0 - 1.0) * period
 
 
-def stretches_of(
-    recorded: Recorded, robot: Robot, timeline: Timeline, set_twist: Array
-) -> Stretches:
+def stretches_of(recorded: Drive, robot: Robot, timeline: Timeline, set_twist: Array) -> Stretches:
     """What the loops are driven with, beginning with the motion that the encoders tell.
 
     Args:
@@ -165,17 +168,3 @@ def stretches_of(
         heading,
         told=timeline.cut(np.stack(told, axis=1)),
     )
-
-
-def turned_angle(recorded: Recorded, wheel: int) -> Array:
-    """Angle of a wheel at the encoder samples [rad]; integrated speed where none is told."""
-    angle = recorded.position[:, wheel]
-    if np.isfinite(angle).all():
-        return angle
-    speed = np.nan_to_num(recorded.velocity[:, wheel])
-    step = np.diff(recorded.encoder_time, prepend=recorded.encoder_time[0])
-    known = np.isfinite(angle)
-    if known.any():
-        time = recorded.encoder_time
-        return np.interp(time, time[known], angle[known])
-    return np.asarray(np.cumsum(speed * step))

@@ -15,6 +15,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from tomr_power_model.estimation.statistics import robust_scale
 from tomr_reality_gap.alignment.channels import Channel
 
 Array = NDArray[np.float64]
@@ -121,7 +122,7 @@ def _left(columns: Array, residual: Array, weight: Array, local: Sequence[Local]
 
 
 def _scale(noise: Array, quantum: float) -> float:
-    spread = 1.4826 * float(np.median(np.abs(noise)))
+    spread = robust_scale(noise)
     return max(spread, 0.1 * float(np.std(noise)), quantum / math.sqrt(12.0), 1e-9)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_power_model.estimation.statistics import robust_scale
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.alignment.forward import Forward
@@ -35,11 +36,9 @@ def comparison(
 ) -> Comparison:
     """One recording, simulated before and after, (2, n); `run` is of `forward.run` after."""
     rows = rows_of(forward.channels)
-    line = forward.timeline
     residual = np.concatenate([channel.value for channel in forward.channels]) - values[1]
     sigma = tuple(
-        np.full(part.stop - part.start, 1.4826 * float(np.median(np.abs(residual[part]))) + 1e-9)
-        for part in rows
+        np.full(part.stop - part.start, robust_scale(residual[part]) + 1e-9) for part in rows
     )
     return Comparison(
         name=forward.recorded.name,
@@ -49,7 +48,7 @@ def comparison(
         after=tuple(values[1, part] for part in rows),
         sigma=sigma,
         speed=run["speed"],
-        time=np.asarray(line.start + line.period * (np.arange(line.count) + 0.5)),
+        time=forward.timeline.middle,
     )
 
 

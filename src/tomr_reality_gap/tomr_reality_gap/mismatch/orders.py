@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
+from tomr_power_model.estimation.statistics import robust_scale
 from tomr_reality_gap.alignment.channels import MOTOR_KINDS, Channel
 
 Array = NDArray[np.float64]
@@ -17,7 +18,7 @@ _SLOW = 0.3  # s: what is slower than this is no ripple
 
 
 def ripple_orders(
-    recorded: Recorded, channels: tuple[Channel, ...], residuals: list[Array], speeds: list[Array]
+    recorded: Drive, channels: tuple[Channel, ...], residuals: list[Array], speeds: list[Array]
 ) -> tuple[float, ...]:
     """Orders [1/rev] at which a residual of power or current swings with the angle of its wheel.
 
@@ -59,7 +60,7 @@ def _fast(time: Array, values: Array) -> Array:
 
 def _spectrum(residual: Array, lever: Array, angle: Array) -> Array:
     """Power of residual ~ lever * sin(order * angle + phase), over all orders."""
-    scale = 1.4826 * float(np.median(np.abs(residual))) + 1e-12
+    scale = robust_scale(residual) + 1e-12
     weighted = np.clip(residual / scale, -4.0, 4.0) * lever
     power = np.empty(len(_ORDERS))
     for first in range(0, len(_ORDERS), _BLOCK):

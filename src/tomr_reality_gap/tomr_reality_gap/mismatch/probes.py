@@ -12,10 +12,10 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.drive.motion import turned_angle
 from tomr_power_model.geometry.kinematics import wheels_to_twist
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.forward import Forward
-from tomr_reality_gap.alignment.stretches import turned_angle
 
 Array = NDArray[np.float64]
 

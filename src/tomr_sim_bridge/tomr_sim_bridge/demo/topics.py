@@ -3,8 +3,8 @@
 from attrs import frozen
 
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
-from tomr_power_model.messages.inputs import BATTERY, DIAGNOSTICS, IMU, JOINT_STATE, TWIST_STAMPED
 from tomr_power_model.messages.predictions import EXPECTED, prediction_topics
+from tomr_power_model.messages.types import BATTERY, DIAGNOSTICS, IMU, JOINT_STATE, TWIST_STAMPED
 from tomr_power_model.robot import Robot
 from tomr_sim_bridge.demo.score import DIAGNOSTICS as DIAGNOSIS
 from tomr_sim_bridge.demo.score import TRUTH

@@ -1,45 +1,40 @@
-"""What must not be in a calibration: faults, dead sensors, too little motion, another robot.
+"""What no tool must swallow: dead or saturated sensors, lost wheels, another robot.
 
 Each check looks at one recording and returns what it found, where, and what to do about it.
 """
 
-import math
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from tomr_power_model.calibration.motion import median_period
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.motion import measured_speed, wheel_motion
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
-from tomr_power_model.geometry.kinematics import twist_to_wheels, wheels_to_twist
-from tomr_power_model.model.commanded import CommandPath, CommandTiming, Seen
-from tomr_power_model.model.ticks import to_ns
+from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _MOVING = 0.3  # rad/s of a wheel
-_LEAST_MOTION = 10.0  # s of all recordings together
-_LEAST_WHEEL = 3.0  # s
 _STUCK = 1.0  # s with the very same reading
 _CLIPPED_RUN, _CLIPPED_COUNT = 3, 6  # readings at one and the same peak
+_HIDDEN = 2.0  # quanta by which readings would pass the peak, were it no limit
 _FROZEN = 0.4  # s
-_TICK = 0.05  # s
+_SPAN = 0.1  # s, of the fit to the encoders
 _COMPARED = 0.4  # s, width of the bell over which a wheel's speed is held against its command
-_LOST = 0.5  # s
-_ASTRAY = 0.65  # rms difference over rms of what is expected
-_WORTH_TELLING = 1.5  # rad/s, rms of what is expected
+_LOST = 1.5  # s: a wheel that does not follow for a shorter time may be slow
+_ASTRAY = 0.65  # rms difference over rms of what is expected or measured
+_NOTABLE = 1.5  # rad/s, rms of what is expected or measured
 _CUT = "leave it out with --skip {name}={start:.1f}:{end:.1f}"
 
 
 @frozen
 class Finding:
-    """Something that a calibration must not swallow."""
+    """Something that must not be taken for physics."""
 
     name: str  # of the recording
     where: str  # wheel or topic
@@ -66,51 +61,52 @@ def runs(mask: Mask, time: Array, least: float, bridge: float = 0.0) -> Iterator
             yield int(run[0]), int(run[-1])
 
 
-def refuse_faults(
-    recordings: Sequence[Recorded], robot: Robot, tick: Callable[[], None] = lambda: None
-) -> None:
-    """Raise InputError with the first thing found that a healthy recording does not have."""
-    findings: list[Finding] = []
-    for item in recordings:
-        findings += [found for check in CHECKS for found in check(item, robot)]
-        tick()
-    if findings:
-        more = f" ({len(findings) - 1} more findings)" if len(findings) > 1 else ""
-        raise InputError(f"{findings[0]}{more}")
+def refuse(findings: Iterable[Finding]) -> None:
+    """Raise InputError with the first finding, if there is any."""
+    found = list(findings)
+    if found:
+        more = f" ({len(found) - 1} more findings)" if len(found) > 1 else ""
+        raise InputError(f"{found[0]}{more}")
 
 
-def refuse_little_motion(recordings: Sequence[Recorded], robot: Robot) -> None:
-    """Raise InputError where all recordings together hold too little to fit."""
-    moving = np.zeros(WHEELS)
-    anything = 0.0
-    for item in recordings:
-        speed = np.abs(measured_speed(item)) > _MOVING
-        step = np.minimum(np.diff(item.encoder_time, prepend=item.encoder_time[0]), 0.5)
-        moving += (speed * step[:, None]).sum(axis=0)
-        anything += float(step[speed.any(axis=1)].sum())
-    names = ", ".join(item.name for item in recordings)
-    if anything < _LEAST_MOTION:
-        raise InputError(
-            f"{names}: the wheels turn for {anything:.1f} s in all: drive at least "
-            f"{_LEAST_MOTION:g} s, several headings and speeds, with starts and stops"
-        )
-    wheel = int(np.argmin(moving))
-    if moving[wheel] < _LEAST_WHEEL:
-        raise InputError(
-            f"{names}: {robot.wheel_names[wheel]} turns for {moving[wheel]:.1f} s in all: add a "
-            f"drive in which it turns for {_LEAST_WHEEL:g} s, e.g. a spin on the spot"
-        )
+def sensor_faults(drive: Drive, robot: Robot) -> Iterator[Finding]:
+    """Faults of sensors, and signs of another robot: what needs no model of the motion."""
+    for check in SENSOR_CHECKS:
+        yield from check(drive, robot)
 
 
-def measured_speed(item: Recorded) -> Array:
-    """Wheel speeds at the encoder's samples [rad/s], as told or from differences, (n, 3)."""
-    told = item.velocity
-    step = np.diff(item.encoder_time, prepend=item.encoder_time[0] - 1.0)[:, None]
-    differences = np.diff(item.position, axis=0, prepend=item.position[:1]) / step
-    return np.where(np.isnan(told), differences, told)
+def not_following(drive: Drive, robot: Robot, time: Array, expected: Array) -> Iterator[Finding]:
+    """Wheels that do not turn as the commands make them: a lost driver or encoder.
+
+    Args:
+        drive: the recording.
+        robot: its description.
+        time: evenly spaced [s], (n,).
+        expected: wheel speeds that a simulation gives then [rad/s], (n, 3), NaN where unknown.
+    """
+    if len(time) < 2:
+        return
+    motion = wheel_motion(drive.encoder_time, drive.position, drive.velocity, time, _SPAN)
+    known = np.isfinite(expected) & np.isfinite(motion.speed)
+    expected, speed = (np.where(known, values, 0.0) for values in (expected, motion.speed))
+    width = _COMPARED / float(np.median(np.diff(time)))
+    error = gaussian_filter1d((speed - expected) ** 2, width, axis=0)
+    level = gaussian_filter1d(np.maximum(expected**2, speed**2), width, axis=0)
+    off = (error > _ASTRAY**2 * level) & (level > _NOTABLE**2)
+    for wheel, name in enumerate(robot.wheel_names):
+        for first, last in runs(off[:, wheel], time, _LOST, bridge=_COMPARED):
+            rows = slice(first, last + 1)
+            seen, wanted = (
+                float(np.sqrt(np.mean(values[rows, wheel] ** 2))) for values in (speed, expected)
+            )
+            what = (
+                f"it does not follow its command: it turns at {seen:.1f} rad/s rms, {wanted:.1f} "
+                "rad/s is expected: a fault, lost commands or another robot's description"
+            )
+            yield _found(drive, name, rows, time, what)
 
 
-def _geometry(item: Recorded, robot: Robot) -> Iterator[Finding]:
+def _geometry(item: Drive, robot: Robot) -> Iterator[Finding]:
     """Wheels that answer to other headings than their places in robot.yaml say."""
     if len(item.command_time) < 2:
         return
@@ -141,58 +137,13 @@ def _geometry(item: Recorded, robot: Robot) -> Iterator[Finding]:
             )
 
 
-def _held(item: Recorded) -> Array:
+def _held(item: Drive) -> Array:
     """The command in force at each encoder sample, NaN before the first, (n, 3)."""
     index = np.searchsorted(item.command_time, item.encoder_time, side="right") - 1
     return np.where((index >= 0)[:, None], item.command[np.maximum(index, 0)], np.nan)
 
 
-def _not_following(item: Recorded, robot: Robot) -> Iterator[Finding]:
-    """Wheels that do not turn as the command makes them: a lost driver or encoder."""
-    if not len(item.command_time):
-        return
-    time, expected = _expected(item, robot)
-    after = np.clip(np.searchsorted(item.encoder_time, time), 1, len(item.encoder_time) - 1)
-    gap = np.diff(item.encoder_time)[after - 1] > max(_TICK, 3.0 * median_period(item.encoder_time))
-    known = np.isfinite(expected) & ~gap[:, None]
-    speed = np.column_stack(
-        [np.interp(time, item.encoder_time, column) for column in measured_speed(item).T]
-    )
-    width = _COMPARED / _TICK
-    error = gaussian_filter1d(np.where(known, speed - expected, 0.0) ** 2, width, axis=0)
-    level = gaussian_filter1d(np.where(known, expected, 0.0) ** 2, width, axis=0)
-    off = (error > _ASTRAY**2 * level) & (level > _WORTH_TELLING**2)
-    for wheel, name in enumerate(robot.wheel_names):
-        for first, last in runs(off[:, wheel], time, _LOST, bridge=_LOST):
-            rows = slice(first, last + 1)
-            seen, wanted = (
-                f"{np.sqrt(np.mean(values[rows, wheel] ** 2)):.1f} rad/s"
-                for values in (speed, np.nan_to_num(expected))
-            )
-            what = f"it does not follow its command: it turns at {seen} rms, {wanted} is expected"
-            yield _found(item, name, rows, time, what)
-
-
-def _expected(item: Recorded, robot: Robot) -> tuple[Array, Array]:
-    """Wheel speeds that the commands lead to, by the description as it is: (n,), (n, 3)."""
-    motion = CommandPath(robot, CommandTiming(to_ns(_TICK)))
-    to_twist = wheels_to_twist(robot)
-    pending = deque(zip(item.command_time, item.command, strict=True))
-    time = np.arange(item.encoder_time[0], item.encoder_time[-1], _TICK) + _TICK
-    speeds = np.full((len(time), WHEELS), np.nan)
-    x, y, yaw = (float(value) for value in to_twist @ measured_speed(item)[0])
-    first = Seen((x, y, yaw), (math.nan,) * WHEELS, math.nan)
-    for row, tick in enumerate(time):
-        while pending and pending[0][0] <= tick:
-            stamp, (vx, vy, wz) = pending.popleft()
-            motion.command(to_ns(stamp), (float(vx), float(vy), float(wz)))
-        step = motion.over(to_ns(tick), first)
-        if step is not None:
-            speeds[row] = step.speed
-    return time, speeds
-
-
-def _frozen_encoder(item: Recorded, robot: Robot) -> Iterator[Finding]:
+def _frozen_encoder(item: Drive, robot: Robot) -> Iterator[Finding]:
     """Encoders that stand still while their motor works and the command asks the wheel to turn."""
     time = item.encoder_time
     asked = np.full((len(time), WHEELS), np.inf)
@@ -212,7 +163,7 @@ def _frozen_encoder(item: Recorded, robot: Robot) -> Iterator[Finding]:
         for first, last in runs(still, time, _FROZEN):
             rows = slice(first, last + 1)
             drawn = float(np.median(working[rows]))
-            if np.median(asked[rows, wheel]) < _WORTH_TELLING:
+            if np.median(asked[rows, wheel]) < _NOTABLE:
                 continue  # a wheel may hold against a drag along its axle
             if drawn > idle + 0.5 * max(usual - idle, 1e-9) and drawn > 1.5 * idle:
                 unit = "A" if robot.measurement.quantity == "motor_current" else "W"
@@ -220,7 +171,7 @@ def _frozen_encoder(item: Recorded, robot: Robot) -> Iterator[Finding]:
                 yield _found(item, name, rows, time, seen)
 
 
-def _stuck_power(item: Recorded, robot: Robot) -> Iterator[Finding]:
+def _stuck_power(item: Drive, robot: Robot) -> Iterator[Finding]:
     """Power sensors that repeat themselves while the wheel's speed changes."""
     for wheel, name in enumerate(robot.wheel_names):
         time, reading, speed = _of_wheel(item, wheel)
@@ -234,13 +185,14 @@ def _stuck_power(item: Recorded, robot: Robot) -> Iterator[Finding]:
             rows = slice(first, last + 1)
             equal = reading[rows] == reading[first]
             changes = np.ptp(speed[rows]) > 0.2 * np.abs(speed).max() + _MOVING
+            changes = changes and _changes(time, reading, speed, repeats, rows)
             noisy = usual < 0.5 and np.median(np.abs(speed[rows])) > _MOVING
             if equal.all() and (changes or noisy):
                 seen = f"its power sensor repeats {reading[first]:.3g} while the wheel turns"
                 yield _found(item, name, rows, time, seen)
 
 
-def _saturated_power(item: Recorded, robot: Robot) -> Iterator[Finding]:
+def _saturated_power(item: Drive, robot: Robot) -> Iterator[Finding]:
     """Power sensors that end at a peak which they hold, again and again."""
     for wheel, name in enumerate(robot.wheel_names):
         time, reading, speed = _of_wheel(item, wheel)
@@ -252,8 +204,8 @@ def _saturated_power(item: Recorded, robot: Robot) -> Iterator[Finding]:
             top = float(levels[end])
             at_top = reading == top
             held = [run for run in runs(at_top, time, 0.0) if run[1] - run[0] + 1 >= _CLIPPED_RUN]
-            changes = np.ptp(speed[at_top]) > 0.1 * np.abs(speed).max()
-            if held and changes:
+            way = 1.0 if end else -1.0  # of the peak: upper or lower
+            if held and _passes(time, reading, speed, at_top, way):
                 rows = slice(held[0][0], held[-1][1] + 1)
                 seen = (
                     f"its power sensor is saturated: it never passes {top:.3g}, which it reads "
@@ -262,7 +214,44 @@ def _saturated_power(item: Recorded, robot: Robot) -> Iterator[Finding]:
                 yield _found(item, name, rows, time, seen)
 
 
-def _wrong_sign(item: Recorded, robot: Robot) -> Iterator[Finding]:
+def _passes(time: Array, reading: Array, speed: Array, at_top: Mask, way: float) -> bool:
+    """Whether by the wheel's motion readings would pass their peak, upwards or downwards (-1).
+
+    Readings of a coarse sensor repeat at their peak, too, but have nothing to hide there.
+    """
+    expected = _by_motion(time, reading, speed, ~at_top)
+    if expected is None:
+        return bool(np.ptp(speed[at_top]) > 0.1 * np.abs(speed).max())
+    rest = float(np.std((reading - expected)[~at_top]))
+    beyond = float(np.percentile(way * (expected - reading)[at_top], 75))
+    return beyond > max(_HIDDEN * _quantum(reading), rest)
+
+
+def _changes(time: Array, reading: Array, speed: Array, repeats: Mask, rows: slice) -> bool:
+    """Whether by the wheel's motion readings would change by more than a coarse sensor's quanta."""
+    expected = _by_motion(time, reading, speed, ~repeats)
+    return expected is None or float(np.ptp(expected[rows])) > _HIDDEN * _quantum(reading)
+
+
+def _by_motion(time: Array, reading: Array, speed: Array, fitted: Mask) -> Array | None:
+    """Readings as the wheel's speed and acceleration explain the fitted; None: too few."""
+    acceleration = np.gradient(speed, time)
+    features = np.stack(
+        [np.ones_like(speed), np.abs(speed), speed**2, speed * acceleration], axis=1
+    )
+    if np.count_nonzero(fitted) < 5 * features.shape[1]:
+        return None
+    shape, *_ = np.linalg.lstsq(features[fitted], reading[fitted], rcond=None)
+    return np.asarray(features @ shape)
+
+
+def _quantum(reading: Array) -> float:
+    """Usual step between the levels that a sensor reads."""
+    steps = np.diff(np.unique(reading))
+    return float(np.median(steps)) if len(steps) else 0.0
+
+
+def _wrong_sign(item: Drive, robot: Robot) -> Iterator[Finding]:
     """Power that flows out of the motors while they drive."""
     for wheel, name in enumerate(robot.wheel_names):
         time, _, speed = _of_wheel(item, wheel)
@@ -279,7 +268,7 @@ def _wrong_sign(item: Recorded, robot: Robot) -> Iterator[Finding]:
             )
 
 
-def _of_wheel(item: Recorded, wheel: int) -> tuple[Array, Array, Array]:
+def _of_wheel(item: Drive, wheel: int) -> tuple[Array, Array, Array]:
     """Time, reading and wheel speed where the wheel's power was measured."""
     known = np.isfinite(item.reading[:, wheel])
     time = item.power_time[known]
@@ -287,20 +276,17 @@ def _of_wheel(item: Recorded, wheel: int) -> tuple[Array, Array, Array]:
     return time, item.reading[known, wheel], np.interp(time, item.encoder_time, speed)
 
 
-def _found(item: Recorded, name: str, rows: slice, time: Array, seen: str) -> Finding:
+def _found(item: Drive, name: str, rows: slice, time: Array, seen: str) -> Finding:
     start, end = float(time[rows][0]), float(time[rows][-1])
     remedy = _CUT.format(name=item.name, start=max(0.0, start - 1.0), end=end + 1.0)
     return Finding(item.name, name, start, end, seen, f"{remedy}, or record it again")
 
 
-Check = Callable[[Recorded, Robot], Iterator[Finding]]
-CHECKS: tuple[Check, ...] = (
+Check = Callable[[Drive, Robot], Iterator[Finding]]
+SENSOR_CHECKS: tuple[Check, ...] = (
     _geometry,
     _frozen_encoder,
-    _not_following,
     _saturated_power,
     _stuck_power,
     _wrong_sign,
 )
-# Those that need no model of the motion.
-SENSOR_CHECKS = tuple(check for check in CHECKS if check is not _not_following)

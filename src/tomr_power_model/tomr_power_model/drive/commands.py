@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
 
 Array = NDArray[np.float64]
 
@@ -12,7 +12,7 @@ _FARTHEST = 2.0  # s
 _ALIKE = 0.3  # RMS of the commands' difference over that of the commands
 
 
-def shift_between(one: Recorded, other: Recorded) -> float | None:
+def shift_between(one: Drive, other: Drive) -> float | None:
     """By how much later the other's commands are [s], between encoder starts; None: others."""
     first, second = one.command_time, other.command_time
     if min(len(first), len(second)) < 2:
@@ -37,7 +37,7 @@ def shift_between(one: Recorded, other: Recorded) -> float | None:
     return float(lags[best] + np.median(times - apart))
 
 
-def _held(recorded: Recorded, time: Array) -> Array:
+def _held(recorded: Drive, time: Array) -> Array:
     """Commands in force, (n, 3)."""
     rows = np.searchsorted(recorded.command_time, time + 1e-9, side="right") - 1
     return recorded.command[np.clip(rows, 0, None)]

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.dynamics.drives import WheelMotion
 
 Array = NDArray[np.float64]
@@ -91,3 +92,23 @@ def _usable(time: Array, at: Array, low: Index, high: Index, half: float, degree
     # A window cut short at one side extrapolates; a third of its half is what it may miss.
     covered = (time[first_in] < at - half / 3.0) & (time[last_in] > at + half / 3.0)
     return np.asarray(enough & around & whole & covered)
+
+
+def measured_speed(drive: Drive) -> Array:
+    """Wheel speeds at the encoder's samples [rad/s], as published or from differences, (n, 3)."""
+    step = np.diff(drive.encoder_time, prepend=drive.encoder_time[0] - 1.0)[:, None]
+    differences = np.diff(drive.position, axis=0, prepend=drive.position[:1]) / step
+    return np.where(np.isnan(drive.velocity), differences, drive.velocity)
+
+
+def turned_angle(drive: Drive, wheel: int) -> Array:
+    """Angle of a wheel at the encoder samples [rad]; integrated speed where none is published."""
+    angle = drive.position[:, wheel]
+    known = np.isfinite(angle)
+    if known.all():
+        return angle
+    time = drive.encoder_time
+    if known.any():
+        return np.interp(time, time[known], angle[known])
+    step = np.diff(time, prepend=time[0])
+    return np.asarray(np.cumsum(np.nan_to_num(drive.velocity[:, wheel]) * step))

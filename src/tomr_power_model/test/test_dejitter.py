@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tomr_power_model.model.encoders import EncoderSample, EncoderWindow
-from tomr_power_model.model.even_stamps import EvenStamps
+from tomr_power_model.drive.dejitter import dejitter, even
+from tomr_power_model.model.encoders import EncoderSample, EncoderWindow, RecentStamps
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
@@ -56,7 +56,7 @@ def test_samples_that_are_really_uneven_keep_their_stamps() -> None:
     noise = np.random.default_rng(5).normal(0.0, 5e-4, (300, 3))  # rad
     angles = _angles(1e-9 * stamps) + noise
     assert _error(stamps, angles) < 0.01
-    watched = EvenStamps()
+    watched = RecentStamps()
     for stamp, angle in zip(stamps.tolist(), angles.tolist(), strict=True):
         watched.add(stamp, tuple(angle))
     assert watched.times(stamps[-8:].tolist()) == stamps[-8:].tolist()
@@ -67,17 +67,17 @@ def test_even_stamps_stay_bit_by_bit(missing: int) -> None:
     stamps = np.arange(300, dtype=np.int64) * 10 * MS
     if missing:
         stamps = np.delete(stamps, np.arange(100, 300, missing))
-    watched = EvenStamps()
+    watched = RecentStamps()
     for stamp, angle in zip(stamps.tolist(), _angles(1e-9 * stamps).tolist(), strict=True):
         watched.add(stamp, tuple(angle))
     assert watched.times(stamps[-8:].tolist()) == stamps[-8:].tolist()
 
 
-def _watched() -> tuple[EvenStamps, np.ndarray]:
+def _watched() -> tuple[RecentStamps, np.ndarray]:
     """What has seen 1.2 s of jittered stamps, and the last of them."""
     even = np.arange(120, dtype=np.int64) * 10 * MS
     stamps = even + _jitter(120)
-    watched = EvenStamps()
+    watched = RecentStamps()
     for stamp, angle in zip(stamps.tolist(), _angles(1e-9 * even).tolist(), strict=True):
         watched.add(stamp, tuple(angle))
     return watched, stamps[-8:]
@@ -105,3 +105,56 @@ def test_at_rest_nothing_is_told_and_what_was_known_stays() -> None:
         stamps = np.append(stamps[1:], stamp)
     times = watched.times(stamps.tolist())
     np.testing.assert_allclose(np.diff(times), 10 * MS, atol=5e3)
+
+
+def test_jitter_is_taken_off_and_gaps_are_kept() -> None:
+    grid = np.delete(np.arange(500) * 0.01, np.arange(200, 230))
+    noisy = grid + np.random.default_rng(1).normal(0.0, 5e-4, len(grid))
+    assert np.abs(even(noisy) - grid).max() < 1e-4
+    assert np.diff(even(noisy)).max() == pytest.approx(0.31, abs=1e-3)
+
+
+def test_stamps_without_a_grid_are_left_alone() -> None:
+    time = np.sort(np.random.default_rng(2).uniform(0.0, 5.0, 300))
+    np.testing.assert_array_equal(even(time), time)
+
+
+@pytest.mark.parametrize("rate", [30.0, 100.0])
+def test_twenty_pieces_have_a_grid_each(rate: float) -> None:
+    """A driver that starts afresh after every gap starts anywhere in its period."""
+    random = np.random.default_rng(3)
+    pieces = [
+        5.0 * number + random.uniform(0.0, 1.0 / rate) + np.arange(round(4.0 * rate)) / rate
+        for number in range(20)
+    ]
+    taken = np.concatenate(pieces)
+    stamped = taken + random.normal(0.0, 5e-4, len(taken))
+    times, jitters = dejitter(stamped, _angles(taken))
+    assert jitters
+    assert np.abs(times - taken).max() < 3e-4
+    assert np.abs(np.diff(times) - np.diff(taken)).max() < 5e-4
+
+
+def test_a_stray_stamp_does_not_tilt_the_grid() -> None:
+    grid = np.append(np.arange(300) * 0.01, 3600.0)
+    noisy = grid + np.random.default_rng(6).normal(0.0, 5e-4, len(grid))
+    assert np.abs(even(noisy)[:-1] - grid[:-1]).max() < 1e-4
+
+
+def test_a_recording_and_a_live_stream_are_dejittered_alike() -> None:
+    taken = np.arange(200, dtype=np.int64) * 10 * MS
+    stamps = taken + _jitter(200)
+    watched = RecentStamps()
+    for stamp, angle in zip(stamps.tolist(), _angles(1e-9 * taken).tolist(), strict=True):
+        watched.add(stamp, tuple(angle))
+    times, jitters = dejitter(1e-9 * (stamps - stamps[0]), _angles(1e-9 * taken))
+    assert jitters
+    live = np.array(watched.times(stamps[-20:].tolist())) - stamps[0]
+    np.testing.assert_allclose(1e-9 * live, times[-20:], atol=2e-9)
+
+
+def test_at_rest_stamps_are_believed() -> None:
+    stamps = 0.01 * np.arange(300) + 1e-9 * _jitter(300)
+    times, jitters = dejitter(stamps, np.zeros((300, 3)))
+    assert not jitters
+    np.testing.assert_array_equal(times, stamps)
