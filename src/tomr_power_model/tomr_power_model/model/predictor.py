@@ -121,10 +121,11 @@ class PowerPredictor:
             for t in (-0.5 * self._period_s, 0.5 * self._period_s)
         )
         commanded = self._path.over(tick, Seen(self._twist(speed), before, self._heading))
-        held = self._resting.voltages(self._path, after, speed)
+        windows = self._windows(tick)
+        share = 0.5 + windows.offset_s / self._period_s
+        held = self._resting.voltages(self._path, after, speed, share)
         rise = self._path.wheel(at.RISE) or self._cold
         turned = self._period_s * self._turning(speed, gyro, commanded)
-        windows = self._windows(tick)
         motion = MeasuredMotion(
             speed,
             change,
@@ -137,7 +138,6 @@ class PowerPredictor:
         )
         self._heading += turned
         measured = self._model.measured(motion)
-        self._resting.correct(held, _voltages(measured), speed)
         from_encoders = self._readings(self._where_known(measured, motion), self._measured)
         if commanded is None:
             return Prediction(tick, UNKNOWN, UNKNOWN, _UNKNOWN, UNKNOWN_READING, from_encoders)

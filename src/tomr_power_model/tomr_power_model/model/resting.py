@@ -5,8 +5,7 @@ law does, on the measured speeds:
 
     v = k_p (asked - omega) + k_i I,   I = integral of (asked - omega) = I_sim + theta_sim - theta
 
-for simulation and driver are asked for the same, and both sum up. What saturation or a start in
-motion left different is found again while the wheel turns, where inverse dynamics tell v.
+for simulation and driver are asked for the same, and both sum up.
 """
 
 from collections.abc import Sequence
@@ -15,8 +14,6 @@ from tomr_power_model.dynamics import layout as at
 from tomr_power_model.model.commanded import CommandPath
 from tomr_power_model.robot import Controller
 
-_MOVING = 1.0  # rad/s: a wheel whose motion tells its torque
-_CORRECTED = 0.02  # share of the difference that is taken off in a tick in motion
 _UNKNOWN = float("nan")
 
 
@@ -32,16 +29,18 @@ class RestingDrivers:
     def clear(self) -> None:
         """What the drivers' sums hold is not known until the next command."""
         self._offset = [_UNKNOWN] * self._wheels  # rad
+        self._before = [_UNKNOWN] * self._wheels  # V, at the end of the last tick
 
     def voltages(
-        self, path: CommandPath, angle: Sequence[float], speed: Sequence[float]
+        self, path: CommandPath, angle: Sequence[float], speed: Sequence[float], share: float
     ) -> list[float]:
-        """Voltage that each driver holds [V], NaN before the first command.
+        """Voltage that each driver holds at some time of a tick [V], NaN before the first command.
 
         Args:
             path: that simulates what the drivers are asked for.
             angle: of the wheels at the end of the tick [rad], NaN where not known.
             speed: of the wheels [rad/s].
+            share: of the tick at that time.
         """
         if path.state is None:
             return [_UNKNOWN] * self._wheels
@@ -57,13 +56,8 @@ class RestingDrivers:
             total = sums[wheel] + ahead + self._offset[wheel]
             error = asked[wheel] - speed[wheel]
             found.append(self._proportional * error + self._integral * total)
-        return found
-
-    def correct(
-        self, held: Sequence[float], voltage: Sequence[float], speed: Sequence[float]
-    ) -> None:
-        """Learn from wheels that turn: `voltage` is what inverse dynamics say of them [V]."""
-        for wheel in range(self._wheels):
-            error = voltage[wheel] - held[wheel]
-            if abs(speed[wheel]) > _MOVING and error == error and self._integral > 0.0:
-                self._offset[wheel] += _CORRECTED * error / self._integral
+        before, self._before = self._before, found
+        return [
+            first + share * (last - first) if first == first else last
+            for first, last in zip(before, found, strict=True)
+        ]
