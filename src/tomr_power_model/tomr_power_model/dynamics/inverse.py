@@ -44,6 +44,7 @@ from tomr_power_model.dynamics.layout import (
     POWER_WHEEL,
     RESISTANCE,
     ROLLER_SLIP,
+    ROTOR,
     STRIDE,
     TO_TWIST,
     VISCOUS,
@@ -59,6 +60,7 @@ from tomr_power_model.effects.base import Wheel
 
 # Wheel speed below which dry friction fades instead of jumping with the encoder's noise [rad/s].
 STICKING_SPEED = 0.1
+_ROUNDS = 3  # each leaves a tenth of the last one's error
 
 
 def carried_force(
@@ -113,16 +115,20 @@ def drive_power(p: Numbers, m: Numbers, out: Mutable, n: int) -> None:
         carried = p[w + TO_TWIST] * fx + p[w + TO_TWIST + 1] * fy + p[w + TO_TWIST + 2] * mz
         carried += p[w + AXLE_INERTIA] * m[a + MOTION_ACCELERATION]
         load = max(p[w + LOAD] + p[w + LOAD_X] * along_x + p[w + LOAD_Y] * along_y, 0.0)
-        wheel = Wheel(speed, load, carried, m[a + MOTION_ANGLE], p[w + NOMINAL_RADIUS], p[w + GEAR])
         k, hot = p[w + CONSTANT], p[w + RESISTANCE] * (1.0 + COPPER * m[a + MOTION_RISE])
-        torque = carried + p[w + VISCOUS] * speed + m[a + MOTION_RESISTING]
-        torque += moving_torque(p, w, wheel)
-        dry, moves = max(dry_torque(p, w, wheel), 0.0), math.tanh(speed / STICKING_SPEED)
-        held = m[a + MOTION_VOLTAGE]
-        rests = 0.0
-        if held == held:
-            rests = (1.0 - abs(moves)) * min(max(k / hot * held - torque, -dry), dry)
-        torque += dry * moves + rests
+        carried += p[w + VISCOUS] * speed + m[a + MOTION_RESISTING]
+        moves, held = math.tanh(speed / STICKING_SPEED), m[a + MOTION_VOLTAGE]
+        torque = carried
+        for _ in range(_ROUNDS):  # the gear carries friction too, which grows with what it carries
+            gear = torque - p[w + ROTOR] * m[a + MOTION_ACCELERATION]
+            wheel = Wheel(
+                speed, load, gear, m[a + MOTION_ANGLE], p[w + NOMINAL_RADIUS], p[w + GEAR]
+            )
+            dry, free = max(dry_torque(p, w, wheel), 0.0), carried + moving_torque(p, w, wheel)
+            rests = 0.0
+            if held == held:
+                rests = (1.0 - abs(moves)) * min(max(k / hot * held - free, -dry), dry)
+            torque = free + dry * moves + rests
         current = torque / k
         volts = hot * current + k * speed
         out[o + POWER_TORQUE] = torque

@@ -8,7 +8,9 @@ middle lies, so that an answer rests on messages up to its tick alone.
 from collections import deque
 from collections.abc import Sequence
 
+import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.simulation import Simulation, State
@@ -16,9 +18,11 @@ from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import Robot
 
+Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 _STOP: Triple = (0.0, 0.0, 0.0)
+_REMEMBERED = 600_000_000  # ns, of simulated motion
 _STEADY = 50  # commands over which the phase of the periods is averaged
 
 
@@ -57,6 +61,47 @@ class Commanded:
         return row[at.OUT_HEADER + field :: at.OUT_WHEEL]
 
 
+class SimulatedMotion:
+    """Angles and speeds of the wheels at the steps' ends, of the last moments."""
+
+    def __init__(self) -> None:
+        self._points: deque[tuple[int, list[float], list[float]]] = deque()
+
+    def add(self, time_ns: int, angles: list[float], speeds: list[float]) -> None:
+        """Take the end of a step: wheels [rad] and [rad/s]."""
+        self._points.append((time_ns, angles, speeds))
+        while self._points[0][0] < time_ns - _REMEMBERED:
+            self._points.popleft()
+
+    def angles(self, times_ns: Sequence[int]) -> Array:
+        """Angles at some times [rad], (k, n); beyond the ends as the speed there has it."""
+        return self._at(times_ns, 1)
+
+    def mean_motion(self, tick_ns: int, period_ns: int) -> tuple[Array, Array]:
+        """Mean speed and acceleration in the window that ends at a tick, (n,) each."""
+        window = (tick_ns - period_ns, tick_ns)
+        rate = 1e9 / period_ns
+        first, last = self._at(window, 1)
+        before, after = self._at(window, 2)
+        return rate * (last - first), rate * (after - before)
+
+    def _at(self, times_ns: Sequence[int], column: int) -> Array:
+        origin = self._points[0][0]
+        time = np.array([point[0] - origin for point in self._points])
+        values = np.array([point[column] for point in self._points])
+        wanted = np.array([at_ns - origin for at_ns in times_ns])
+        found = np.stack([np.interp(wanted, time, own) for own in values.T], axis=1)
+        if len(time) < 2:
+            return found
+        # Beyond the ends as the nearest step has it.
+        first, last = (
+            (values[k + 1] - values[k]) / max(time[k + 1] - time[k], 1) for k in (0, len(time) - 2)
+        )
+        found += np.minimum(wanted, 0)[:, None] * first
+        found += np.maximum(wanted - time[-1], 0)[:, None] * last
+        return np.asarray(found)
+
+
 class CommandPath:
     """Runs the closed loop over the commands, each held until the next."""
 
@@ -77,6 +122,7 @@ class CommandPath:
         self._given = 0
         self._next = 0  # when the next period begins [ns]
         self._taken = 0  # commands
+        self.motion = SimulatedMotion()
         resting = [0.0] * self._simulation.wheels
         self._means = resting, resting, self._simulation.numbers[at.VOLTAGE]
 
@@ -121,6 +167,7 @@ class CommandPath:
                 rows.append(out[k * width : (k + 1) * width])
             self._see(None)
             self._next += self._step
+            self.motion.add(self._next, *self._standing())
         if rows:
             self._means = self._mean_of(rows)
         speed, torque, voltage = self._means
@@ -135,10 +182,14 @@ class CommandPath:
             return False
         self.state = self._simulation.start(seen.twist if known else _STOP)
         self._inputs[at.COMMAND : at.COMMAND + 3] = self.state[at.SET : at.SET + 3]
+        self.motion.add(tick_ns - self._timing.period, *self._standing())
         # The first period of this tick, in step with the command.
         begin = tick_ns - self._timing.period
         self._next = first + -(-(begin - first - self._step // 2) // self._step) * self._step
         return True
+
+    def _standing(self) -> tuple[list[float], list[float]]:
+        return self.wheel(at.TURNED), self.wheel(at.SPEED)
 
     def _see(self, seen: Seen | None) -> None:
         """Put the simulation where the robot was seen, for one period; None: as it goes on."""

@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import compress
+from typing import Protocol
 
 import numpy as np
 from attrs import field, frozen
@@ -16,6 +17,8 @@ Triple = tuple[float, float, float]
 _KEPT = 200  # samples whose stamps are looked at
 _LEAST = 50
 _EVERY = 25  # samples: how often
+_LONG = 200_000_000  # ns, of the fit beside a simulation
+_FIT = 5  # samples that it takes
 UNKNOWN: Triple = (float("nan"), float("nan"), float("nan"))
 
 
@@ -35,6 +38,18 @@ class WheelEstimate:
     speed: Array  # rad/s
     acceleration: Array  # rad/s^2
     angle: Array = field(factory=lambda: np.full(3, np.nan))  # rad
+
+
+class Reference(Protocol):
+    """A simulation of the motion that encoders measure."""
+
+    def angles(self, times_ns: Sequence[int]) -> Array:
+        """Angles of the wheels at some times [rad], (k, 3)."""
+        ...
+
+    def mean_motion(self, tick_ns: int, period_ns: int) -> tuple[Array, Array]:
+        """Mean speed and acceleration in the window that ends at a tick, (3,) each."""
+        ...
 
 
 class RecentStamps:
@@ -110,9 +125,27 @@ class EncoderWindow:
             return _from_positions(times, positions)
         return self._mixed(samples, times, positions)
 
-    def _until(self, tick_ns: int) -> list[EncoderSample]:
+    def beside(self, tick_ns: int, reference: Reference) -> WheelEstimate:
+        """As `at`, where a simulation of the same motion is known.
+
+        What is measured less what is simulated changes slowly: it is fitted over a longer span,
+        which leaves less of the noise in the acceleration.
+        """
+        samples = self._until(tick_ns, max(self._span, _LONG))
+        positions = np.array([sample.position for sample in samples])
+        if len(samples) < _FIT or np.isnan(positions).any():
+            return self.at(tick_ns)
+        middle = tick_ns - self._period // 2
+        times = self._times(samples, middle)
+        ahead = positions - reference.angles([middle + time for time in times])
+        offset = _weights(times, 2) @ (ahead - ahead[0])
+        speed, acceleration = reference.mean_motion(tick_ns, self._period)
+        angle = reference.angles([middle])[0] + ahead[0] + offset[0]
+        return WheelEstimate(speed + offset[1], acceleration + 2.0 * offset[2], angle)
+
+    def _until(self, tick_ns: int, span: int | None = None) -> list[EncoderSample]:
         """Samples of the window, and the two newest where encoders are slower than it."""
-        oldest = tick_ns - self._span
+        oldest = tick_ns - (self._span if span is None else span)
         while len(self._samples) > 2 and self._samples[1].stamp_ns <= tick_ns - self._stale:
             self._samples.popleft()
         window: list[EncoderSample] = []

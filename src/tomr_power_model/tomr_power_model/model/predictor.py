@@ -14,7 +14,13 @@ from tomr_power_model.dynamics.vehicle import plant_numbers, vehicle_of
 from tomr_power_model.effects import EFFECTS
 from tomr_power_model.messages.readings import NAN, UNKNOWN_READING, SupplyReading
 from tomr_power_model.model.commanded import Commanded, CommandPath, CommandTiming, Seen
-from tomr_power_model.model.encoders import UNKNOWN, EncoderSample, EncoderWindow, Triple
+from tomr_power_model.model.encoders import (
+    UNKNOWN,
+    EncoderSample,
+    EncoderWindow,
+    Triple,
+    WheelEstimate,
+)
 from tomr_power_model.model.means import Means
 from tomr_power_model.model.monitors import Monitors
 from tomr_power_model.model.power_models import POWER_MODELS, MeasuredMotion, Windows
@@ -113,14 +119,13 @@ class PowerPredictor:
 
     def _predict(self, tick: int) -> Prediction:
         estimate = self._encoders.at(tick)
-        speed, change = estimate.speed.tolist(), estimate.acceleration.tolist()
-        angle = estimate.angle.tolist()
-        gyro = self._yaw_rate(tick)
-        before, after = (
-            [a + t * (w + 0.5 * c * t) for a, w, c in zip(angle, speed, change, strict=True)]
-            for t in (-0.5 * self._period_s, 0.5 * self._period_s)
-        )
+        speed, gyro = estimate.speed.tolist(), self._yaw_rate(tick)
+        before = self._moved(estimate, -0.5 * self._period_s)
         commanded = self._path.over(tick, Seen(self._twist(speed), before, self._heading))
+        if commanded is not None:
+            estimate = self._encoders.beside(tick, self._path.motion)
+            speed = estimate.speed.tolist()
+        after = self._moved(estimate, 0.5 * self._period_s)
         windows = self._windows(tick)
         share = 0.5 + windows.offset_s / self._period_s
         held = self._resting.voltages(self._path, after, speed, share)
@@ -128,8 +133,8 @@ class PowerPredictor:
         turned = self._period_s * self._turning(speed, gyro, commanded)
         motion = MeasuredMotion(
             speed,
-            change,
-            angle,
+            estimate.acceleration.tolist(),
+            estimate.angle.tolist(),
             gyro,
             self._heading + 0.5 * turned,
             rise,
@@ -150,6 +155,13 @@ class PowerPredictor:
             total=self._total(means),
             from_encoders=from_encoders,
         )
+
+    @staticmethod
+    def _moved(estimate: WheelEstimate, seconds: float) -> list[float]:
+        """Angles of the wheels some time after the middle of the tick [rad]."""
+        speed = estimate.speed + 0.5 * estimate.acceleration * seconds
+        found: list[float] = (estimate.angle + seconds * speed).tolist()
+        return found
 
     def _windows(self, tick: int) -> Windows:
         """In which windows the power was measured that a tick compares."""
