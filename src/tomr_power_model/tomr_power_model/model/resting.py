@@ -5,7 +5,8 @@ law does, on the measured speeds:
 
     v = k_p (asked - omega) + k_i I,   I = integral of (asked - omega) = I_sim + theta_sim - theta
 
-for simulation and driver are asked for the same, and both sum up.
+for simulation and driver are asked for the same, and both sum up. What a start in motion or
+saturation left different fades while the wheel turns: there motion and simulation tell the sum.
 """
 
 from collections.abc import Sequence
@@ -15,6 +16,8 @@ from tomr_power_model.model.commanded import CommandPath
 from tomr_power_model.robot import Controller
 
 _UNKNOWN = float("nan")
+_MOVING = 1.0  # rad/s
+_FADES = 0.01  # share of the difference in a tick in motion
 
 
 class RestingDrivers:
@@ -49,11 +52,12 @@ class RestingDrivers:
         turned = path.wheel(at.TURNED)
         for wheel in range(self._wheels):
             ahead = turned[wheel] - angle[wheel]
-            if ahead != ahead:
-                ahead, self._offset[wheel] = 0.0, 0.0
-            if self._offset[wheel] != self._offset[wheel]:
+            if ahead == ahead and self._offset[wheel] != self._offset[wheel]:
                 self._offset[wheel] = -ahead
-            total = sums[wheel] + ahead + self._offset[wheel]
+            if abs(speed[wheel]) > _MOVING:
+                self._offset[wheel] -= _FADES * (ahead + self._offset[wheel])
+            known = ahead + self._offset[wheel]
+            total = sums[wheel] + (known if known == known else 0.0)
             error = asked[wheel] - speed[wheel]
             found.append(self._proportional * error + self._integral * total)
         before, self._before = self._before, found
