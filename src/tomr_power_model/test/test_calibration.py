@@ -16,7 +16,6 @@ from tomr_power_model.drive.motion import wheel_motion
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.dynamics.drives import InverseDynamics, WheelMotion
 from tomr_power_model.errors import InputError
-from tomr_power_model.response.closed_loop import ClosedLoop
 from tomr_power_model.robot import (
     GRAVITY,
     Robot,
@@ -214,13 +213,3 @@ def test_roller_drag_turns_with_the_slip_by_hand() -> None:
     np.testing.assert_allclose(
         torque, force * 0.05 / np.sqrt(3.0) * np.array([[0, 1, -1]]), atol=1e-9
     )
-
-
-@pytest.mark.parametrize("slip", [0.0, 0.4])
-def test_closed_loop_feels_the_same_roller_drag(slip: float) -> None:
-    robot = dragged(slip)
-    model = InverseDynamics.of(robot)
-    speed = (3.0, -5.0, 1.0)
-    torque = model.power(WheelMotion(np.array([speed]), np.zeros((1, 3)))).torque[0]
-    loop = ClosedLoop.of(robot, model, 0.005)
-    np.testing.assert_allclose(loop._body_torque(speed), torque, rtol=1e-9)

@@ -6,15 +6,12 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 from attrs import evolve
-from tomr_power_model.model.slow_states import Monitors, Surroundings, Windings
 
-from tomr_power_model.dynamics.drives import InverseDynamics
 from tomr_power_model.geometry.kinematics import twist_to_wheels
-from tomr_power_model.model.encoders import Triple, WheelEstimate
+from tomr_power_model.model.encoders import Triple
+from tomr_power_model.model.monitors import Monitors
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.predictor import PowerPredictor
-from tomr_power_model.physics.effects import COPPER, effects_of
-from tomr_power_model.response.closed_loop import ClosedLoop, LoopState
 from tomr_power_model.robot import Robot, shipped_robot
 
 MS = 1_000_000
@@ -90,8 +87,8 @@ def test_a_monitor_of_motor_current_shows_its_flaw_in_the_current() -> None:
 def test_the_lag_by_hand() -> None:
     # Step 0 -> 1 W, 0.1 s: the mean over the first 0.05 s is 1 - 2 (1 - e^-0.5) = 0.213061 and
     # the next 1 - e^-0.5 * 0.786939 = 0.522697.
-    effects = effects_of(_robot({"sensor.power_lag": {"time_constant": 0.1}}))
-    monitors = Monitors(effects, PERIOD)
+    monitors = Monitors.of(_robot({"sensor.power_lag": {"time_constant": 0.1}}), PERIOD)
+    assert monitors is not None
     found = [monitors.shown((power,) * 3)[0] for power in (0.0, 1.0, 1.0)]
     np.testing.assert_allclose(found, [0.0, 0.213061, 0.522697], atol=1e-6)
 
@@ -105,20 +102,10 @@ def test_the_lag_by_hand() -> None:
     ],
 )
 def test_the_offset_by_hand(delay: float, expected: list[float]) -> None:
-    monitors = Monitors(effects_of(_robot({"sensor.clock_offset": {"delay": delay}})), PERIOD)
+    monitors = Monitors.of(_robot({"sensor.clock_offset": {"delay": delay}}), PERIOD)
+    assert monitors is not None
     found = [monitors.shown((power,) * 3)[2] for power in (1.0, 2.0, 4.0, 8.0)]
     np.testing.assert_allclose(found, expected)
-
-
-def test_heat_by_hand() -> None:
-    # 2 A through 0.8 ohm: 3.2 W, settled 6.4 K; after 0.05 s of 10 s 6.4 (1 - e^-0.005). Wheel 2
-    # has no encoder: its command says 1 A. Of wheel 3 nothing is known.
-    heating = {"thermal_resistance": 2.0, "time_constant": 10.0}
-    model = InverseDynamics.of(_robot({"electrical.winding_heating": heating}))
-    windings = Windings.of(model, PERIOD)
-    assert windings is not None
-    windings.heat(np.array([4.0, math.nan, math.nan]), np.array([0.0, 1.0, math.nan]))
-    np.testing.assert_allclose(windings.warm, [0.0319202, 0.0079800, 0.0], atol=1e-7)
 
 
 def test_warm_windings_draw_more() -> None:
@@ -131,21 +118,6 @@ def test_warm_windings_draw_more() -> None:
     expected = current * (1.1144 * current + 0.7 * 6.9282) + 1.2
     assert last.from_encoders[2].power == pytest.approx(expected, rel=1e-5)
     assert last.motors[2].power == pytest.approx(expected, rel=1e-2)
-
-
-def test_warm_windings_start_slower() -> None:
-    """Windings of twice the resistance halve the first step from standstill."""
-    robot = evolve(shipped_robot("reference"), physics={})
-    loop = ClosedLoop.of(robot, InverseDynamics.of(robot), 0.005)
-    cold = loop.step(LoopState(), UPHILL)
-    warm = loop.step(LoopState(), UPHILL, None, (1.0 / COPPER,) * 3)
-    assert abs(cold.speed[2]) > 0.0
-    np.testing.assert_allclose(warm.speed, 0.5 * np.array(cold.speed), rtol=1e-12, atol=1e-15)
-    # So the stage expects a slower start, not only more copper loss.
-    heating = {"thermal_resistance": 0.0, "time_constant": 1e9, "initial": 1.0 / COPPER}
-    hot = PowerPredictor(_robot({"electrical.winding_heating": heating}))
-    first, other = (_standing_start(p) for p in (PowerPredictor(_robot({})), hot))
-    assert 0.3 * first < other < 0.95 * first
 
 
 def _standing_start(predictor: PowerPredictor) -> float:
@@ -179,25 +151,6 @@ def test_without_angles_there_is_no_ripple() -> None:
         _drive(rippled, UPHILL, angles=False), _drive(plain, UPHILL, angles=False), strict=True
     ):
         np.testing.assert_allclose(_powers(one), _powers(other), rtol=1e-6)
-
-
-def test_the_slope_turns_against_the_heading() -> None:
-    # 15 kg * 9.80665 m/s^2 * sin 0.05 = 7.35192 N. Downhill ahead the wheels hold
-    # F r / sqrt 3 = 0.212231 N m; after a turn by 90 degrees, with downhill at the right,
-    # F r / 3 (-2, 1, 1).
-    model = InverseDynamics.of(_robot({"body.slope": EVERY["body.slope"]}))
-    slope = Surroundings.of(model, PERIOD, 10)
-    assert slope is not None
-    still = WheelEstimate(np.zeros(3), np.zeros(3))
-    ahead = slope.torque(still, np.zeros(3), math.nan)
-    np.testing.assert_allclose(ahead, np.tile([0.0, -0.212231, 0.212231], (10, 1)), atol=1e-6)
-    # -4 rad/s of all wheels are 1 rad/s: 30 ticks and then 0.070796 s more.
-    spin = WheelEstimate(np.full(3, -4.0), np.zeros(3))
-    for _ in range(30):
-        slope.torque(spin, np.zeros(3), math.nan)
-        slope.turn(None)
-    aside = slope.torque(still, np.zeros(3), 2.0 * 0.0707963 / PERIOD)
-    np.testing.assert_allclose(aside[0], 0.1225320 * np.array([-2.0, 1.0, 1.0]), atol=1e-6)
 
 
 def test_the_heading_is_summed_up_over_ticks() -> None:
