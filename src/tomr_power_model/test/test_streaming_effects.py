@@ -24,7 +24,11 @@ EVERY = {
     "sensor.power_bias": {"power": 0.5},
     "sensor.power_lag": {"time_constant": 0.1},
     "sensor.clock_offset": {"delay": 0.03},
-    "electrical.winding_heating": {"thermal_resistance": 50.0, "time_constant": 2.0},
+    "electrical.winding_heating": {
+        "thermal_resistance": 50.0,
+        "time_constant": 2.0,
+        "initial": 0.0,
+    },
     "drivetrain.torque_ripple": {"torque": 0.02, "order": 3.0, "phase": 0.4},
     "body.slope": {"angle": 0.05, "azimuth": 0.0},
 }
@@ -33,7 +37,11 @@ NEUTRAL = {
     "sensor.power_bias": {"power": 0.0},
     "sensor.power_lag": {"time_constant": 0.0},
     "sensor.clock_offset": {"delay": 0.0},
-    "electrical.winding_heating": {"thermal_resistance": 0.0, "time_constant": 2.0},
+    "electrical.winding_heating": {
+        "thermal_resistance": 0.0,
+        "time_constant": 2.0,
+        "initial": 0.0,
+    },
     "drivetrain.torque_ripple": {"torque": 0.0, "order": 3.0, "phase": 0.4},
     "body.slope": {"angle": 0.0, "azimuth": 0.0},
 }
@@ -46,14 +54,18 @@ def _robot(effects: Mapping[str, Mapping[str, float]], name: str = "reference") 
 
 
 def _drive(
-    predictor: PowerPredictor, twist: Triple, until_ms: int = 2000, angles: bool = True
+    predictor: PowerPredictor,
+    twist: Triple,
+    until_ms: int = 2000,
+    angles: bool = True,
+    commands: bool = True,
 ) -> list[Prediction]:
     """Commands at 20 Hz; encoders at 100 Hz that follow at once, from angle 0 on."""
     speed = twist_to_wheels(shipped_robot("reference")) @ twist
     found: list[Prediction] = []
     for at_ms in range(until_ms):
         stamp = BASE + at_ms * MS
-        if at_ms % 50 == 0:
+        if commands and at_ms % 50 == 0:
             predictor.command(stamp, twist)
         if at_ms % 10 == 3:
             first, second, third = (float(value) for value in speed)
@@ -132,14 +144,16 @@ def test_the_ripple_follows_the_measured_angle() -> None:
     # At constant speed w the ripple's mean over the tick around t is
     # torque sin(3 w t + 0.4) sin(x) / x, x = 3 w T / 2, for the angle w t; copper besides is small.
     ripple = EVERY["drivetrain.torque_ripple"]
-    with_it = _drive(PowerPredictor(_robot({"drivetrain.torque_ripple": ripple})), UPHILL)
-    without = _drive(PowerPredictor(shipped_robot("reference")), UPHILL)
+    rippled, plain = _robot({"drivetrain.torque_ripple": ripple}), shipped_robot("reference")
+    with_it, without = (
+        _drive(PowerPredictor(robot), UPHILL, commands=False) for robot in (rippled, plain)
+    )
     speed = float((twist_to_wheels(shipped_robot("reference")) @ UPHILL)[2])
     half = 1.5 * speed * PERIOD
-    for rippled, plain in zip(with_it[10:], without[10:], strict=True):
-        middle = 1e-9 * (rippled.stamp_ns - BASE) - 0.5 * PERIOD
+    for shown, smooth in zip(with_it[10:], without[10:], strict=True):
+        middle = 1e-9 * (shown.stamp_ns - BASE) - 0.5 * PERIOD
         mean = 0.02 * math.sin(3.0 * speed * middle + 0.4) * math.sin(half) / half
-        change = rippled.from_encoders[2].power - plain.from_encoders[2].power
+        change = shown.from_encoders[2].power - smooth.from_encoders[2].power
         assert change == pytest.approx(mean * speed, abs=0.012)
 
 
@@ -165,13 +179,13 @@ def test_the_heading_is_summed_up_over_ticks() -> None:
     assert added == pytest.approx(expected, rel=1e-4)
 
 
-def test_the_expected_motion_gives_way_to_the_slope() -> None:
-    """Let go on a slope a robot rolls downhill, ahead, until its drivers push back."""
+def test_drivers_hold_a_robot_that_stands_on_a_slope() -> None:
+    """As it stands when the first command finds it, so it goes on: 0.212 N m on two wheels."""
     predictor = PowerPredictor(_robot({"body.slope": EVERY["body.slope"]}))
     found = _drive(predictor, (0.0, 0.0, 0.0))
-    assert found[0].speed[1] > 0.02
-    assert found[0].speed[2] < -0.02
-    assert abs(found[-1].speed[1]) < 0.01
+    assert max(abs(speed) for prediction in found for speed in prediction.speed) < 1e-6
+    # i = 0.212231 / 0.7 A: 0.8 ohm i^2 = 0.073537 W besides standby.
+    assert found[-1].motors[1].power == pytest.approx(1.2 + 0.073537, abs=1e-4)
 
 
 def test_uphill_lifts_the_body() -> None:

@@ -36,17 +36,25 @@ class Simulation:
         self.row = at.output_size(self.wheels)
         self._step = plain(tuple(vehicle.physics))
 
-    def start(self, twist: Triple = _REST, rate: Triple = _REST, heading: float = 0.0) -> State:
+    def start(
+        self,
+        twist: Triple = _REST,
+        rate: Triple = _REST,
+        heading: float = 0.0,
+        angle: float = 0.0,
+    ) -> State:
         """A state that drives on steadily.
 
         Args:
             twist: of the body [m/s, m/s, rad/s].
             rate: its change [m/s^2, m/s^2, rad/s^2].
             heading: rad.
+            angle: of all wheels [rad]; NaN: not known.
         """
         state = [0.0] * at.state_size(self.wheels)
         state[at.TWIST : at.TWIST + 3], state[at.RATE : at.RATE + 3] = twist, rate
         state[at.HEADING] = heading
+        state[at.STATE_HEADER + at.ANGLE :: at.STATE_WHEEL] = [angle] * self.wheels
         motion = [0.0] * (at.MOTION_HEADER + self.wheels * at.MOTION_WHEEL)
         power = [0.0] * (self.wheels * at.POWER_WHEEL)
         self._step.begin(self.numbers, state, motion, power, self.wheels)

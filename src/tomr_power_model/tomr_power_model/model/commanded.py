@@ -5,6 +5,7 @@ it, and the periods' phase follows the commands' stamps. A period belongs to the
 middle lies, so that an answer rests on messages up to its tick alone.
 """
 
+import math
 from collections import deque
 from collections.abc import Sequence
 
@@ -180,7 +181,7 @@ class CommandPath:
         first = self._pending[0][0]
         if not known and tick_ns - first < self._timing.patience:
             return False
-        self.state = self._simulation.start(seen.twist if known else _STOP)
+        self.state = self._simulation.start(seen.twist if known else _STOP, angle=math.nan)
         self._inputs[at.COMMAND : at.COMMAND + 3] = self.state[at.SET : at.SET + 3]
         self.motion.add(tick_ns - self._timing.period, *self._standing())
         # The first period of this tick, in step with the command.
@@ -194,10 +195,10 @@ class CommandPath:
     def _see(self, seen: Seen | None) -> None:
         """Put the simulation where the robot was seen, for one period; None: as it goes on."""
         heading, angle = (None, None) if seen is None else (seen.heading, seen.angle)
-        self._inputs[at.SEEN_HEADING] = float("nan") if heading is None else heading
+        self._inputs[at.SEEN_HEADING] = math.nan if heading is None else heading
         for wheel in range(self._simulation.wheels):
             place = at.INPUT_HEADER + wheel * at.INPUT_WHEEL + at.SEEN_ANGLE
-            self._inputs[place] = float("nan") if angle is None else angle[wheel]
+            self._inputs[place] = math.nan if angle is None else angle[wheel]
 
     def _take(self) -> None:
         """The command in force in the period that begins now."""

@@ -214,7 +214,7 @@ class PowerPredictor:
         if means.voltage is not None:
             return means.voltage
         nominal = self._robot.supply.nominal_voltage
-        return nominal - self._drop * power / nominal
+        return nominal if math.isnan(power) else nominal - self._drop * power / nominal
 
     def _readings(self, means: Means, monitors: Monitors | None = None) -> Readings:
         if self._reads_motor:
