@@ -6,7 +6,9 @@ from tomr_power_model.dynamics.contacts import Mutable, Numbers
 from tomr_power_model.dynamics.inverse import drive_power
 from tomr_power_model.dynamics.layout import (
     ANGLE,
+    AUXILIARY,
     COUNTED,
+    DRAWN,
     HEADER,
     HEADING,
     INITIAL_RISE,
@@ -23,6 +25,7 @@ from tomr_power_model.dynamics.layout import (
     MOTION_SPEED,
     MOTION_WHEEL,
     MOTION_YAW,
+    POWER_DRAWN,
     POWER_VOLTAGE,
     POWER_WHEEL,
     RATE,
@@ -37,12 +40,13 @@ from tomr_power_model.dynamics.layout import (
     TWIST,
     WHEEL_LOAD,
 )
+from tomr_power_model.dynamics.step import supply_current
 
 
 def begin(p: Numbers, s: Mutable, motion: Mutable, power: Mutable, n: int) -> None:
     """Complete a state of which TWIST, RATE, HEADING and the wheels' ANGLE are given.
 
-    Its drivers' sums hold that motion, the set point is its twist. `motion` and `power` are
+    Its drivers' sums hold that motion, the supply sags with it, the set point is its twist. `motion` and `power` are
     scratch, as long as a motion and its power are.
     """
     stride = int(p[STRIDE])
@@ -60,9 +64,12 @@ def begin(p: Numbers, s: Mutable, motion: Mutable, power: Mutable, n: int) -> No
         motion[a + MOTION_ANGLE], motion[a + MOTION_RESISTING] = s[z + ANGLE], 0.0
         motion[a + MOTION_RISE] = p[w + INITIAL_RISE]
     drive_power(p, motion, power, n)
+    drawn = p[AUXILIARY]
     for i in range(n):
         z = STATE_HEADER + i * STATE_WHEEL
+        drawn += power[i * POWER_WHEEL + POWER_DRAWN]
         volts = power[i * POWER_WHEEL + POWER_VOLTAGE]
         s[z + INTEGRAL] = volts / p[INTEGRAL_GAIN] if p[INTEGRAL_GAIN] > 0.0 else 0.0
+    s[DRAWN] = supply_current(p, drawn)
     for k in range(3):
         s[SET + k] = s[TWIST + k]
