@@ -7,11 +7,14 @@ is one source of the dynamics, and an effect is one file.
 """
 
 import hashlib
-import importlib.util
+import importlib
 import os
+import pickletools
 import tempfile
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
@@ -23,6 +26,7 @@ from tomr_power_model.effects import EFFECTS, LAWS, base
 _MODULES = (contacts, step, inverse, start, batch)
 _ENTRIES = ("advance", "begin", "drive_powers", "predict", "run")
 _CACHE = "TOMR_CACHE_DIR"  # where compiled code is kept; default: the user's cache folder
+_ROOM = 2_000_000  # bytes that it takes, and some more
 
 Jit = Callable[[Any], Any]
 
@@ -126,11 +130,6 @@ def plain(effect_ids: tuple[str, ...]) -> Any:
     return _bound(present, _as_it_is, _as_it_is)
 
 
-def has_compiler() -> bool:
-    """Whether numba is installed."""
-    return importlib.util.find_spec("numba") is not None
-
-
 @cache
 def compiled() -> Any:
     """The dynamics compiled, with the laws of all effects; plain where there is no numba.
@@ -138,12 +137,24 @@ def compiled() -> Any:
     Compiled code is kept in a folder named after all that it was made of, if there is one that
     can be written to; else it is made anew in each process.
     """
-    if not has_compiler():
+    try:
+        import numba
+    except ImportError as error:
+        warnings.warn(
+            f"no compiler ({error}): simulations take a hundred times as long; pip install numba",
+            RuntimeWarning,
+            stacklevel=2,
+        )
         return plain(tuple(EFFECTS))
+    jit, entry = _compilers(_cache_folder(numba.__version__))
+    return _bound(EFFECTS, jit, entry)
+
+
+def _compilers(folder: Path | None) -> tuple[Jit, Jit]:
+    """For inner functions, and for entries, whose compiled code is kept in a folder if there is."""
     import numba
 
     config: Any = numba.config
-    folder = _cache_folder(numba.__version__)
 
     def jit(function: Any) -> Any:
         return numba.njit(nogil=True, error_model="numpy")(function)
@@ -157,7 +168,7 @@ def compiled() -> Any:
         finally:
             config.CACHE_DIR = before
 
-    return _bound(EFFECTS, jit, entry)
+    return jit, entry
 
 
 def _cache_folder(version: str) -> Path | None:
@@ -165,22 +176,42 @@ def _cache_folder(version: str) -> Path | None:
     digest = hashlib.sha256(version.encode())
     for source in sorted(_sources()):
         digest.update(source.read_bytes())
-    given = os.environ.get(_CACHE)
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tomr"
-    places = [Path(given)] if given else [home, Path(tempfile.gettempdir()) / f"tomr-{_user()}"]
-    for place in places:
+    for place in _cache_places():
         folder = place / digest.hexdigest()[:16]
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                return folder
+            with tempfile.TemporaryFile(dir=folder) as probe:
+                probe.write(bytes(_ROOM))
+            for kept in folder.rglob("*.nb[ci]"):
+                if not _is_whole(kept):
+                    kept.unlink(missing_ok=True)
+            return folder
         except OSError:
             continue
     return None
 
 
-def _user() -> int:
-    return os.getuid()
+def _cache_places() -> list[Path]:
+    given = os.environ.get(_CACHE)
+    if given:
+        return [Path(given)]
+    # Path.home() raises where there is none; "~" then stays as it is.
+    home = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
+    spare = Path(tempfile.gettempdir()) / f"tomr-{os.getuid()}"
+    return [home / "tomr", spare] if home.is_absolute() else [spare]
+
+
+def _is_whole(file: Path) -> bool:
+    """Whether a file is of complete pickles: a robot switched off while it writes leaves others."""
+    data = BytesIO(file.read_bytes())
+    size = len(data.getvalue())
+    try:
+        while data.tell() < size:
+            for _ in pickletools.genops(data):
+                pass
+    except (ValueError, IndexError, UnicodeDecodeError):
+        return False
+    return size > 0
 
 
 def _sources() -> set[Path]:
