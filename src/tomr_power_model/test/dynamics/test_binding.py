@@ -107,9 +107,7 @@ def test_damaged_compiled_code_is_made_anew(
 def test_two_processes_may_compile_at_once(tmp_path: Path) -> None:
     (tmp_path / "twice.py").write_text(TWICE, encoding="utf-8")
     code = "import twice; print(twice.result(twice.binding._cache_folder('1')))"
-    both = [
-        started(code, TOMR_CACHE_DIR=str(tmp_path), PYTHONPATH=str(tmp_path)) for _ in range(2)
-    ]
+    both = [started(code, TOMR_CACHE_DIR=str(tmp_path), PYTHONPATH=str(tmp_path)) for _ in range(2)]
     assert [finished(process)[0] for process in both] == ["42.0"] * 2
 
 
@@ -126,6 +124,15 @@ compiled().advance(simulation.numbers, state, simulation.inputs(), [0.0] * simul
     error = finished(started(code))[1]
     assert error.count("RuntimeWarning") == 1
     assert "pip install numba" in error
+
+
+def test_a_name_means_one_thing_in_all_modules() -> None:
+    """They are bound in one namespace."""
+    seen: dict[str, object] = {}
+    for module in binding._MODULES:
+        for name, value in vars(module).items():
+            if not name.startswith("__"):
+                assert seen.setdefault(name, value) is value, name
 
 
 def test_what_runs_in_the_nodes_does_not_import_numba() -> None:

@@ -1,7 +1,7 @@
 """One period of the drivers: numbers worked by hand.
 
 The reference robot: k = 0.7 N m/A at the wheel, R = 0.8 ohm, J = 6e-4 + 20^2 * 5e-6 = 2.6e-3
-kg m^2, r = 0.05 m, wheels at 0, 120, 240 degrees at 0.2 m, PI of 1.2 V s/rad and 12 V/rad at 200 Hz.
+kg m^2, r = 0.05 m, wheels at 0, 120, 240 degrees at 0.2 m; 1.2 V s/rad and 12 V/rad at 200 Hz.
 """
 
 import math
@@ -74,9 +74,7 @@ def test_short_circuited_motors_brake_and_open_ones_coast(
     decay = math.exp(-0.1 * K**2 / (R * SPIN_INERTIA))
     assert shorted.twist[-1, 2] == pytest.approx(2.0 * decay, rel=1e-9)
     assert shorted.steps.power == pytest.approx(np.zeros((20, 3)))  # all of it warms the windings
-    opened = drive_vehicle(
-        idle, rest, Simulation(idle).start((0.0, 0.0, 2.0)), {at.CONNECTED: 0.0}
-    )
+    opened = drive_vehicle(idle, rest, Simulation(idle).start((0.0, 0.0, 2.0)), {at.CONNECTED: 0.0})
     # The back-EMF is given back at the start of each step: second order in 5 ms.
     assert opened.twist[-1, 2] == pytest.approx(2.0, rel=2e-3)
     assert not opened.steps.current.any()
@@ -223,7 +221,9 @@ def test_an_encoder_loses_no_counts(make_vehicle: MakeVehicle, drive_vehicle: Dr
     assert np.abs(counted - driven.wheels[-1, :, at.ANGLE]).max() <= 0.5 * quantum + 1e-9
     # The loop still holds the speed on average.
     wanted = drive_vehicle(make_vehicle(), held((0.1, 0.05, 0.3), 400)).steps.speed[200:]
-    np.testing.assert_allclose(driven.steps.speed[200:].mean(axis=0), wanted.mean(axis=0), atol=0.02)
+    np.testing.assert_allclose(
+        driven.steps.speed[200:].mean(axis=0), wanted.mean(axis=0), atol=0.02
+    )
 
 
 def test_drivers_just_too_fast_for_steps_are_taken_as_continuous(

@@ -7,7 +7,7 @@ is one source of the dynamics, and an effect is one file.
 """
 
 import hashlib
-import importlib
+import inspect
 import os
 import pickletools
 import tempfile
@@ -123,31 +123,39 @@ def _bound(effect_ids: Iterable[str], jit: Jit, entry: Jit) -> Any:
     return SimpleNamespace(**{name: names[name] for name in _ENTRIES})
 
 
-@cache
 def plain(effect_ids: tuple[str, ...]) -> Any:
     """The dynamics as they are, with the laws of some effects only: others would add nothing."""
-    present = [name for name in law_offsets() if name in effect_ids]
+    return _plain(tuple(name for name in law_offsets() if name in effect_ids), tuple(EFFECTS))
+
+
+@cache
+def _plain(present: tuple[str, ...], vocabulary: tuple[str, ...]) -> Any:
+    """Where a law finds its parameters depends on the vocabulary as well."""
     return _bound(present, _as_it_is, _as_it_is)
 
 
-@cache
 def compiled() -> Any:
     """The dynamics compiled, with the laws of all effects; plain where there is no numba.
 
     Compiled code is kept in a folder named after all that it was made of, if there is one that
     can be written to; else it is made anew in each process.
     """
+    return _compiled(tuple(EFFECTS))
+
+
+@cache
+def _compiled(vocabulary: tuple[str, ...]) -> Any:
     try:
         import numba
     except ImportError as error:
         warnings.warn(
             f"no compiler ({error}): simulations take a hundred times as long; pip install numba",
             RuntimeWarning,
-            stacklevel=2,
+            stacklevel=3,
         )
-        return plain(tuple(EFFECTS))
+        return plain(vocabulary)
     jit, entry = _compilers(_cache_folder(numba.__version__))
-    return _bound(EFFECTS, jit, entry)
+    return _bound(vocabulary, jit, entry)
 
 
 def _compilers(folder: Path | None) -> tuple[Jit, Jit]:
@@ -217,7 +225,4 @@ def _is_whole(file: Path) -> bool:
 def _sources() -> set[Path]:
     modules: list[ModuleType] = [*_MODULES, layout, base]
     files = {Path(__file__), *(Path(str(module.__file__)) for module in modules)}
-    for effect in EFFECTS.values():
-        module = importlib.import_module(effect.__module__)
-        files.add(Path(str(module.__file__)))
-    return files
+    return files | {Path(inspect.getfile(effect)) for effect in EFFECTS.values()}

@@ -43,6 +43,7 @@ from tomr_power_model.dynamics.layout import (
     POWER_WHEEL,
     RESISTANCE,
     ROLLER_SLIP,
+    ROTOR,
     STRIDE,
     TO_TWIST,
     VISCOUS,
@@ -58,6 +59,8 @@ from tomr_power_model.effects.base import Wheel
 
 # Wheel speed below which dry friction fades instead of jumping with the encoder's noise [rad/s].
 STICKING_SPEED = 0.1
+MESHING_SWEEPS = 8  # at most, of friction that grows with the torque that the gear carries
+SETTLED = 1e-6  # N m
 
 
 def carried_force(
@@ -112,10 +115,17 @@ def drive_power(p: Numbers, m: Numbers, out: Mutable, n: int) -> None:
         carried = p[w + TO_TWIST] * fx + p[w + TO_TWIST + 1] * fy + p[w + TO_TWIST + 2] * mz
         carried += p[w + AXLE_INERTIA] * m[a + MOTION_ACCELERATION]
         load = max(p[w + LOAD] + p[w + LOAD_X] * along_x + p[w + LOAD_Y] * along_y, 0.0)
-        wheel = Wheel(speed, load, carried, m[a + MOTION_ANGLE], p[w + NOMINAL_RADIUS], p[w + GEAR])
-        torque = carried + p[w + VISCOUS] * speed + m[a + MOTION_RESISTING]
-        torque += max(dry_torque(p, w, wheel), 0.0) * math.tanh(speed / STICKING_SPEED)
-        torque += moving_torque(p, w, wheel)
+        carried += p[w + VISCOUS] * speed + m[a + MOTION_RESISTING]
+        fade, rotor = math.tanh(speed / STICKING_SPEED), p[w + ROTOR] * m[a + MOTION_ACCELERATION]
+        torque = carried
+        for _ in range(MESHING_SWEEPS):  # the gear carries what friction at the axle takes as well
+            before = torque
+            angle, radius = m[a + MOTION_ANGLE], p[w + NOMINAL_RADIUS]
+            wheel = Wheel(speed, load, before - rotor, angle, radius, p[w + GEAR])
+            torque = carried + max(dry_torque(p, w, wheel), 0.0) * fade
+            torque += moving_torque(p, w, wheel)
+            if abs(torque - before) < SETTLED:
+                break
         k = p[w + CONSTANT]
         current = torque / k
         volts = p[w + RESISTANCE] * (1.0 + COPPER * m[a + MOTION_RISE]) * current + k * speed

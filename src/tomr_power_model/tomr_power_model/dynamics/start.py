@@ -46,8 +46,8 @@ from tomr_power_model.dynamics.step import supply_current
 def begin(p: Numbers, s: Mutable, motion: Mutable, power: Mutable, n: int) -> None:
     """Complete a state of which TWIST, RATE, HEADING and the wheels' ANGLE are given.
 
-    Its drivers' sums hold that motion, the supply sags with it, the set point is its twist. `motion` and `power` are
-    scratch, as long as a motion and its power are.
+    Its drivers' sums hold that motion, the supply sags with it, the set point is its twist.
+    `motion` and `power` are scratch, as long as a motion and its power are.
     """
     stride = int(p[STRIDE])
     motion[MOTION_YAW], motion[MOTION_HEADING] = math.nan, s[HEADING]
