@@ -35,18 +35,23 @@ def shown(
     return np.asarray(predict([Variant(laid_out(vehicle), 0, later)], excitation(), readout)[0])
 
 
-@pytest.mark.parametrize("kind", [batch.SPEED, batch.CURRENT, batch.POWER, batch.TOTAL])
-def test_spans_are_means_over_whole_steps(make_vehicle: MakeVehicle, kind: int) -> None:
-    vehicle = make_vehicle()
+@pytest.mark.parametrize(
+    "kind", ["SPEED", "POWER", "TOTAL", "VOLTAGE", "YAW", "CURRENT", "MAGNITUDE"]
+)
+def test_spans_are_means_over_whole_steps(make_vehicle: MakeVehicle, kind: str) -> None:
+    vehicle = make_vehicle(further={"electrical.supply_sag": {"resistance": 0.2}})
     steps = drive(Variant(laid_out(vehicle)), excitation())
     expected = {
-        batch.SPEED: steps.speed[:, 1],
-        batch.CURRENT: steps.current[:, 1],
-        batch.POWER: steps.power[:, 1],
-        batch.TOTAL: steps.power.sum(axis=1) + 12.0,
+        "SPEED": steps.speed[:, 1],
+        "POWER": steps.power[:, 1],
+        "TOTAL": steps.power.sum(axis=1) + 12.0,
+        "VOLTAGE": steps.voltage,
+        "YAW": steps.yaw_rate,
+        "CURRENT": steps.current[:, 1],
+        "MAGNITUDE": np.abs(steps.current[:, 1]),
     }[kind]
     time = np.array([0.3, 0.6, 1.1, 1.5])
-    found = shown(vehicle, kind, time, 0.1)[0]
+    found = shown(vehicle, getattr(batch, kind), time, 0.1)[0]
     means = [expected[round(200 * t) - 20 : round(200 * t)].mean() for t in time]
     np.testing.assert_allclose(found, means, rtol=1e-9)
 

@@ -126,15 +126,6 @@ compiled().advance(simulation.numbers, state, simulation.inputs(), [0.0] * simul
     assert "pip install numba" in error
 
 
-def test_a_name_means_one_thing_in_all_modules() -> None:
-    """They are bound in one namespace."""
-    seen: dict[str, object] = {}
-    for module in binding._MODULES:
-        for name, value in vars(module).items():
-            if not name.startswith("__"):
-                assert seen.setdefault(name, value) is value, name
-
-
 def test_what_runs_in_the_nodes_does_not_import_numba() -> None:
     code = f"""
 import pkgutil, sys

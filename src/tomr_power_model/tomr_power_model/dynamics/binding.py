@@ -1,9 +1,9 @@
 """The step bound to the laws of the effects: as it is, or compiled.
 
 `step`, `contacts`, `inverse`, `start` and `batch` are plain functions that call each other and four
-laws by name. Binding makes copies of them in one namespace in which the laws are those of the
-effects: of those that a robot has, in plain Python; of all, where numba compiles them. So there
-is one source of the dynamics, and an effect is one file.
+laws by name. Binding makes copies of them for which the laws are those of the effects: of those
+that a robot has, in plain Python; of all, where numba compiles them. So there is one source of the
+dynamics, and an effect is one file.
 """
 
 import hashlib
@@ -104,23 +104,21 @@ def _law(name: str, effect_ids: Iterable[str], jit: Jit) -> Any:
 
 
 def _bound(effect_ids: Iterable[str], jit: Jit, entry: Jit) -> Any:
-    """Copies of all functions of the dynamics, in one namespace with the laws."""
+    """Copies of all functions of the dynamics, which call each other and the laws."""
     ids = tuple(effect_ids)
-    # numba looks the module up by its name when it loads what it compiled.
-    names: dict[str, Any] = {"__builtins__": __builtins__, "__name__": step.__name__}
-    plain: dict[str, FunctionType] = {}
-    for module in _MODULES:
-        for name, value in vars(module).items():
-            if isinstance(value, FunctionType) and value.__module__ == module.__name__:
-                plain[name] = value
-            elif not name.startswith("__"):
-                names.setdefault(name, value)
-    for name, function in plain.items():
-        copy = FunctionType(function.__code__, names, name, function.__defaults__)
-        names[name] = (entry if name in _ENTRIES else jit)(copy)
-    for law in LAWS:
-        names[law] = _law(law, ids, jit)
-    return SimpleNamespace(**{name: names[name] for name in _ENTRIES})
+    copies: dict[Any, Any] = {getattr(step, law): _law(law, ids, jit) for law in LAWS}
+    # One namespace a module: a name may be a place in the layout here, a kind of channel there.
+    spaces = [dict(vars(module)) for module in _MODULES]
+    for names in spaces:
+        for name, value in names.items():
+            own = isinstance(value, FunctionType) and value.__module__ == names["__name__"]
+            if own and value not in copies:
+                copy = FunctionType(value.__code__, names, name, value.__defaults__)
+                copies[value] = (entry if name in _ENTRIES else jit)(copy)
+    for names in spaces:
+        names.update({k: copies[v] for k, v in names.items() if isinstance(v, FunctionType)})
+    found = {name: names[name] for names in spaces for name in _ENTRIES if name in names}
+    return SimpleNamespace(**found)
 
 
 def plain(effect_ids: tuple[str, ...]) -> Any:
