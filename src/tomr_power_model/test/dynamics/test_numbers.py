@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.numbers import laid_out, record_length, timing_of
@@ -78,18 +79,12 @@ def test_a_short_push_meets_body_and_wheels(
     make_vehicle: MakeVehicle, kind: str, masses: list[float]
 ) -> None:
     """The gain of a step tends to h over the mass where the motors hardly damp."""
-    vehicle = make_vehicle(kind, physics={}, rate=1e4 / 20.0)
-    weak = [attrs_evolved(motor) for motor in vehicle.motors]
-    p = laid_out(make_vehicle(kind, physics={}, motors=tuple(weak)))
+    vehicle = make_vehicle(kind, physics={})
+    weak = tuple(evolve(motor, resistance=1e9) for motor in vehicle.motors)
+    p = laid_out(evolve(vehicle, motors=weak))
     gain = p[at.GAIN : at.GAIN + 9].reshape(3, 3)
     np.testing.assert_allclose(p[at.STEP] / np.diag(gain), masses, rtol=1e-6)
     np.testing.assert_allclose(gain - np.diag(np.diag(gain)), 0.0, atol=1e-12)
-
-
-def attrs_evolved(motor: object) -> object:
-    from attrs import evolve
-
-    return evolve(motor, resistance=1e9)  # type: ignore[type-var]
 
 
 def test_wheels_and_casters_carry_the_robot(make_vehicle: MakeVehicle) -> None:

@@ -208,7 +208,7 @@ def test_a_drive_that_begins_steadily_goes_on_so(
     kind: str,
     twist: tuple[float, float, float],
 ) -> None:
-    vehicle = make_vehicle(kind)
+    vehicle = make_vehicle(kind, further={"electrical.supply_sag": {"resistance": 0.2}})
     if kind == "two_driven":
         twist = (twist[0], 0.0, twist[2])
     state = Simulation(vehicle).start(twist)
@@ -216,6 +216,7 @@ def test_a_drive_that_begins_steadily_goes_on_so(
     driven = drive_vehicle(vehicle, legs([twist], 40), state)
     moving = np.abs(wheels) > 0.5
     np.testing.assert_allclose(driven.twist[-1], twist, atol=0.01)
+    np.testing.assert_allclose(driven.steps.voltage, driven.steps.voltage[-1], atol=0.01)
     np.testing.assert_allclose(
         driven.steps.power[0][moving], driven.steps.power[-1][moving], atol=0.3
     )

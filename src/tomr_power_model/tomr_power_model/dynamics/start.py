@@ -31,6 +31,7 @@ from tomr_power_model.dynamics.layout import (
     RATE,
     RISE,
     ROLL,
+    SAG,
     SET,
     SPEED,
     STATE_HEADER,
@@ -38,6 +39,7 @@ from tomr_power_model.dynamics.layout import (
     STRIDE,
     TURNED,
     TWIST,
+    VOLTAGE,
     WHEEL_LOAD,
 )
 from tomr_power_model.dynamics.step import supply_current
@@ -66,10 +68,12 @@ def begin(p: Numbers, s: Mutable, motion: Mutable, power: Mutable, n: int) -> No
     drive_power(p, motion, power, n)
     drawn = p[AUXILIARY]
     for i in range(n):
-        z = STATE_HEADER + i * STATE_WHEEL
         drawn += power[i * POWER_WHEEL + POWER_DRAWN]
-        volts = power[i * POWER_WHEEL + POWER_VOLTAGE]
-        s[z + INTEGRAL] = volts / p[INTEGRAL_GAIN] if p[INTEGRAL_GAIN] > 0.0 else 0.0
     s[DRAWN] = supply_current(p, drawn)
+    share = 1.0 - p[SAG] * s[DRAWN] / p[VOLTAGE]
+    for i in range(n):
+        z = STATE_HEADER + i * STATE_WHEEL
+        volts = power[i * POWER_WHEEL + POWER_VOLTAGE] / share
+        s[z + INTEGRAL] = volts / p[INTEGRAL_GAIN] if p[INTEGRAL_GAIN] > 0.0 else 0.0
     for k in range(3):
         s[SET + k] = s[TWIST + k]
