@@ -1,7 +1,9 @@
-"""Drives made up for the tests of calibration: motion and power known exactly."""
+"""Robots, vehicles and drives that tests share."""
 
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,18 +12,31 @@ from numpy.typing import NDArray
 
 from tomr_power_model.calibration.problem import modelled_power
 from tomr_power_model.drive.record import Drive
+from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.drives import WheelMotion
+from tomr_power_model.dynamics.simulation import Simulation, Steps
+from tomr_power_model.dynamics.vehicle import (
+    Vehicle,
+    mecanum_wheel,
+    omni_wheel,
+    plain_wheel,
+    vehicle_of,
+)
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.messages.bag import bag_header, bag_message
 from tomr_power_model.messages.types import BATTERY, JOINT_STATE, TWIST, TWIST_STAMPED
 from tomr_power_model.recordings import RecordingWriter
-from tomr_power_model.robot import Robot, shipped_robot
+from tomr_power_model.robot import Controller, Robot, shipped_robot
 
 Array = NDArray[np.float64]
 MakeDrive = Callable[..., Drive]
 WriteBag = Callable[..., Path]
 ROBOT = shipped_robot("reference")
 _START_NS = 1_700_000_000 * 1_000_000_000
+MakeVehicle = Callable[..., Vehicle]
+DriveVehicle = Callable[..., "Driven"]
+
+KINDS = ("three_omni", "four_omni", "four_mecanum", "two_driven")
 
 _ENCODER_STEP = 0.01  # s
 _POWER_EVERY = 4  # encoder samples
@@ -145,3 +160,94 @@ def write_bag() -> WriteBag:
         return path
 
     return write
+
+
+def _of_kind(kind: str) -> Vehicle:
+    """The reference robot on other wheels."""
+    vehicle = vehicle_of(shipped_robot("reference"))
+    corners = [(0.2, 0.15), (-0.2, 0.15), (-0.2, -0.15), (0.2, -0.15)]
+    if kind == "four_omni":
+        angles = [math.pi * (0.25 + 0.5 * wheel) for wheel in range(4)]
+        wheels = [omni_wheel(0.2 * math.cos(a), 0.2 * math.sin(a), a + math.pi / 2) for a in angles]
+    elif kind == "four_mecanum":  # the rollers on the floor lie along a diamond's sides
+        wheels = [mecanum_wheel(x, y, 0.0, math.copysign(math.pi / 4, x * y)) for x, y in corners]
+    elif kind == "two_driven":
+        wheels = [plain_wheel(0.0, 0.15, 0.0), plain_wheel(0.0, -0.15, 0.0)]
+    else:
+        return vehicle
+    n = len(wheels)
+    return evolve(
+        vehicle,
+        wheels=tuple(wheels),
+        motors=(vehicle.motors[0],) * n,
+        physics={effect: (given[0],) * n for effect, given in vehicle.physics.items()},
+        casters=((0.2, 0.0), (-0.2, 0.0)) if kind == "two_driven" else (),
+    )
+
+
+@pytest.fixture(scope="session")
+def make_vehicle() -> MakeVehicle:
+    """Makes a vehicle of one of KINDS: the reference robot on other wheels.
+
+    `physics` replaces its effects, alike at all wheels; `further` adds to them; what else is given
+    replaces fields of the vehicle, or of its controller.
+    """
+
+    def make(
+        kind: str = "three_omni",
+        physics: Mapping[str, Mapping[str, float]] | None = None,
+        further: Mapping[str, Mapping[str, float]] | None = None,
+        **changes: Any,
+    ) -> Vehicle:
+        vehicle = _of_kind(kind)
+        n = vehicle.count
+        present = dict(vehicle.physics) if physics is None else {}
+        for effect_id, given in {**(physics or {}), **(further or {})}.items():
+            present[effect_id] = (given,) * n
+        loop = {name: changes.pop(name) for name in tuple(changes) if hasattr(Controller, name)}
+        controller = evolve(vehicle.controller, **loop)
+        return evolve(vehicle, physics=present, controller=controller, **changes)
+
+    return make
+
+
+@frozen
+class Driven:
+    """What a simulation did, period by period."""
+
+    steps: Steps
+    twist: Array  # of the body after each period [m/s, m/s, rad/s], (k, 3)
+    wheels: Array  # the wheels' part of the state after each period, (k, n, STATE_WHEEL)
+    state: list[float]  # at the end
+
+
+@pytest.fixture(scope="session")
+def drive_vehicle() -> DriveVehicle:
+    """Drives a vehicle in plain Python through commanded twists, (k, 3), from rest or a state.
+
+    `inputs` are those of every period before its command: fields of the wheels by their offsets.
+    """
+
+    def run(
+        vehicle: Vehicle,
+        commands: Array,
+        state: list[float] | None = None,
+        inputs: Mapping[int, float] | None = None,
+    ) -> Driven:
+        simulation = Simulation(vehicle)
+        state = simulation.start() if state is None else state
+        asked = simulation.inputs()
+        for wheel in range(vehicle.count):
+            for offset, value in (inputs or {}).items():
+                asked[at.INPUT_HEADER + wheel * at.INPUT_WHEEL + offset] = value
+        out, twists, wheels = [], [], []
+        for command in commands.tolist():
+            asked[at.COMMAND : at.COMMAND + 3] = command
+            out.append(simulation.advance(state, asked))
+            twists.append(state[at.TWIST : at.TWIST + 3])
+            wheels.append(state[at.STATE_HEADER :])
+        shape = (len(commands), vehicle.count, at.STATE_WHEEL)
+        steps = Steps.of(np.array(out), vehicle.count)
+        return Driven(steps, np.array(twists), np.array(wheels).reshape(shape), state)
+
+    return run

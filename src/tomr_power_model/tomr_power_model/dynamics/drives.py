@@ -7,7 +7,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.dynamics import layout as at
-from tomr_power_model.dynamics.binding import compiled, has_compiler, plain
+from tomr_power_model.dynamics.binding import compiled
 from tomr_power_model.dynamics.numbers import laid_out
 from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.robot import Robot
@@ -50,12 +50,11 @@ class InverseDynamics:
     """Inverse dynamics of one robot, see `dynamics.inverse`; compiled where numba is installed."""
 
     numbers: Array
-    effects: tuple[str, ...]
 
     @classmethod
     def of(cls, robot: Robot) -> Self:
         """Of a description."""
-        return cls(laid_out(vehicle_of(robot)), tuple(robot.physics))
+        return cls(laid_out(vehicle_of(robot)))
 
     def power(self, motion: WheelMotion) -> DrivePower:
         """Power of each drive; what depends on place, time and past is left out."""
@@ -70,8 +69,7 @@ class InverseDynamics:
         )
         own[..., at.MOTION_ANGLE] = own[..., at.MOTION_VOLTAGE] = np.nan
         out = np.empty((count, wheels * at.POWER_WHEEL))
-        step = compiled() if has_compiler() else plain(self.effects)
-        step.drive_powers(self.numbers, rows, out, wheels)
+        compiled().drive_powers(self.numbers, rows, out, wheels)
         found = out.reshape(count, wheels, at.POWER_WHEEL)
         return DrivePower(
             torque=found[..., at.POWER_TORQUE],

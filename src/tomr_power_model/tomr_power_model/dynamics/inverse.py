@@ -60,7 +60,8 @@ from tomr_power_model.effects.base import Wheel
 
 # Wheel speed below which dry friction fades instead of jumping with the encoder's noise [rad/s].
 STICKING_SPEED = 0.1
-_ROUNDS = 3  # each leaves a tenth of the last one's error
+MESHING_SWEEPS = 8  # at most, of friction that grows with the torque that the gear carries
+SETTLED = 1e-6  # N m
 
 
 def carried_force(
@@ -119,8 +120,9 @@ def drive_power(p: Numbers, m: Numbers, out: Mutable, n: int) -> None:
         carried += p[w + VISCOUS] * speed + m[a + MOTION_RESISTING]
         moves, held = math.tanh(speed / STICKING_SPEED), m[a + MOTION_VOLTAGE]
         torque = carried
-        for _ in range(_ROUNDS):  # the gear carries friction too, which grows with what it carries
-            gear = torque - p[w + ROTOR] * m[a + MOTION_ACCELERATION]
+        for _ in range(MESHING_SWEEPS):  # the gear carries what friction at the axle takes as well
+            before = torque
+            gear = before - p[w + ROTOR] * m[a + MOTION_ACCELERATION]
             wheel = Wheel(
                 speed, load, gear, m[a + MOTION_ANGLE], p[w + NOMINAL_RADIUS], p[w + GEAR]
             )
@@ -129,6 +131,8 @@ def drive_power(p: Numbers, m: Numbers, out: Mutable, n: int) -> None:
             if held == held:
                 rests = (1.0 - abs(moves)) * min(max(k / hot * held - free, -dry), dry)
             torque = free + dry * moves + rests
+            if abs(torque - before) < SETTLED:
+                break
         current = torque / k
         volts = hot * current + k * speed
         out[o + POWER_TORQUE] = torque
