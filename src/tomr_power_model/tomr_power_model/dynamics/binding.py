@@ -21,7 +21,7 @@ from tomr_power_model.dynamics.numbers import law_offsets
 from tomr_power_model.effects import EFFECTS, LAWS, base
 
 _MODULES = (contacts, step, inverse, start, batch)
-_ENTRIES = ("advance", "begin", "drive_powers", "predict", "run")
+_ENTRIES = ("advance", "begin", "drive_powers", "predict", "read", "run")
 _CACHE = "TOMR_CACHE_DIR"  # where compiled code is kept; default: the user's cache folder
 
 Jit = Callable[[Any], Any]
@@ -109,8 +109,8 @@ def _bound(effect_ids: Iterable[str], jit: Jit, entry: Jit) -> Any:
         for name, value in vars(module).items():
             if isinstance(value, FunctionType) and value.__module__ == module.__name__:
                 plain[name] = value
-            elif not name.startswith("__"):
-                names.setdefault(name, value)
+            elif not name.startswith("__") and names.setdefault(name, value) != value:
+                raise RuntimeError(f"{module.__name__}.{name} means something else elsewhere")
     for name, function in plain.items():
         copy = FunctionType(function.__code__, names, name, function.__defaults__)
         names[name] = (entry if name in _ENTRIES else jit)(copy)

@@ -67,6 +67,7 @@ from tomr_power_model.dynamics.layout import (
     MEASURED,
     NEXT,
     NOMINAL_RADIUS,
+    NOMINAL_VOLTAGE,
     OUT_COPPER,
     OUT_CURRENT,
     OUT_GAP,
@@ -107,7 +108,6 @@ from tomr_power_model.dynamics.layout import (
     TRANSMITTED,
     TURNED,
     TWIST,
-    VOLTAGE,
     VOLTS,
     WHEEL_LOAD,
     YAW_MEAN,
@@ -154,10 +154,10 @@ def advance(p: Numbers, s: Mutable, u: Numbers, out: Mutable, n: int) -> None:
     for k in range(steps):
         substep(p, s, u, n)
         drawn += report(p, s, u, out, k * width, n)
-    bus = p[VOLTAGE] - p[SAG] * s[DRAWN]
+    bus = p[NOMINAL_VOLTAGE] - p[SAG] * s[DRAWN]
     s[DRAWN] = (drawn / steps + p[AUXILIARY]) / bus
     for k in range(steps):
-        out[k * width + OUT_VOLTAGE] = p[VOLTAGE] - p[SAG] * s[DRAWN]
+        out[k * width + OUT_VOLTAGE] = p[NOMINAL_VOLTAGE] - p[SAG] * s[DRAWN]
     for i in range(n):
         z, w = STATE_HEADER + i * STATE_WHEEL, HEADER + i * stride
         turned = s[z + MEASURED] * u[INPUT_HEADER + i * INPUT_WHEEL + COUNTS]
@@ -182,7 +182,7 @@ def control(p: Numbers, s: Mutable, u: Numbers, n: int) -> None:
     vy = s[SET + 1] = s[SET + 1] + part * dy
     yaw = p[YAW_STEP]
     wz = s[SET + 2] = s[SET + 2] + min(max(u[COMMAND + 2] - s[SET + 2], -yaw), yaw)
-    stride, most = int(p[STRIDE]), p[VOLTAGE]
+    stride, most = int(p[STRIDE]), p[NOMINAL_VOLTAGE]
     share = 1.0 - p[SAG] * s[DRAWN] / most
     for i in range(n):
         w, z = HEADER + i * stride, STATE_HEADER + i * STATE_WHEEL
