@@ -18,7 +18,7 @@ where it runs as it is. Every field is an offset; those of a wheel count from it
     INTEGRAL_GAIN,  # V/rad
     LINEAR_STEP,  # of the ramp in a period [m/s]
     YAW_STEP,  # rad/s
-    NOMINAL_VOLTAGE,  # V
+    VOLTAGE,  # nominal [V]
     SAG,  # ohm
     AUXILIARY,  # W
     MASS,  # kg

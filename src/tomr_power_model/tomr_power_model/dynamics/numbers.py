@@ -134,7 +134,7 @@ def _controller(p: Array, vehicle: Vehicle, timing: Timing) -> None:
     p[at.BACKWARD] = given.integrator == "backward"
     p[at.PROPORTIONAL], p[at.INTEGRAL_GAIN] = given.proportional, given.integral
     p[at.LINEAR_STEP], p[at.YAW_STEP] = ramp, ramp / vehicle.ramp_radius
-    p[at.NOMINAL_VOLTAGE] = vehicle.supply.nominal_voltage
+    p[at.VOLTAGE] = vehicle.supply.nominal_voltage
     p[at.AUXILIARY] = vehicle.supply.auxiliary_power
 
 

@@ -67,7 +67,6 @@ from tomr_power_model.dynamics.layout import (
     MEASURED,
     NEXT,
     NOMINAL_RADIUS,
-    NOMINAL_VOLTAGE,
     OUT_COPPER,
     OUT_CURRENT,
     OUT_GAP,
@@ -108,6 +107,7 @@ from tomr_power_model.dynamics.layout import (
     TRANSMITTED,
     TURNED,
     TWIST,
+    VOLTAGE,
     VOLTS,
     WHEEL_LOAD,
     YAW_MEAN,
@@ -154,10 +154,10 @@ def advance(p: Numbers, s: Mutable, u: Numbers, out: Mutable, n: int) -> None:
     for k in range(steps):
         substep(p, s, u, n)
         drawn += report(p, s, u, out, k * width, n)
-    bus = p[NOMINAL_VOLTAGE] - p[SAG] * s[DRAWN]
+    bus = p[VOLTAGE] - p[SAG] * s[DRAWN]
     s[DRAWN] = (drawn / steps + p[AUXILIARY]) / bus
     for k in range(steps):
-        out[k * width + OUT_VOLTAGE] = p[NOMINAL_VOLTAGE] - p[SAG] * s[DRAWN]
+        out[k * width + OUT_VOLTAGE] = p[VOLTAGE] - p[SAG] * s[DRAWN]
     for i in range(n):
         z, w = STATE_HEADER + i * STATE_WHEEL, HEADER + i * stride
         turned = s[z + MEASURED] * u[INPUT_HEADER + i * INPUT_WHEEL + COUNTS]
@@ -182,7 +182,7 @@ def control(p: Numbers, s: Mutable, u: Numbers, n: int) -> None:
     vy = s[SET + 1] = s[SET + 1] + part * dy
     yaw = p[YAW_STEP]
     wz = s[SET + 2] = s[SET + 2] + min(max(u[COMMAND + 2] - s[SET + 2], -yaw), yaw)
-    stride, most = int(p[STRIDE]), p[NOMINAL_VOLTAGE]
+    stride, most = int(p[STRIDE]), p[VOLTAGE]
     share = 1.0 - p[SAG] * s[DRAWN] / most
     for i in range(n):
         w, z = HEADER + i * stride, STATE_HEADER + i * STATE_WHEEL
@@ -282,7 +282,8 @@ def torques(p: Numbers, s: Mutable, u: Numbers, n: int) -> None:
         conducting = 1.0 if u[a + CONNECTED] > 0.0 else 0.0
         # The discretised damping is that of connected, cold windings: what is less is given back.
         less = k * (k + back) * (1.0 / cold - conducting / hot)
-        s[z + TORQUE] = torque + conducting * k / hot * s[z + VOLTS] + less * speed
+        ahead = 2.0 * speed - s[z + MEAN]  # in the middle of this step, as the last one went on
+        s[z + TORQUE] = torque + conducting * k / hot * s[z + VOLTS] + less * ahead
         s[z + SIDE_LIMIT] = p[w + DRAG] * s[z + WHEEL_LOAD]
 
 

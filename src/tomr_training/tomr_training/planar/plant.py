@@ -62,7 +62,7 @@ class Motion:
         Returns power of the drivers [W], (k, 3), and the supply's voltage [V], (k,).
         """
         count = len(time)
-        kinds = [(batch.POWER, wheel) for wheel in range(WHEELS)] + [(batch.VOLTAGE, 0)]
+        kinds = [(batch.POWER, wheel) for wheel in range(WHEELS)] + [(batch.SUPPLY_VOLTAGE, 0)]
         rows = [(*kind, k * count, (k + 1) * count) for k, kind in enumerate(kinds)]
         readout = Readout(
             np.array(rows), np.tile(time, len(kinds)), np.full(count * len(kinds), span)
