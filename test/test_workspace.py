@@ -30,6 +30,7 @@ LIBRARIES = {
     "jinja2": ("python3-jinja2", "Jinja2"),
     "matplotlib": ("python3-matplotlib", "matplotlib"),
     "mujoco": ("python3-mujoco-pip", "mujoco"),
+    "numba": ("python3-numba", "numba"),
     "numpy": ("python3-numpy", "numpy"),
     "pytest": ("python3-pytest", "pytest"),
     "rich": ("python3-rich", "rich"),
