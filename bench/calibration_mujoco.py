@@ -20,7 +20,6 @@ from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS
-from tomr_fault_diag.training.drives import every_value
 from tomr_power_model.calibrate_cli import main as tomr_calibrate
 from tomr_power_model.calibration.problem import modelled_power
 from tomr_power_model.calibration.samples import samples_of
@@ -31,6 +30,7 @@ from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import Robot, load_robot
 from tomr_sim_bridge.missions import drive, load_mission, start_mission
 from tomr_sim_bridge.plant.samples import build
+from tomr_training.drives import every_value
 
 Array = NDArray[np.float64]
 

@@ -106,6 +106,7 @@ class Variant:
 class Steps:
     """What came out of a drive, means over its m steps."""
 
+    rows: Array = field(repr=False)  # as `layout` has them, (m, output_size)
     voltage: Array  # of the supply [V], (m,)
     yaw_rate: Array  # rad/s, (m,)
     speed: Array  # of the wheels [rad/s], (m, n)
@@ -122,6 +123,7 @@ class Steps:
         rows = out.reshape(-1, at.output_size(wheels))
         own = rows[:, at.OUT_HEADER :].reshape(len(rows), wheels, at.OUT_WHEEL)
         return cls(
+            rows=rows,
             voltage=rows[:, at.OUT_VOLTAGE],
             yaw_rate=rows[:, at.OUT_YAW],
             speed=own[..., at.OUT_SPEED],
@@ -223,6 +225,18 @@ def drive(variant: Variant, excitation: Excitation, wheels: int = 3) -> Steps:
     dynamics.begin(numbers, state, scratch[1], scratch[2], wheels)
     dynamics.run(numbers, state, excitation.inputs, extra, variant.late, out, scratch[0], wheels)
     return Steps.of(out, wheels)
+
+
+def shown(
+    variant: Variant, excitation: Excitation, steps: Steps, readout: Readout, wheels: int = 3
+) -> Array:
+    """Values that the sensors show of a drive, (rows,); without the variant's `later`."""
+    found = np.empty(len(readout.time))
+    work = np.empty((3, len(steps.rows) + 1))
+    given, start = variant.numbers, excitation.start
+    rows, time, span = readout.channels, readout.time, readout.span
+    compiled().read(given, steps.rows, start, 0.0, rows, time, span, found, work, wheels)
+    return found
 
 
 def _mapped(

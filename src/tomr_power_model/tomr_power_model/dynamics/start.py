@@ -15,6 +15,7 @@ from tomr_power_model.dynamics.layout import (
     INTEGRAL,
     INTEGRAL_GAIN,
     LOAD,
+    MEAN,
     MEASURED,
     MOTION_ACCELERATION,
     MOTION_ANGLE,
@@ -61,7 +62,8 @@ def begin(p: Numbers, s: Mutable, motion: Mutable, power: Mutable, n: int) -> No
         for k in range(3):
             speed += p[w + ROLL + k] * s[TWIST + k]
             change += p[w + ROLL + k] * s[RATE + k]
-        s[z + SPEED], s[z + MEASURED], s[z + RISE] = speed, speed, p[w + INITIAL_RISE]
+        s[z + SPEED], s[z + MEASURED], s[z + MEAN] = speed, speed, speed
+        s[z + RISE] = p[w + INITIAL_RISE]
         s[z + WHEEL_LOAD], s[z + TURNED], s[z + COUNTED] = p[w + LOAD], 0.0, 0.0
         motion[a + MOTION_SPEED], motion[a + MOTION_ACCELERATION] = speed, change
         motion[a + MOTION_ANGLE], motion[a + MOTION_RESISTING] = s[z + ANGLE], 0.0

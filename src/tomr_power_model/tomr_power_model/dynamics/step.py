@@ -289,7 +289,8 @@ def torques(p: Numbers, s: Mutable, u: Numbers, n: int) -> None:
         conducting = 1.0 if u[a + CONNECTED] > 0.0 else 0.0
         # The discretised damping is that of connected, cold windings: what is less is given back.
         less = k * (k + back) * (1.0 / cold - conducting / hot)
-        s[z + TORQUE] = torque + conducting * k / hot * s[z + VOLTS] + less * speed
+        ahead = 2.0 * speed - s[z + MEAN]  # in the middle of this step, as the last one went on
+        s[z + TORQUE] = torque + conducting * k / hot * s[z + VOLTS] + less * ahead
         s[z + SIDE_LIMIT] = p[w + DRAG] * s[z + WHEEL_LOAD]
 
 
