@@ -27,6 +27,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
+from tomr_reality_gap.alignment.forward import Forward
 from tqdm import tqdm
 
 from tomr_power_model.calibration.fitted import fitted_text
@@ -35,7 +36,6 @@ from tomr_power_model.cli import run_main
 from tomr_power_model.model.scores import accuracy
 from tomr_power_model.robot import Robot, load_robot, read_description
 from tomr_reality_gap.alignment.channels import channels_of
-from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.alignment.steady import steadied
 from tomr_reality_gap.explain import explain
 from tomr_reality_gap.explanation import Comparison, Explanation

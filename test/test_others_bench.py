@@ -21,13 +21,13 @@ from others.compare import excluded, row_of, score_refit, score_sparse
 from others.library import columns_of, series_of, shape_of
 from others.refit import Fit, Refit, fitted, half_widths, knobs_of
 from others.sparse import Equation, Sparse
+from tomr_reality_gap.alignment.forward import Forward
 
 from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.cli import run_main
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import read_description, robot_from_parameters
 from tomr_reality_gap.alignment.channels import channels_of
-from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.hypotheses.knobs import Turned, turned
 

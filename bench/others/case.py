@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
+from tomr_reality_gap.alignment.forward import Forward
 
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import Channel
-from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.hypotheses.knobs import Turned
 from tomr_reality_gap.prepared import prepared

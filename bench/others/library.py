@@ -9,11 +9,11 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
+from tomr_reality_gap.alignment.forward import Forward
 
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_reality_gap.alignment.channels import Channel
-from tomr_reality_gap.alignment.forward import Forward
 
 Array = NDArray[np.float64]
 Shape = tuple[frozenset[str], frozenset[str]]

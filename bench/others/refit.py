@@ -17,9 +17,9 @@ from attrs import evolve, frozen
 from mujoco import minimize
 from numpy.typing import NDArray
 from scipy.special import stdtrit
+from tomr_reality_gap.alignment.forward import Forward
 
 from others.case import Case, nrmse, residuals
-from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.hypotheses.knobs import Knob, Turned, bounds_of, unit_of, wheel_key
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from attrs import evolve
+from tomr_reality_gap.alignment.forward import Forward
 
 from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
 from tomr_reality_gap.alignment.commands import shift_between
-from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.alignment.steady import steadied, steady
 
 

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attrs import evolve
+from tomr_reality_gap.alignment.forward import Forward, predict_all
 
 from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
-from tomr_reality_gap.alignment.forward import Forward, predict_all
 from tomr_reality_gap.alignment.response import leaps_of
 from tomr_reality_gap.explain import explain
 from tomr_reality_gap.explanation import Explanation

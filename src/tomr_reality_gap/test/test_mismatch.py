@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from attrs import evolve
+from tomr_reality_gap.alignment.forward import Forward
 
 from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.robot import shipped_robot
 from tomr_reality_gap.alignment.channels import Channel
-from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.fit.leftover import leftovers
 from tomr_reality_gap.fit.likened import likened
 from tomr_reality_gap.fit.mirrored import Mirror, beyond

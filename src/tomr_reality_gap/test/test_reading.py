@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from attrs import evolve
+from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.stretches import Timeline
 
 from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import Channel, channels_of
-from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.alignment.steady import steadied, steady
-from tomr_reality_gap.alignment.stretches import Timeline
 
 from .test_alignment import _recorded as recorded_drive
 from .test_alignment import forward  # noqa: F401 -- the fixture

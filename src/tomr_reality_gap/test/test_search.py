@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from attrs import evolve
 from scipy.stats import multivariate_normal
+from tomr_reality_gap.alignment.forward import Forward
 
 from tomr_power_model.robot import Robot, read_description
-from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.fit.linear import Gram, evidence
 from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.fit.probed import probed

@@ -5,13 +5,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from attrs import evolve
+from tomr_reality_gap.alignment.forward import Forward
 
 from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.errors import InputError
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
-from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.alignment.usable import (
     refuse_dull,
     refuse_faulty,

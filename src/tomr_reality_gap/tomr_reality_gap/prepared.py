@@ -1,6 +1,6 @@
 """From files to what can be compared: recordings read, checked, aligned, and simulated alike."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,18 +16,19 @@ from tomr_power_model.recordings import open_recording, resolve_topic
 from tomr_power_model.robot import Robot, read_description, robot_from_parameters
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS, channels_of
 from tomr_reality_gap.alignment.commands import shift_between
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
 from tomr_reality_gap.alignment.steady import steadied
 from tomr_reality_gap.alignment.usable import refuse_dull, refuse_faulty, refuse_unfollowed, usable
 from tomr_reality_gap.fit.likened import Likened, likened
 from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.hypotheses.knobs import Turned, turned
-from tomr_reality_gap.hypotheses.scales import grips_of, scales_of
+from tomr_reality_gap.hypotheses.scales import scales_of, traction_ratios
 from tomr_reality_gap.mismatch.probes import motion_of
 from tomr_reality_gap.request import Request
 
 Array = NDArray[np.float64]
 
+INTEGRATOR = "controller.integrator"
 _WINDOW = 0.005  # s, over which power sensors average
 _SHORTEST = 10.0  # s, of all recordings together
 _SINGLE = 2.0  # s, of each
@@ -39,10 +40,10 @@ class Prepared:
 
     base: Turned  # the description, written out for each wheel
     robot: Robot  # as the drivers believe it to be
-    real: tuple[Forward, ...]
-    held: tuple[Forward, ...]
-    simulations: tuple[Forward, ...]  # of the user's
-    runs: tuple[Mapping[str, Array], ...]  # of `Forward.run` as described, of the real ones
+    real: tuple[RecordingSimulation, ...]
+    held: tuple[RecordingSimulation, ...]
+    simulations: tuple[RecordingSimulation, ...]  # of the user's
+    runs: tuple[Run, ...]  # as described, of the real ones
     scales: Scales
     notes: tuple[str, ...]
 
@@ -58,20 +59,20 @@ def prepared(request: Request) -> Prepared:
     refuse_faulty((*real, *held), robot)
     sim = _read_all((request.sim,), request, robot) if request.sim else ()
     _check_alike(real, sim, robot)
-    prompt = _is_prompt(_forward((*sim, *real)[0], robot))
-    forwards, held_out, simulations = (
-        tuple(evolve(_forward(item, robot), prompt=prompt) for item in group)
-        for group in (real, held, sim)
+    base = base.given({INTEGRATOR: _integrator(_simulation((*sim, *real)[0], robot))})
+    robot = evolve(robot, controller=base.robot.controller)
+    recordings, held_out, simulations = (
+        tuple(_simulation(item, robot) for item in group) for group in (real, held, sim)
     )
-    runs = tuple(item.run(base.robot) for item in forwards)
-    refuse_unfollowed(forwards, runs)
-    scales = _scales(forwards, runs, robot)
+    runs = tuple(item.run(base.robot) for item in recordings)
+    refuse_unfollowed(recordings, runs)
+    scales = _scales(recordings, runs, robot)
     alike = likened(simulations, base.robot, scales.torque)
     notes = [note for item in (*real, *held) for note in item.notes]
     return Prepared(
         base=base,
         robot=robot,
-        real=tuple(_with(alike, item, base.robot) for item in forwards),
+        real=tuple(_with(alike, item, base.robot) for item in recordings),
         held=tuple(_with(alike, item, base.robot) for item in held_out),
         simulations=tuple(_with(alike, item, base.robot) for item in simulations),
         runs=runs,
@@ -143,36 +144,35 @@ def _refuse_short(real: tuple[Recorded, ...]) -> None:
         )
 
 
-def _forward(recorded: Recorded, robot: Robot) -> Forward:
+def _simulation(recorded: Recorded, robot: Robot) -> RecordingSimulation:
     even, jitters = steadied(recorded)
-    return Forward.of(even, robot, channels_of(even, robot, _WINDOW, jitters))
+    return RecordingSimulation.of(even, robot, channels_of(even, robot, _WINDOW, jitters))
 
 
-def _with(alike: Likened | None, forward: Forward, robot: Robot) -> Forward:
+def _with(
+    alike: Likened | None, simulation: RecordingSimulation, robot: Robot
+) -> RecordingSimulation:
     """The recording, simulated with what the user's simulation resists beyond ours."""
     if alike is None:
-        return forward
-    motion = motion_of(forward, robot, forward.run(robot))
-    return evolve(forward, resisting=alike.torque(motion))
+        return simulation
+    motion = motion_of(simulation, robot, simulation.run(robot))
+    return evolve(simulation, resisting=alike.torque(motion))
 
 
-def _is_prompt(forward: Forward) -> bool:
+def _integrator(simulation: RecordingSimulation) -> str:
     """Whether the drivers add the present error before they use the sum: which fits better.
 
-    The contract leaves it open; it counts as much as a few percent of the proportional gain.
+    It counts as much as a few percent of the proportional gain.
     """
-    errors = []
-    for prompt in (False, True):
-        value = evolve(forward, prompt=prompt).predict([forward.robot])[0]
-        parts = zip(forward.channels, rows_of(forward.channels), strict=True)
-        errors.append(
-            sum(
-                float(np.mean(np.abs(channel.value - value[part])))
-                for channel, part in parts
-                if channel.kind == "speed"
-            )
-        )
-    return errors[1] < errors[0]
+    ways = ("forward", "backward")
+    given = simulation.robot
+    robots = [evolve(given, controller=evolve(given.controller, integrator=way)) for way in ways]
+    errors = dict.fromkeys(ways, 0.0)
+    for way, value in zip(ways, simulation.predict(robots), strict=True):
+        for channel, part in zip(simulation.channels, rows_of(simulation.channels), strict=True):
+            if channel.kind == "speed":
+                errors[way] += float(np.mean(np.abs(channel.value - value[part])))
+    return min(ways, key=errors.__getitem__)
 
 
 def _check_alike(real: tuple[Recorded, ...], sim: tuple[Recorded, ...], robot: Robot) -> None:
@@ -189,39 +189,44 @@ def _check_alike(real: tuple[Recorded, ...], sim: tuple[Recorded, ...], robot: R
             )
 
 
-def _sim_notes(simulations: Sequence[Forward], alike: Likened | None) -> tuple[str, ...]:
+def _sim_notes(
+    simulations: Sequence[RecordingSimulation], alike: Likened | None
+) -> tuple[str, ...]:
     """How far the given simulation and the one used here agree."""
     notes = []
-    for forward in simulations:
-        value = forward.predict([forward.robot])[0]
-        rows = rows_of(forward.channels)
+    for simulation in simulations:
+        value = simulation.predict([simulation.robot])[0]
+        rows = rows_of(simulation.channels)
         errors = [
             float(np.std(channel.value - value[part]) / max(np.std(channel.value), 1e-9))
-            for channel, part in zip(forward.channels, rows, strict=True)
+            for channel, part in zip(simulation.channels, rows, strict=True)
             if channel.kind in DRAWN_KINDS
         ]
         more = "" if alike is None else "; what it resists more is taken off"
         notes.append(
-            f"{forward.recorded.name}: the simulation that the findings rest on differs from it by "
-            f"an NRMSE of {max(errors):.3f} in what it draws{more}"
+            f"{simulation.recorded.name}: the simulation that the findings rest on differs from "
+            f"it by an NRMSE of {max(errors):.3f} in what it draws{more}"
         )
     return tuple(notes)
 
 
 def _scales(
-    forwards: Sequence[Forward], runs: Sequence[Mapping[str, Array]], robot: Robot
+    simulations: Sequence[RecordingSimulation], runs: Sequence[Run], robot: Robot
 ) -> Scales:
     joined = {
-        name: np.concatenate([run[name] for run in runs]) for name in ("speed", "power", "copper")
+        name: np.concatenate([getattr(run, name) for run in runs])
+        for name in ("speed", "power", "copper")
     }
-    duration = max(item.timeline.count * item.timeline.period for item in forwards)
-    channels = [channel for item in forwards for channel in item.channels]
+    duration = max(item.timeline.count * item.timeline.period for item in simulations)
+    channels = [channel for item in simulations for channel in item.channels]
     currents = [channel.value for channel in channels if channel.kind == "current"]
     scales = scales_of(
         robot, joined["speed"], joined["power"], joined["copper"], duration, currents
     )
-    grips = [
-        grips_of(robot, run["speed"], item.timeline.period)
-        for item, run in zip(forwards, runs, strict=True)
+    ratios = [
+        traction_ratios(robot, run.speed, item.timeline.period)
+        for item, run in zip(simulations, runs, strict=True)
     ]
-    return evolve(scales, traction_ratios=tuple(max(levels) for levels in zip(*grips, strict=True)))
+    return evolve(
+        scales, traction_ratios=tuple(max(levels) for levels in zip(*ratios, strict=True))
+    )

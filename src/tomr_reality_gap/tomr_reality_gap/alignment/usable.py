@@ -2,7 +2,7 @@
 that never meet. None of that is physics which a simulation leaves out.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from attrs import evolve
@@ -14,7 +14,7 @@ from tomr_power_model.calibration.checks import SENSOR_CHECKS, measured_speed, r
 from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import Robot
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
 
 Array = NDArray[np.float64]
 
@@ -82,24 +82,20 @@ def refuse_dull(recordings: Sequence[Recorded]) -> None:
         )
 
 
-def refuse_unfollowed(
-    forwards: Sequence[Forward], simulated: Sequence[Mapping[str, Array]]
-) -> None:
+def refuse_unfollowed(simulations: Sequence[RecordingSimulation], simulated: Sequence[Run]) -> None:
     """Raise InputError for a wheel that does not turn as the commands make it: a lost driver or
     encoder, or commands that were not those.
 
     Args:
-        forwards: the recordings.
-        simulated: of `Forward.run` as described, of each.
+        simulations: the recordings.
+        simulated: of `RecordingSimulation.run` as described, of each.
     """
-    for item, run in zip(forwards, simulated, strict=True):
-        line = item.timeline
-        middle = line.start + line.period * (np.arange(line.count) + 0.5)
+    for item, run in zip(simulations, simulated, strict=True):
         for channel in item.channels:
             if channel.kind != "speed" or channel.wheel is None or len(channel.time) < 2:
                 continue
             time = channel.time - 0.5 * channel.span
-            expected = np.interp(time, middle, run["speed"][:, channel.wheel])
+            expected = np.interp(time, item.timeline.middle, run.speed[:, channel.wheel])
             width = _COMPARED / float(np.median(np.diff(time)))
             error = gaussian_filter1d((channel.value - expected) ** 2, width)
             level = gaussian_filter1d(np.maximum(expected**2, channel.value**2), width)

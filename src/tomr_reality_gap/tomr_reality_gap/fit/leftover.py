@@ -138,7 +138,7 @@ def _shape(
     covariance: Array,
     rows: Array,
 ) -> Shape:
-    names = study.forwards[0].robot.wheel_names
+    names = study.simulations[0].robot.wheel_names
     if family.is_periodic:
         at = np.linspace(0.0, 2.0 * np.pi, _POINTS)
     else:
@@ -182,7 +182,7 @@ def still_needed(
         lacking = residual + (simulated[0] - without) * weight
         needed.append(whole - _likelihood(both, lacking, rest) > least)
     return [
-        wanted and not _contradicts(leftover, hypothesis, study.forwards[0].robot)
+        wanted and not _contradicts(leftover, hypothesis, study.simulations[0].robot)
         for wanted, hypothesis in zip(needed, fitted.model.hypotheses, strict=True)
     ]
 

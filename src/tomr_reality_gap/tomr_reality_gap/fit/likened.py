@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.linear import Gram, solve
 from tomr_reality_gap.fit.noise import Local, noise_of, rows_of
 from tomr_reality_gap.fit.probed import probed
@@ -39,7 +39,9 @@ class Likened:
         return np.asarray(np.einsum("wk,knw->nw", self.turns, bumps))
 
 
-def likened(simulations: Sequence[Forward], robot: Robot, torque: float) -> Likened | None:
+def likened(
+    simulations: Sequence[RecordingSimulation], robot: Robot, torque: float
+) -> Likened | None:
     """What simulations of a robot show beyond ours; None if that is next to nothing.
 
     Args:

@@ -51,7 +51,7 @@ def probed(
         orders: at which its power swings with wheel angles [1/rev].
         only: names of variables; None: all.
     """
-    motions = [motion_of(item, robot, item.run(robot)) for item in study.forwards]
+    motions = [motion_of(item, robot, item.run(robot)) for item in study.simulations]
     tried = tuple(
         family for family in families(motions, orders) if only is None or family.variable in only
     )

@@ -1,6 +1,6 @@
 """Recordings to be explained, as numbers: residuals and derivatives by every knob."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from attrs import evolve, field, frozen
@@ -8,7 +8,12 @@ from numpy.typing import NDArray
 
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS, Channel
-from tomr_reality_gap.alignment.forward import Forward, predict_all, respond_all
+from tomr_reality_gap.alignment.simulation import (
+    RecordingSimulation,
+    Tick,
+    predict_all,
+    respond_all,
+)
 from tomr_reality_gap.hypotheses.knobs import Hypothesis, Knob, Turned
 
 Array = NDArray[np.float64]
@@ -24,34 +29,34 @@ _GYRO_SCALE = 0.01
 class Study:
     """All recordings together; rows are the channels of one after another."""
 
-    forwards: tuple[Forward, ...]
+    simulations: tuple[RecordingSimulation, ...]
     channels: tuple[Channel, ...] = field(init=False)
     value: Array = field(init=False)  # measured, (n,)
 
     def __attrs_post_init__(self) -> None:
-        channels = tuple(channel for item in self.forwards for channel in item.channels)
+        channels = tuple(channel for item in self.simulations for channel in item.channels)
         object.__setattr__(self, "channels", channels)
         object.__setattr__(self, "value", np.concatenate([item.value for item in channels]))
 
     def predict(
         self,
         robots: Sequence[Robot],
-        tick: Callable[[int], None] = lambda done: None,
         later: Sequence[float] = (),
+        tick: Tick = lambda done: None,
     ) -> Array:
-        """As `Forward.predict`, of all recordings' channels, (v + l, n)."""
-        return predict_all(self.forwards, robots, tick, later)
+        """As `RecordingSimulation.predict`, of all recordings' channels, (v + l, n)."""
+        return predict_all(self.simulations, robots, later, tick)
 
     def sloped(
-        self, robots: Sequence[Robot], tick: Callable[[int], None] = lambda done: None
+        self, robots: Sequence[Robot], tick: Tick = lambda done: None
     ) -> tuple[Array, Array]:
         """Values for each robot, (v, n), and the derivative of the first's in time, (n,)."""
-        values = self.predict(robots, tick, (_DELAY_STEP,))
+        values = self.predict(robots, (_DELAY_STEP,), tick)
         return values[:-1], np.asarray((values[0] - values[-1]) / _DELAY_STEP)
 
     def respond(self, robot: Robot, torques: Sequence[Array]) -> Array:
-        """As `Forward.respond`, torques one array (v, count, 3) per recording."""
-        return respond_all(self.forwards, robot, torques)
+        """As `RecordingSimulation.respond`, torques one array (v, count, 3) per recording."""
+        return respond_all(self.simulations, robot, torques)
 
     def instruments(self, value: Array, slope: Array) -> Array:
         """Columns of what instruments may be off, in units of their beliefs, (n, k).
@@ -66,7 +71,7 @@ class Study:
             column[part] = change[part]
             columns.append(column)
 
-        for item in self.forwards:
+        for item in self.simulations:
             size = sum(len(channel.time) for channel in item.channels)
             add(slice(row, row + size), -_DELAY_SPREAD * slope)
             for channel in item.channels:
@@ -174,7 +179,7 @@ def columns_at(
     study: Study,
     model: Model,
     candidates: Sequence[Hypothesis],
-    tick: Callable[[int], None] = lambda done: None,
+    tick: Tick = lambda done: None,
     before: Columns | None = None,
 ) -> Columns:
     """Derivatives by everything that a model and its possible additions can turn.
