@@ -57,7 +57,7 @@ def smallest(evidence: Evidence) -> tuple[tuple[str, str, str], ...]:
     step = evidence.found.rounds[-1]
     columns: Columns = step.columns
     weight = step.noise.weight
-    gram = Gram.of(columns.matrix * weight[:, None], np.zeros(len(weight)))
+    gram = Gram.of(columns.matrix, np.zeros(len(weight)), weight)
     base = list(range(columns.instruments.stop))
     inverse = solve(gram, base).covariance
     found: dict[str, tuple[float, Hypothesis, Knob]] = {}

@@ -22,7 +22,7 @@ from tomr_reality_gap.alignment.usable import refuse_dull, refuse_faulty, refuse
 from tomr_reality_gap.fit.likened import Likened, likened
 from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.hypotheses.knobs import Turned, turned
-from tomr_reality_gap.hypotheses.scales import scales_of, traction_ratios
+from tomr_reality_gap.hypotheses.scales import scales_of, traction_ratios_of
 from tomr_reality_gap.mismatch.probes import motion_of
 from tomr_reality_gap.request import Request
 
@@ -224,7 +224,7 @@ def _scales(
         robot, joined["speed"], joined["power"], joined["copper"], duration, currents
     )
     ratios = [
-        traction_ratios(robot, run.speed, item.timeline.period)
+        traction_ratios_of(robot, run.speed, item.timeline.period)
         for item, run in zip(simulations, runs, strict=True)
     ]
     return evolve(

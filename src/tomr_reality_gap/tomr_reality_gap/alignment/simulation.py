@@ -147,7 +147,7 @@ class RecordingSimulation:
 
         The last l rows are those of the first robot, did it respond later by so much [s].
         """
-        return predict_all((self,), robots, later)
+        return predict_all((self,), robots, later=later)
 
     def predicted(
         self, robots: Sequence[Robot], later: Sequence[float], tick: Tick
@@ -219,8 +219,8 @@ class RecordingSimulation:
 def predict_all(
     simulations: Sequence[RecordingSimulation],
     robots: Sequence[Robot],
-    later: Sequence[float] = (),
     tick: Tick = lambda done: None,
+    later: Sequence[float] = (),
 ) -> Array:
     """As `RecordingSimulation.predict`, of recordings one after another, (v + l, n)."""
     found = np.empty((len(robots) + len(later), sum(item.size for item in simulations)))

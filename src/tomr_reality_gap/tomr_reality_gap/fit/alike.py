@@ -62,10 +62,10 @@ def _told(study: Study, last: Round, number: int) -> dict[str, _Told]:
     first = sum(sizes[:number])
     rows = slice(first, first + sizes[number])
     kept = columns.instruments.stop + sum(part.stop - part.start for part in columns.own)
-    matrix = columns.matrix[rows, :kept] * weight[rows, None]
+    matrix = columns.matrix[rows, :kept].astype(np.float64)
     matrix[:, columns.nuisance] *= _BEYOND
-    residual = (study.value[rows] - columns.value[rows]) * weight[rows]
-    found = solve(Gram.of(matrix, residual), range(kept))
+    residual = study.value[rows] - columns.value[rows]
+    found = solve(Gram.of(matrix, residual, weight[rows]), range(kept))
     values = columns.model.described.values
     told = {}
     for row, knob in enumerate(columns.model.nuisances):

@@ -59,7 +59,7 @@ def likened(
     weight = noise_of(study.channels, residual, nothing, values[0], slope, local).weight
     fitted = [
         solve(
-            Gram.of(item.matrix * weight[item.rows, None], residual[item.rows] * weight[item.rows]),
+            Gram.of(item.matrix, residual[item.rows], weight[item.rows]),
             range(item.matrix.shape[1]),
         )
         for item in local

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.leftover import Leftover
-from tomr_reality_gap.fit.linear import Gram, solve
+from tomr_reality_gap.fit.linear import Gram, Matrix, solve
 from tomr_reality_gap.fit.noise import Noise, rows_of
 from tomr_reality_gap.fit.probed import Probed, own_rows
 from tomr_reality_gap.fit.refine import Tick, refine
@@ -99,8 +99,8 @@ class Mirror:
         ]
         return float(both[0] @ both[1]) > _HALF * float(both[1] @ both[1])
 
-    def _fitted(self, columns: Array) -> Array:
-        gram = Gram.of(columns * self.weight[:, None], self.residual * self.weight)
+    def _fitted(self, columns: Matrix) -> Array:
+        gram = Gram.of(columns, self.residual, self.weight)
         return solve(gram, range(columns.shape[1])).mean
 
 

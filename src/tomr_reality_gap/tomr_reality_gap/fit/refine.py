@@ -136,7 +136,7 @@ def _points(study: Study, models: Sequence[Model], tick: Tick) -> list[tuple[Arr
         sizes.append(
             np.array([knob.spread / step for knob, step in zip(model.own, steps, strict=True)])
         )
-    values = study.predict(robots, tick=tick)
+    values = study.predict(robots, tick)
     found, at = [], 0
     for size in sizes:
         part = values[at : (at := at + 1 + len(size))]

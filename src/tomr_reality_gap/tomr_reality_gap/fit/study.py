@@ -14,6 +14,7 @@ from tomr_reality_gap.alignment.simulation import (
     predict_all,
     respond_all,
 )
+from tomr_reality_gap.fit.linear import Matrix
 from tomr_reality_gap.hypotheses.knobs import Hypothesis, Knob, Turned
 
 Array = NDArray[np.float64]
@@ -41,17 +42,17 @@ class Study:
     def predict(
         self,
         robots: Sequence[Robot],
-        later: Sequence[float] = (),
         tick: Tick = lambda done: None,
+        later: Sequence[float] = (),
     ) -> Array:
         """As `RecordingSimulation.predict`, of all recordings' channels, (v + l, n)."""
-        return predict_all(self.simulations, robots, later, tick)
+        return predict_all(self.simulations, robots, tick, later)
 
     def sloped(
         self, robots: Sequence[Robot], tick: Tick = lambda done: None
     ) -> tuple[Array, Array]:
         """Values for each robot, (v, n), and the derivative of the first's in time, (n,)."""
-        values = self.predict(robots, (_DELAY_STEP,), tick)
+        values = self.predict(robots, tick, (_DELAY_STEP,))
         return values[:-1], np.asarray((values[0] - values[-1]) / _DELAY_STEP)
 
     def respond(self, robot: Robot, torques: Sequence[Array]) -> Array:
@@ -168,7 +169,7 @@ class Columns:
     model: Model
     value: Array  # simulated, (n,)
     slope: Array  # in time, (n,)
-    matrix: Array  # (n, p): nuisances, instruments, the model's own, candidates
+    matrix: Matrix  # (n, p): nuisances, instruments, the model's own, candidates
     nuisance: slice
     instruments: slice
     own: tuple[slice, ...]  # of each of the model's hypotheses
@@ -204,20 +205,23 @@ def columns_at(
             knobs.append(knob)
     values, slope = study.sloped(robots, tick)
     spread = np.array([knob.spread for knob in knobs])
-    matrix = ((values[1:] - values[0]).T / np.array(steps)) * spread
-    instruments = study.instruments(values[0], slope)
+    changes, value = values[1:], values[0].copy()
+    changes -= value
+    changes *= (spread / np.array(steps))[:, None]
+    instruments = study.instruments(value, slope)
     first = len(model.nuisances)
     own = len(model.own)
+    nuisance: Matrix
     if before is None:
         nuisance, mine, others = (
-            matrix[:, :first],
-            matrix[:, first : first + own],
-            matrix[:, first + own :],
+            changes[:first],
+            changes[first : first + own],
+            changes[first + own :],
         )
     else:
-        nuisance, mine = before.matrix[:, before.nuisance], matrix
-        rows = [before.matrix[:, before.candidates[item.key]] for item in candidates]
-        others = np.concatenate(rows, axis=1) if rows else np.empty((len(slope), 0))
+        nuisance, mine = before.matrix[:, before.nuisance].T, changes
+        rows = [before.matrix[:, before.candidates[item.key]].T for item in candidates]
+        others = np.concatenate(rows) if rows else np.empty((0, len(slope)))
     edge = first + instruments.shape[1]
     parts, found = [], {}
     for hypothesis in model.hypotheses:
@@ -227,9 +231,9 @@ def columns_at(
         found[candidate.key] = slice(edge, edge := edge + sizes)
     return Columns(
         model,
-        values[0],
+        value,
         slope,
-        np.concatenate([nuisance, instruments, mine, others], axis=1),
+        np.concatenate([nuisance, instruments.T, mine, others], dtype=np.float32).T,
         slice(0, first),
         slice(first, first + instruments.shape[1]),
         tuple(parts),

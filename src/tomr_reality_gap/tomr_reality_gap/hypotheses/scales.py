@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 _PARTS = (1.0, 0.8, 0.64, 0.51, 0.41, 0.33, 0.26)  # of what the contacts carry at most
 
 
-def traction_ratios(robot: Robot, speed: Array, period: float) -> tuple[float, ...]:
+def traction_ratios_of(robot: Robot, speed: Array, period: float) -> tuple[float, ...]:
     """The largest traction over load of any wheel that rolls, and parts of it, falling.
 
     Args:
