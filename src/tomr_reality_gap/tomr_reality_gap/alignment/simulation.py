@@ -150,7 +150,7 @@ class RecordingSimulation:
         return predict_all((self,), robots, later=later)
 
     def predicted(
-        self, robots: Sequence[Robot], later: Sequence[float], tick: Tick
+        self, robots: Sequence[Robot], tick: Tick, later: Sequence[float]
     ) -> Iterator[Array]:
         """The rows of `predict` one by one."""
         variants = [
@@ -224,7 +224,7 @@ def predict_all(
 ) -> Array:
     """As `RecordingSimulation.predict`, of recordings one after another, (v + l, n)."""
     found = np.empty((len(robots) + len(later), sum(item.size for item in simulations)))
-    _filled(found, [item.predicted(robots, later, tick) for item in simulations])
+    _filled(found, [item.predicted(robots, tick, later) for item in simulations])
     return found
 
 

@@ -53,10 +53,10 @@ def likened(
         return None
     study = Study(tuple(simulations))
     nameless = probed(study, robot, torque, only=_VARIABLES)
-    values, slope = study.sloped([robot])
-    residual, nothing = study.value - values[0], np.zeros((len(study.value), 1))
+    value, slope, _ = study.sloped(robot, (), np.empty(0))
+    residual, nothing = study.value - value, np.zeros((len(study.value), 1))
     local = nameless.local
-    weight = noise_of(study.channels, residual, nothing, values[0], slope, local).weight
+    weight = noise_of(study.channels, residual, nothing, value, slope, local).weight
     fitted = [
         solve(
             Gram.of(item.matrix, residual[item.rows], weight[item.rows]),

@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dpstrf
 from scipy.optimize import nnls
 
 from tomr_reality_gap.alignment.channels import Channel
@@ -76,6 +77,7 @@ def noise_of(
         variance[part] = _scale(residual[part], channel.quantum) ** 2
     times = np.ones(len(rows))
     outlier = np.ones_like(residual)
+    columns = columns[:, _distinct(columns, _weight(rows, variance, times, outlier))]
     for _ in range(_ROUNDS):
         weight = _weight(rows, variance, times, outlier)
         left = _left(columns, residual, weight, local)
@@ -94,6 +96,13 @@ def _weight(rows: Sequence[slice], variance: Array, times: Array, outlier: Array
     for part, time in zip(rows, times, strict=True):
         weight[part] /= np.sqrt(time)
     return weight
+
+
+def _distinct(columns: Matrix, weight: Array) -> NDArray[np.intp]:
+    """Columns of which the others leave more than nothing (pivoted Cholesky)."""
+    gram = Gram.of(columns, np.zeros_like(weight), weight)
+    _, pivots, rank, _ = dpstrf(gram.matrix, tol=_RIDGE)
+    return np.sort(pivots[:rank] - 1)
 
 
 def _left(columns: Matrix, residual: Array, weight: Array, local: Sequence[Local]) -> Array:

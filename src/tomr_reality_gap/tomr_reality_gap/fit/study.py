@@ -49,11 +49,26 @@ class Study:
         return predict_all(self.simulations, robots, tick, later)
 
     def sloped(
-        self, robots: Sequence[Robot], tick: Tick = lambda done: None
-    ) -> tuple[Array, Array]:
-        """Values for each robot, (v, n), and the derivative of the first's in time, (n,)."""
-        values = self.predict(robots, tick, (_DELAY_STEP,))
-        return values[:-1], np.asarray((values[0] - values[-1]) / _DELAY_STEP)
+        self, robot: Robot, others: Sequence[Robot], scale: Array, tick: Tick = lambda done: None
+    ) -> tuple[Array, Array, NDArray[np.float32]]:
+        """Values of a robot, their derivative in time, (n,) each, and what others change in them.
+
+        Args:
+            robot: the robot.
+            others: others.
+            scale: what each of them changes is multiplied by this, (v,).
+            tick: called for each simulated robot.
+        """
+        value, slope, first = np.empty_like(self.value), np.empty_like(self.value), 0
+        changes = np.empty((len(others), len(value)), dtype=np.float32)
+        for item in self.simulations:
+            part = slice(first, first := first + item.size)
+            shown = item.predicted([robot, *others], tick, (_DELAY_STEP,))
+            value[part] = next(shown)
+            for row in range(len(others)):
+                changes[row, part] = (next(shown) - value[part]) * scale[row]
+            slope[part] = (value[part] - next(shown)) / _DELAY_STEP
+        return value, slope, changes
 
     def respond(self, robot: Robot, torques: Sequence[Array]) -> Array:
         """As `RecordingSimulation.respond`, torques one array (v, count, 3) per recording."""
@@ -189,7 +204,7 @@ def columns_at(
     little from one model to the next, and cost most.
     """
     described = model.described
-    robots: list[Robot] = [described.robot]
+    robots: list[Robot] = []
     knobs: list[Knob] = list(model.own)
     if before is None:
         knobs = [*model.nuisances, *model.own]
@@ -203,15 +218,14 @@ def columns_at(
             robots.append(started.by([knob], [knob.first_step]).robot)
             steps.append(knob.first_step)
             knobs.append(knob)
-    values, slope = study.sloped(robots, tick)
-    spread = np.array([knob.spread for knob in knobs])
-    changes, value = values[1:], values[0].copy()
-    changes -= value
-    changes *= (spread / np.array(steps))[:, None]
+    scale = np.array([knob.spread for knob in knobs]) / np.array(steps)
+    value, slope, changes = study.sloped(described.robot, robots, scale, tick)
     instruments = study.instruments(value, slope)
     first = len(model.nuisances)
     own = len(model.own)
     nuisance: Matrix
+    mine: Matrix
+    others: Matrix
     if before is None:
         nuisance, mine, others = (
             changes[:first],
