@@ -5,13 +5,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from attrs import evolve
-from tomr_reality_gap.alignment.forward import Forward
 
 from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.errors import InputError
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.alignment.usable import (
     refuse_dull,
     refuse_faulty,
@@ -20,7 +20,7 @@ from tomr_reality_gap.alignment.usable import (
 )
 
 from .test_alignment import _recorded as recorded_drive
-from .test_alignment import forward  # noqa: F401 -- the fixture
+from .test_alignment import simulation  # noqa: F401 -- the fixture
 
 Changed = Callable[[Recorded], Recorded]
 
@@ -111,7 +111,7 @@ def test_a_recording_that_begins_in_motion_begins_later(recorded: Recorded, robo
     assert found.power_time[0] > 1.0
     assert found.command_time[0] < -10.0
     np.testing.assert_array_equal(found.command[0], found.command[1])
-    made = Forward.of(found, robot, channels_of(found, robot, 0.005))
+    made = RecordingSimulation.of(found, robot, channels_of(found, robot, 0.005))
     refuse_unfollowed([made], [made.run(robot)])
     assert "it begins in motion" in found.notes[0]
 
@@ -164,30 +164,30 @@ def test_faulty_sensors_and_other_robots_are_refused(
 
 
 def test_commands_that_are_not_those_of_the_drive_are_refused(
-    forward: Forward,  # noqa: F811
+    simulation: RecordingSimulation,  # noqa: F811
 ) -> None:
-    run = forward.run(forward.robot)
-    refuse_unfollowed([forward], [run])
-    kept = forward.recorded.command_time < 20.0
+    run = simulation.run(simulation.robot)
+    refuse_unfollowed([simulation], [run])
+    kept = simulation.recorded.command_time < 20.0
     lost = evolve(
-        forward.recorded,
-        command_time=forward.recorded.command_time[kept],
-        command=forward.recorded.command[kept] * np.array([0.0, 0.0, 1.0]),
+        simulation.recorded,
+        command_time=simulation.recorded.command_time[kept],
+        command=simulation.recorded.command[kept] * np.array([0.0, 0.0, 1.0]),
     )
-    deaf = Forward.of(lost, forward.robot, forward.channels)
+    deaf = RecordingSimulation.of(lost, simulation.robot, simulation.channels)
     with pytest.raises(InputError, match=r"wheel_1_joint, .*it does not follow its command"):
         refuse_unfollowed([deaf], [deaf.run(deaf.robot)])
 
 
-def test_a_slow_loop_is_no_fault(forward: Forward) -> None:  # noqa: F811
+def test_a_slow_loop_is_no_fault(simulation: RecordingSimulation) -> None:  # noqa: F811
     """Half a second behind its commands: that is for the explanation to say."""
-    late = evolve(forward.recorded, command_time=forward.recorded.command_time - 0.5)
-    slow = Forward.of(late, forward.robot, forward.channels)
+    late = evolve(simulation.recorded, command_time=simulation.recorded.command_time - 0.5)
+    slow = RecordingSimulation.of(late, simulation.robot, simulation.channels)
     refuse_unfollowed([slow], [slow.run(slow.robot)])
 
 
-def test_wheels_that_turn_backwards_are_refused(forward: Forward) -> None:  # noqa: F811
-    run = dict(forward.run(forward.robot))
-    run["speed"] = run["speed"] * np.array([1.0, -1.0, 1.0])
+def test_wheels_that_turn_backwards_are_refused(simulation: RecordingSimulation) -> None:  # noqa: F811
+    run = simulation.run(simulation.robot)
+    run = evolve(run, speed=run.speed * np.array([1.0, -1.0, 1.0]))
     with pytest.raises(InputError, match="wheel_2_joint"):
-        refuse_unfollowed([forward], [run])
+        refuse_unfollowed([simulation], [run])

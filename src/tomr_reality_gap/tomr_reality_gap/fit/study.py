@@ -224,8 +224,6 @@ def columns_at(
     first = len(model.nuisances)
     own = len(model.own)
     nuisance: Matrix
-    mine: Matrix
-    others: Matrix
     if before is None:
         nuisance, mine, others = (
             changes[:first],
@@ -235,7 +233,7 @@ def columns_at(
     else:
         nuisance, mine = before.matrix[:, before.nuisance].T, changes
         rows = [before.matrix[:, before.candidates[item.key]].T for item in candidates]
-        others = np.concatenate(rows) if rows else np.empty((0, len(slope)))
+        others = np.concatenate([changes[:0], *rows])
     edge = first + instruments.shape[1]
     parts, found = [], {}
     for hypothesis in model.hypotheses:
