@@ -165,8 +165,10 @@ class RecordingSimulation:
             robot: one robot.
             torques: of each wheel in each driver period [N m], (v, count, n).
         """
-        one, known = self._variant(robot), 0.0 if self.resisting is None else self.resisting
-        return self._shown([evolve(one, resisting=torque + known) for torque in torques])
+        one = self._variant(robot)
+        if self.resisting is not None:
+            torques = torques + self.resisting
+        return self._shown([evolve(one, resisting=torque) for torque in torques])
 
     def run(self, robot: Robot) -> Run:
         """What happens to a robot in the drive."""

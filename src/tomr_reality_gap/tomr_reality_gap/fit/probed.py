@@ -56,7 +56,7 @@ def probed(
         family for family in families(motions, orders) if only is None or family.variable in only
     )
     size = _SIZE * torque
-    torques = [np.concatenate([item.torques(one) for item in tried]) * size for one in motions]
+    torques = [np.concatenate([size * item.torques(one) for item in tried]) for one in motions]
     response = study.respond(robot, torques) - study.predict([robot])[0]
     edges = np.cumsum([0, *(len(item.knots) for item in tried)])
     parts = tuple(response[first:last].T for first, last in pairwise(edges))

@@ -224,16 +224,13 @@ def columns_at(
     first = len(model.nuisances)
     own = len(model.own)
     nuisance: Matrix
+    others: list[Matrix]
     if before is None:
-        nuisance, mine, others = (
-            changes[:first],
-            changes[first : first + own],
-            changes[first + own :],
-        )
+        nuisance, mine = changes[:first], changes[first : first + own]
+        others = [changes[first + own :]]
     else:
         nuisance, mine = before.matrix[:, before.nuisance].T, changes
-        rows = [before.matrix[:, before.candidates[item.key]].T for item in candidates]
-        others = np.concatenate([changes[:0], *rows])
+        others = [before.matrix[:, before.candidates[item.key]].T for item in candidates]
     edge = first + instruments.shape[1]
     parts, found = [], {}
     for hypothesis in model.hypotheses:
@@ -245,7 +242,7 @@ def columns_at(
         model,
         value,
         slope,
-        np.concatenate([nuisance, instruments.T, mine, others], dtype=np.float32).T,
+        np.concatenate([nuisance, instruments.T, mine, *others], dtype=np.float32).T,
         slice(0, first),
         slice(first, first + instruments.shape[1]),
         tuple(parts),
