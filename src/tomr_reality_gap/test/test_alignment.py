@@ -1,10 +1,13 @@
 """Stamps, channels and the simulation that is driven by a recording."""
 
+import os
+
 import numpy as np
 import pytest
 from attrs import evolve
 
 from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.dynamics.simulation import worker_count
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import Channel, channels_of
@@ -143,3 +146,11 @@ def test_the_shift_between_recordings_of_the_same_commands(simulation: Recording
 def test_other_commands_are_no_simulation_of_a_recording(simulation: RecordingSimulation) -> None:
     other = evolve(simulation.recorded, command=simulation.recorded.command[::-1])
     assert shift_between(simulation.recorded, other) is None
+
+
+def test_a_process_among_others_simulates_on_one_core(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dask sets the limit for linear algebra; the simulation keeps to it."""
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    assert worker_count() == 1
+    monkeypatch.delenv("OMP_NUM_THREADS")
+    assert worker_count() == len(os.sched_getaffinity(0))
