@@ -35,7 +35,7 @@ from tomr_power_model.drive.read import read_drive
 from tomr_power_model.model.scores import accuracy
 from tomr_power_model.robot import Robot, load_robot, read_description
 from tomr_reality_gap.alignment.channels import channels_of
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.explain import explain
 from tomr_reality_gap.explanation import Comparison, Explanation
 from tomr_reality_gap.mismatch.compare import comparison
@@ -203,9 +203,9 @@ def transferred(bags: Bags, surface: str, before: Path, after: Path) -> dict[str
 def _compared(path: Path, before: Robot, after: Robot) -> Comparison:
     instant = evolve(before, sensors=evolve(before.sensors, power_window=0.0))
     drive = read_drive(path, before)
-    forward = Forward.of(drive, before, channels_of(drive, instant))
-    values = forward.predict([before, after])
-    return comparison(forward, values, forward.run(after), is_held_out=True)
+    simulation = RecordingSimulation.of(drive, before, channels_of(drive, instant))
+    values = simulation.predict([before, after])
+    return comparison(simulation, values, simulation.run(after), is_held_out=True)
 
 
 def measure(dataset: Path, surfaces: Sequence[str], out: Path) -> dict[str, Any]:

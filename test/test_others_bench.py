@@ -27,7 +27,7 @@ from tomr_power_model.drive.record import Drive
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import read_description, robot_from_parameters
 from tomr_reality_gap.alignment.channels import channels_of
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.hypotheses.knobs import Turned, turned
 
@@ -43,7 +43,7 @@ def base() -> Turned:
 
 
 @pytest.fixture(scope="module")
-def forward(base: Turned) -> Forward:
+def forward(base: Turned) -> RecordingSimulation:
     """A drive in all directions, its channels not measured yet."""
     robot = base.robot
     command_time = np.arange(0.0, SECONDS, 0.05)
@@ -72,10 +72,10 @@ def forward(base: Turned) -> Forward:
         yaw_time=encoder_time,
         yaw_rate=np.zeros(len(encoder_time)),
     )
-    return Forward.of(recorded, robot, channels_of(recorded, robot))
+    return RecordingSimulation.of(recorded, robot, channels_of(recorded, robot))
 
 
-def measuring(forward: Forward, real: Turned) -> Forward:
+def measuring(forward: RecordingSimulation, real: Turned) -> RecordingSimulation:
     """What the drive would have shown, had the robot been another one."""
     random = np.random.default_rng(0)
     value = forward.predict([real.robot])[0]
@@ -98,7 +98,9 @@ def test_everything_but_settings_and_geometry_is_refitted(base: Turned) -> None:
     assert not any(name.startswith(held) for name in knobs)
 
 
-def test_a_refit_finds_parameters_that_are_wrong(base: Turned, forward: Forward) -> None:
+def test_a_refit_finds_parameters_that_are_wrong(
+    base: Turned, forward: RecordingSimulation
+) -> None:
     names = ("robot.mass", "motor.wheel_2_joint.resistance", "motor.wheel_3_joint.resistance")
     knobs = [knob for knob in knobs_of(base, WHEELS) if knob.name in names]
     off = {"robot.mass": 1.1, "motor.wheel_2_joint.resistance": 1.3}
@@ -111,7 +113,9 @@ def test_a_refit_finds_parameters_that_are_wrong(base: Turned, forward: Forward)
         assert not fit.at_bound
 
 
-def test_a_refit_stops_at_twice_the_described_value(base: Turned, forward: Forward) -> None:
+def test_a_refit_stops_at_twice_the_described_value(
+    base: Turned, forward: RecordingSimulation
+) -> None:
     knobs = [knob for knob in knobs_of(base, WHEELS) if knob.name == "robot.mass"]
     heavy = base.by(knobs, [1.4 * knobs[0].spread])
     (fit,) = fitted(measuring(forward, heavy), base, knobs)
@@ -142,7 +146,7 @@ def test_intervals_are_those_of_least_squares() -> None:
     ],
 )
 def test_an_effect_has_the_terms_that_the_library_says(
-    effect: str, values: Mapping[str, float], base: Turned, forward: Forward
+    effect: str, values: Mapping[str, float], base: Turned, forward: RecordingSimulation
 ) -> None:
     """Its own terms tell most of the power that it adds, and more with those that come along."""
     given = {f"physics.{effect}.{name}": value for name, value in values.items()}

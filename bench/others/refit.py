@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from others.case import Case, nrmse, residuals
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_power_model.robot import Robot
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.hypotheses.knobs import Knob, Turned, bounds_of, unit_of, wheel_key
 
@@ -88,9 +89,9 @@ def refit(case: Case) -> Refit:
     return Refit(fits, before, after)
 
 
-def fitted(forward: Forward, base: Turned, knobs: Sequence[Knob]) -> tuple[Fit, ...]:
+def fitted(simulation: RecordingSimulation, base: Turned, knobs: Sequence[Knob]) -> tuple[Fit, ...]:
     """Parameters that bring the simulation closest to a recording; its delay is fitted besides."""
-    measured = np.concatenate([item.value for item in forward.channels])
+    measured = np.concatenate([item.value for item in simulation.channels])
     scale = np.array([knob.spread for knob in knobs])
     bounds = [
         np.append(1.0 + [getattr(knob, side) for knob in knobs] / scale, delay)
@@ -100,18 +101,15 @@ def fitted(forward: Forward, base: Turned, knobs: Sequence[Knob]) -> tuple[Fit, 
     weight = np.ones_like(measured)
 
     def residual(points: Array) -> Array:
-        values = np.empty((points.shape[1], len(measured)))
-        for delay in np.unique(points[-1]):
-            same = points[-1] == delay
-            robots = [
-                base.by(knobs, (column[:-1] - 1.0) * scale).robot for column in points.T[same]
-            ]
-            values[same] = evolve(forward, delay=delay * _UNIT).predict(robots)
-        return np.asarray(((values - measured) * weight).T)
+        robots = [
+            _later(base.by(knobs, (column[:-1] - 1.0) * scale).robot, column[-1] * _UNIT)
+            for column in points.T
+        ]
+        return np.asarray(((simulation.predict(robots) - measured) * weight).T)
 
     for _ in range(_ROUNDS):
         left = residual(point[:, None])[:, 0] / weight
-        for part in rows_of(forward.channels):
+        for part in rows_of(simulation.channels):
             weight[part] = 1.0 / max(float(np.std(left[part])), 1e-9)
         point, log = minimize.least_squares(
             point, residual, bounds, eps=_STEP, xtol=1e-4, mu_factor=10.0, x_scale="jac",
@@ -124,6 +122,11 @@ def fitted(forward: Forward, base: Turned, knobs: Sequence[Knob]) -> tuple[Fit, 
         Fit(knob.name, knob.spread, knob.spread * x, float(width), knob.unit, bool(at))
         for knob, x, width, at in zip(knobs, point[:-1].tolist(), widths, stuck[:-1], strict=True)
     )
+
+
+def _later(robot: Robot, delay: float) -> Robot:
+    controller = robot.controller
+    return evolve(robot, controller=evolve(controller, delay=controller.delay + delay))
 
 
 def half_widths(residual: Array, jacobian: Array) -> Array:

@@ -65,7 +65,7 @@ def explained(folder: Path, effects: Mapping[str, Mapping[str, float]], wheels: 
     evidence = SimpleNamespace(
         robot=SimpleNamespace(wheel_names=WHEELS),
         source="reference",
-        study=SimpleNamespace(forwards=()),
+        study=SimpleNamespace(simulations=()),
     )
     path = folder / "robot_explained.yaml"
     path.write_text(described(evidence, Model(Turned(values, "made"), (), ())), encoding="utf-8")

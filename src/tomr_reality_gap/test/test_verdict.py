@@ -67,7 +67,7 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> Judged:
         monkeypatch.setattr(verdict, "described", lambda _, model: " ".join(model.hypotheses))
         best = SimpleNamespace(model=_Model(*names), evidence=1000.0 * len(names))
         evidence = SimpleNamespace(
-            study=SimpleNamespace(forwards=(), predict=lambda robots: robots, value=()),
+            study=SimpleNamespace(simulations=(), predict=lambda robots: robots, value=()),
             mirror=None,
             runs=(),
             simulated=(None, None),

@@ -32,5 +32,5 @@ def described(evidence: Evidence, model: Model) -> str:
                 del values[item]
     findings = ", ".join(item.name for item in model.hypotheses)
     header = [f"{evidence.source}, with what reality showed besides:", findings]
-    recordings = ", ".join(item.recorded.name for item in evidence.study.forwards)
+    recordings = ", ".join(item.recorded.name for item in evidence.study.simulations)
     return fitted_text(evidence.source, values, (), (), (), header, {"recordings": recordings})

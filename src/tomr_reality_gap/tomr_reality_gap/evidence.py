@@ -1,7 +1,6 @@
 """All that a verdict rests on, and what it could not have seen."""
 
 import math
-from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from tomr_power_model.effects.scales import Scales
 from tomr_power_model.robot import Robot
+from tomr_reality_gap.alignment.simulation import Run
 from tomr_reality_gap.fit.linear import Gram, solve
 from tomr_reality_gap.fit.mirrored import Mirror, Turns
 from tomr_reality_gap.fit.probed import Probed
@@ -46,10 +46,10 @@ class Evidence:
         return tuple(self.study.predict([self.base.robot, *robots]))
 
     @cached_property
-    def runs(self) -> tuple[Mapping[str, Array], ...]:
+    def runs(self) -> tuple[Run, ...]:
         """Motion of the best model in each recording."""
         robot = self.found.best.model.described.robot
-        return tuple(item.run(robot) for item in self.study.forwards)
+        return tuple(item.run(robot) for item in self.study.simulations)
 
 
 def smallest(evidence: Evidence) -> tuple[tuple[str, str, str], ...]:
@@ -57,7 +57,7 @@ def smallest(evidence: Evidence) -> tuple[tuple[str, str, str], ...]:
     step = evidence.found.rounds[-1]
     columns: Columns = step.columns
     weight = step.noise.weight
-    gram = Gram.of(columns.matrix * weight[:, None], np.zeros(len(weight)))
+    gram = Gram.of(columns.matrix, np.zeros(len(weight)), weight)
     base = list(range(columns.instruments.stop))
     inverse = solve(gram, base).covariance
     found: dict[str, tuple[float, Hypothesis, Knob]] = {}

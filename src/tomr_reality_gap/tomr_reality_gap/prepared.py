@@ -1,6 +1,6 @@
 """From files to what can be compared: recordings read, checked, aligned, and simulated alike."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,15 +19,17 @@ from tomr_power_model.errors import InputError
 from tomr_power_model.recordings import open_recording, resolve_topic
 from tomr_power_model.robot import Robot, read_description, robot_from_parameters
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS, channels_of
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
 from tomr_reality_gap.fit.likened import Likened, likened
 from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.hypotheses.knobs import Turned, turned
-from tomr_reality_gap.hypotheses.scales import grips_of, scales_of
+from tomr_reality_gap.hypotheses.scales import scales_of, traction_ratios_of
 from tomr_reality_gap.mismatch.probes import motion_of
 from tomr_reality_gap.request import Request
 
 Array = NDArray[np.float64]
+
+INTEGRATOR = "controller.integrator"
 
 
 @frozen
@@ -36,10 +38,10 @@ class Prepared:
 
     base: Turned  # the description, written out for each wheel
     robot: Robot  # as the drivers believe it to be
-    real: tuple[Forward, ...]
-    held: tuple[Forward, ...]
-    simulations: tuple[Forward, ...]  # of the user's
-    runs: tuple[Mapping[str, Array], ...]  # of `Forward.run` as described, of the real ones
+    real: tuple[RecordingSimulation, ...]
+    held: tuple[RecordingSimulation, ...]
+    simulations: tuple[RecordingSimulation, ...]  # of the user's
+    runs: tuple[Run, ...]  # as described, of the real ones
     scales: Scales
     notes: tuple[str, ...]
 
@@ -56,22 +58,22 @@ def prepared(request: Request) -> Prepared:
     refuse(found for item in (*real, *held) for found in sensor_faults(item, robot))
     sim = _read_all((request.sim,), request, robot) if request.sim else ()
     _check_alike(real, sim, robot)
-    values["controller.integrator"] = integrator_of(_forward((*sim, *real)[0], robot))
+    values[INTEGRATOR] = integrator_of(_simulation((*sim, *real)[0], robot))
     robot = robot_from_parameters(values, place)
     base = turned(values, robot.wheel_names, place)
-    forwards, held_out, simulations = (
-        tuple(_forward(item, robot) for item in group) for group in (real, held, sim)
+    recordings, held_out, simulations = (
+        tuple(_simulation(item, robot) for item in group) for group in (real, held, sim)
     )
-    runs = tuple(item.run(base.robot) for item in forwards)
-    for item, run in zip(forwards, runs, strict=True):
-        refuse(not_following(item.recorded, robot, item.timeline.middle, run["speed"]))
-    scales = _scales(forwards, runs, robot)
+    runs = tuple(item.run(base.robot) for item in recordings)
+    for item, run in zip(recordings, runs, strict=True):
+        refuse(not_following(item.recorded, robot, item.timeline.middle, run.speed))
+    scales = _scales(recordings, runs, robot)
     alike = likened(simulations, base.robot, scales.torque)
     notes = [note for item in (*real, *held) for note in item.notes]
     return Prepared(
         base=base,
         robot=robot,
-        real=tuple(_with(alike, item, base.robot) for item in forwards),
+        real=tuple(_with(alike, item, base.robot) for item in recordings),
         held=tuple(_with(alike, item, base.robot) for item in held_out),
         simulations=tuple(_with(alike, item, base.robot) for item in simulations),
         runs=runs,
@@ -119,36 +121,34 @@ def _read(path: Path, robot: Robot, name: str, skipped: Sequence[tuple[float, fl
     return without(cleaned(drive, robot), skipped)
 
 
-def _forward(drive: Drive, robot: Robot) -> Forward:
-    return Forward.of(drive, robot, channels_of(drive, robot))
+def _simulation(drive: Drive, robot: Robot) -> RecordingSimulation:
+    return RecordingSimulation.of(drive, robot, channels_of(drive, robot))
 
 
-def _with(alike: Likened | None, forward: Forward, robot: Robot) -> Forward:
+def _with(
+    alike: Likened | None, simulation: RecordingSimulation, robot: Robot
+) -> RecordingSimulation:
     """The recording, simulated with what the user's simulation resists beyond ours."""
     if alike is None:
-        return forward
-    motion = motion_of(forward, robot, forward.run(robot))
-    return evolve(forward, resisting=alike.torque(motion))
+        return simulation
+    motion = motion_of(simulation, robot, simulation.run(robot))
+    return evolve(simulation, resisting=alike.torque(motion))
 
 
-def integrator_of(forward: Forward) -> str:
+def integrator_of(simulation: RecordingSimulation) -> str:
     """Whether the drivers add the present error before they use the sum: which fits better.
 
     It counts as much as a few percent of the proportional gain.
     """
-    errors = {}
-    for way in ("backward", "forward"):
-        controller = evolve(forward.robot.controller, integrator=way)
-        value = evolve(forward, robot=evolve(forward.robot, controller=controller)).predict(
-            [forward.robot]
-        )[0]
-        parts = zip(forward.channels, rows_of(forward.channels), strict=True)
-        errors[way] = sum(
-            float(np.mean(np.abs(channel.value - value[part])))
-            for channel, part in parts
-            if channel.kind == "speed"
-        )
-    return min(errors, key=errors.__getitem__)
+    ways = ("forward", "backward")
+    given = simulation.robot
+    robots = [evolve(given, controller=evolve(given.controller, integrator=way)) for way in ways]
+    errors = dict.fromkeys(ways, 0.0)
+    for way, value in zip(ways, simulation.predict(robots), strict=True):
+        for channel, part in zip(simulation.channels, rows_of(simulation.channels), strict=True):
+            if channel.kind == "speed":
+                errors[way] += float(np.mean(np.abs(channel.value - value[part])))
+    return min(ways, key=errors.__getitem__)
 
 
 def _check_alike(real: tuple[Drive, ...], sim: tuple[Drive, ...], robot: Robot) -> None:
@@ -165,39 +165,44 @@ def _check_alike(real: tuple[Drive, ...], sim: tuple[Drive, ...], robot: Robot) 
             )
 
 
-def _sim_notes(simulations: Sequence[Forward], alike: Likened | None) -> tuple[str, ...]:
+def _sim_notes(
+    simulations: Sequence[RecordingSimulation], alike: Likened | None
+) -> tuple[str, ...]:
     """How far the given simulation and the one used here agree."""
     notes = []
-    for forward in simulations:
-        value = forward.predict([forward.robot])[0]
-        rows = rows_of(forward.channels)
+    for simulation in simulations:
+        value = simulation.predict([simulation.robot])[0]
+        rows = rows_of(simulation.channels)
         errors = [
             float(np.std(channel.value - value[part]) / max(np.std(channel.value), 1e-9))
-            for channel, part in zip(forward.channels, rows, strict=True)
+            for channel, part in zip(simulation.channels, rows, strict=True)
             if channel.kind in DRAWN_KINDS
         ]
         more = "" if alike is None else "; what it resists more is taken off"
         notes.append(
-            f"{forward.recorded.name}: the simulation that the findings rest on differs from it by "
-            f"an NRMSE of {max(errors):.3f} in what it draws{more}"
+            f"{simulation.recorded.name}: the simulation that the findings rest on differs from "
+            f"it by an NRMSE of {max(errors):.3f} in what it draws{more}"
         )
     return tuple(notes)
 
 
 def _scales(
-    forwards: Sequence[Forward], runs: Sequence[Mapping[str, Array]], robot: Robot
+    simulations: Sequence[RecordingSimulation], runs: Sequence[Run], robot: Robot
 ) -> Scales:
     joined = {
-        name: np.concatenate([run[name] for run in runs]) for name in ("speed", "power", "copper")
+        name: np.concatenate([getattr(run, name) for run in runs])
+        for name in ("speed", "power", "copper")
     }
-    duration = max(item.timeline.count * item.timeline.period for item in forwards)
-    channels = [channel for item in forwards for channel in item.channels]
+    duration = max(item.timeline.count * item.timeline.period for item in simulations)
+    channels = [channel for item in simulations for channel in item.channels]
     currents = [channel.value for channel in channels if channel.kind == "current"]
     scales = scales_of(
         robot, joined["speed"], joined["power"], joined["copper"], duration, currents
     )
-    grips = [
-        grips_of(robot, run["speed"], item.timeline.period)
-        for item, run in zip(forwards, runs, strict=True)
+    ratios = [
+        traction_ratios_of(robot, run.speed, item.timeline.period)
+        for item, run in zip(simulations, runs, strict=True)
     ]
-    return evolve(scales, traction_ratios=tuple(max(levels) for levels in zip(*grips, strict=True)))
+    return evolve(
+        scales, traction_ratios=tuple(max(levels) for levels in zip(*ratios, strict=True))
+    )

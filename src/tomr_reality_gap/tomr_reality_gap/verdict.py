@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tomr_power_model.calibration.priors import drive_for
 from tomr_power_model.estimation.statistics import robust_scale
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.described import described, for_users
 from tomr_reality_gap.evidence import Evidence, smallest
 from tomr_reality_gap.explanation import (
@@ -54,7 +54,7 @@ _SURE = 0.97
 
 
 def explanation_of(
-    evidence: Evidence, held: Sequence[Forward], notes: tuple[str, ...]
+    evidence: Evidence, held: Sequence[RecordingSimulation], notes: tuple[str, ...]
 ) -> Explanation:
     """The whole explanation."""
     study, found = evidence.study, evidence.found
@@ -127,13 +127,13 @@ def _comparisons(
     model: Model,
     unknown: Leftover | None,
     after: Array,
-    held: Sequence[Forward],
+    held: Sequence[RecordingSimulation],
 ) -> tuple[Comparison, ...]:
     """All recordings before and after, with what the effect without a name amounts to."""
     described, explained = evidence.base.robot, model.described.robot
     besides = unknown.torque if unknown is not None else None
     found, at = [], 0
-    for item, run in zip(evidence.study.forwards, evidence.runs, strict=True):
+    for item, run in zip(evidence.study.simulations, evidence.runs, strict=True):
         part = slice(at, at := at + sum(len(channel.time) for channel in item.channels))
         values: Array = np.stack([evidence.simulated[0][part], after[part]])
         if besides is not None:
@@ -272,7 +272,7 @@ def _variables(evidence: Evidence) -> Mapping[str, Array]:
     """Variables at all samples of all recordings."""
     parts = [
         variables_at(item, run, item.channels)
-        for item, run in zip(evidence.study.forwards, evidence.runs, strict=True)
+        for item, run in zip(evidence.study.simulations, evidence.runs, strict=True)
     ]
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
@@ -356,11 +356,11 @@ def _maps(
 def _alignment(evidence: Evidence) -> dict[str, str]:
     """What the fit found about the timing of each recording."""
     told = {}
-    for item in evidence.study.forwards:
+    for item in evidence.study.simulations:
         line = item.timeline
         told[item.recorded.name] = (
-            f"drivers' periods of {1e3 * line.period:g} ms begin {-1e3 * line.start:.2f} ms before "
-            f"the first encoder sample; {len(line.first)} stretches simulated side by side"
+            f"drivers' periods of {1e3 * line.period:g} ms begin {1e3 * line.phase:.2f} ms before "
+            "the first encoder sample"
         )
     return told
 

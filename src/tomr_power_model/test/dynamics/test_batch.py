@@ -36,7 +36,7 @@ def shown(
 
 
 @pytest.mark.parametrize(
-    "kind", ["SPEED", "POWER", "TOTAL", "VOLTAGE", "YAW", "CURRENT", "MAGNITUDE"]
+    "kind", ["SPEED", "POWER", "TOTAL", "SUPPLY_VOLTAGE", "YAW", "CURRENT", "MAGNITUDE"]
 )
 def test_spans_are_means_over_whole_steps(make_vehicle: MakeVehicle, kind: str) -> None:
     vehicle = make_vehicle(further={"electrical.supply_sag": {"resistance": 0.2}})
@@ -45,7 +45,7 @@ def test_spans_are_means_over_whole_steps(make_vehicle: MakeVehicle, kind: str) 
         "SPEED": steps.speed[:, 1],
         "POWER": steps.power[:, 1],
         "TOTAL": steps.power.sum(axis=1) + 12.0,
-        "VOLTAGE": steps.voltage,
+        "SUPPLY_VOLTAGE": steps.voltage,
         "YAW": steps.yaw_rate,
         "CURRENT": steps.current[:, 1],
         "MAGNITUDE": np.abs(steps.current[:, 1]),

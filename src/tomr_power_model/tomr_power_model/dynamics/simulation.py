@@ -180,10 +180,10 @@ def predict(
     readout: Readout,
     wheels: int = 3,
     tick: Callable[[int], None] = lambda done: None,
-) -> list[Array]:
+) -> Iterator[Array]:
     """Values that the sensors show of each variant, (delays of its `later`, rows) each.
 
-    Variants run on all cores side by side.
+    Variants run side by side on as many cores as `worker_count` says.
     """
     buffers = _Buffers()
     dynamics: Any = compiled()
@@ -212,7 +212,16 @@ def predict(
         )
         return found
 
-    return list(_mapped(one, variants, tick))
+    return _mapped(one, variants, tick)
+
+
+def worker_count() -> int:
+    """Threads that simulate side by side: OMP_NUM_THREADS, as for linear algebra, or all cores.
+
+    Who runs several processes, such as Dask, sets it to 1.
+    """
+    given = os.environ.get("OMP_NUM_THREADS", "")
+    return max(1, int(given)) if given.isdecimal() else len(os.sched_getaffinity(0))
 
 
 def drive(variant: Variant, excitation: Excitation, wheels: int = 3) -> Steps:
@@ -243,12 +252,13 @@ def _mapped(
     one: Callable[[Variant], Array], variants: Sequence[Variant], tick: Callable[[int], None]
 ) -> Iterator[Array]:
     """Each variant's result, in order; compiled code sets the interpreter free meanwhile."""
-    if len(variants) < 2:
+    workers = min(worker_count(), len(variants))
+    if workers < 2:
         for variant in variants:
             yield one(variant)
             tick(1)
         return
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(workers) as pool:
         for found in pool.map(one, variants):
             yield found
             tick(1)

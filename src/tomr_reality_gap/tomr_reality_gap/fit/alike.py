@@ -36,14 +36,14 @@ def refuse_strangers(study: Study, last: Round) -> None:
         study: the recordings.
         last: the search's last round: the linear model around all that was found.
     """
-    long = [at for at, item in enumerate(study.forwards) if item.recorded.duration > _LONG]
+    long = [at for at, item in enumerate(study.simulations) if item.recorded.duration > _LONG]
     told = {number: _told(study, last, number) for number in long}
     for one, other in combinations(long, 2):
         for key, (first, second) in _pairs(told[one], told[other]).items():
             apart = second.value - first.value
             sigma = float(np.hypot(first.deviation, second.deviation))
             if abs(apart) > max(_APART, _SURE * sigma):
-                names = [study.forwards[item].recorded.name for item in (one, other)]
+                names = [study.simulations[item].recorded.name for item in (one, other)]
                 raise InputError(
                     f"{names[0]} and {names[1]}: they ask for values of {key} that lie "
                     f"{100.0 * abs(apart):.0f} % apart: recordings of different robots, or of one "
@@ -58,14 +58,14 @@ def _pairs(one: dict[str, _Told], other: dict[str, _Told]) -> dict[str, tuple[_T
 def _told(study: Study, last: Round, number: int) -> dict[str, _Told]:
     """What one recording says by itself about the parameters that last."""
     columns, weight = last.columns, last.noise.weight
-    sizes = [sum(len(channel.time) for channel in item.channels) for item in study.forwards]
+    sizes = [sum(len(channel.time) for channel in item.channels) for item in study.simulations]
     first = sum(sizes[:number])
     rows = slice(first, first + sizes[number])
     kept = columns.instruments.stop + sum(part.stop - part.start for part in columns.own)
-    matrix = columns.matrix[rows, :kept] * weight[rows, None]
+    matrix = columns.matrix[rows, :kept].astype(np.float64)
     matrix[:, columns.nuisance] *= _BEYOND
-    residual = (study.value[rows] - columns.value[rows]) * weight[rows]
-    found = solve(Gram.of(matrix, residual), range(kept))
+    residual = study.value[rows] - columns.value[rows]
+    found = solve(Gram.of(matrix, residual, weight[rows]), range(kept))
     values = columns.model.described.values
     told = {}
     for row, knob in enumerate(columns.model.nuisances):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_reality_gap.explanation import Shape
-from tomr_reality_gap.fit.linear import Gram, solve
+from tomr_reality_gap.fit.linear import Gram, Matrix, Solution, solve
 from tomr_reality_gap.fit.probed import Probed
 from tomr_reality_gap.fit.refine import Fitted
 from tomr_reality_gap.fit.search import Found
@@ -53,10 +53,9 @@ def leftovers(
     """Each family with its evidence, best first."""
     kept = columns.instruments.stop + sum(part.stop - part.start for part in columns.own)
     weight = found.noise.weight
-    base = columns.matrix[:, :kept] * weight[:, None]
-    residual = (study.value - fitted.value) * weight
+    base = _Base.of(columns.matrix[:, :kept], study.value - fitted.value, weight)
     results = [
-        _result(study, family, nameless, base, residual, response, weight)
+        _result(study, family, nameless, base, response)
         for family, response in zip(nameless.families, nameless.responses, strict=True)
     ]
     return sorted(results, key=lambda item: -item.evidence)
@@ -76,38 +75,58 @@ def without_needless(
     rows = list(range(columns.instruments.stop))
     for part, wanted in zip(columns.own, needed, strict=True):
         rows += range(part.start, part.stop) if wanted else ()
-    base = columns.matrix[:, rows] * weight[:, None]
-    residual = (study.value - value) * weight
+    base = _Base.of(columns.matrix[:, rows], study.value - value, weight)
     places = [family.variable for family in nameless.families]
     response = nameless.responses[places.index(leftover.family.variable)]
-    return _result(study, leftover.family, nameless, base, residual, response, weight)
+    return _result(study, leftover.family, nameless, base, response)
+
+
+@frozen
+class _Base:
+    """Whitened columns of the named model, and their normal equations."""
+
+    columns: Array  # (n, p)
+    residual: Array  # (n,)
+    weight: Array  # (n,)
+    gram: Gram
+
+    @classmethod
+    def of(cls, columns: Matrix, residual: Array, weight: Array) -> "_Base":
+        whitened = columns * weight[:, None], residual * weight
+        return cls(*whitened, weight, Gram.of(*whitened))
+
+    @property
+    def count(self) -> int:
+        return len(self.gram.vector)
+
+    def solved(self, parts: Sequence[Array]) -> Solution:
+        """With further whitened columns, (n, k) each; next to nothing but zeros in each of them."""
+        more = np.concatenate([*parts, np.empty((len(self.residual), 0))], axis=1)
+        shown = np.flatnonzero(more.any(axis=1))
+        own, cross = more[shown].T @ more[shown], self.columns[shown].T @ more[shown]
+        gram = Gram(
+            np.block([[self.gram.matrix, cross], [cross.T, own]]),
+            np.concatenate([self.gram.vector, more[shown].T @ self.residual[shown]]),
+            self.gram.square,
+        )
+        return solve(gram, range(len(gram.vector)))
 
 
 def _result(
-    study: Study,
-    family: Family,
-    nameless: Probed,
-    base: Array,
-    residual: Array,
-    response: Array,
-    weight: Array,
+    study: Study, family: Family, nameless: Probed, base: _Base, response: Array
 ) -> Leftover:
-    parts = [_only(response * weight[:, None], rows) for rows in nameless.rows]
-    alone = solve(Gram.of(base, residual), range(base.shape[1])).evidence
-    gains = []
-    for part in parts:
-        both = np.concatenate([base, part], axis=1)
-        gains.append(solve(Gram.of(both, residual), range(both.shape[1])).evidence - alone)
+    parts = [_only(response * base.weight[:, None], rows) for rows in nameless.rows]
+    alone = base.solved(()).evidence
+    gains = [base.solved((part,)).evidence - alone for part in parts]
     most = max(gains)
     wheels = tuple(wheel for wheel in range(WHEELS) if gains[wheel] > max(0.2 * most, 10.0))
     if not wheels:
         wheels = (int(np.argmax(gains)),)
-    chosen = np.concatenate([parts[wheel] for wheel in wheels], axis=1)
-    both = np.concatenate([base, chosen], axis=1)
-    whole = solve(Gram.of(both, residual), range(both.shape[1]))
+    chosen = [parts[wheel] for wheel in wheels]
+    whole = base.solved(chosen)
     shapes, turns = [], []
     for place, wheel in enumerate(wheels):
-        rows = base.shape[1] + place * response.shape[1] + np.arange(response.shape[1])
+        rows = base.count + place * response.shape[1] + np.arange(response.shape[1])
         turns.append(nameless.size * whole.mean[rows])
         shapes.append(
             _shape(study, family, nameless.size, wheel, whole.mean[rows], whole.covariance, rows)
@@ -117,7 +136,7 @@ def _result(
         whole.evidence - alone,
         wheels,
         tuple(gains),
-        chosen,
+        np.concatenate(chosen, axis=1),
         tuple(shapes),
         tuple(turns),
     )
@@ -138,7 +157,7 @@ def _shape(
     covariance: Array,
     rows: Array,
 ) -> Shape:
-    names = study.forwards[0].robot.wheel_names
+    names = study.simulations[0].robot.wheel_names
     if family.is_periodic:
         at = np.linspace(0.0, 2.0 * np.pi, _POINTS)
     else:
@@ -174,15 +193,17 @@ def still_needed(
     residual = (study.value - fitted.value) * weight
     both = np.concatenate([base, leftover.columns], axis=1)
     everything = list(range(both.shape[1]))
-    whole = _likelihood(both, residual, everything)
+    gram = Gram.of(both, residual)
+    whole = _likelihood(gram, everything)
     least = max(_NEEDED, _NEEDED_SHARE * leftover.evidence)
     needed = []
     for part, without in zip(columns.own, simulated[1:], strict=True):
         rest = [row for row in everything if not part.start <= row < part.stop]
         lacking = residual + (simulated[0] - without) * weight
-        needed.append(whole - _likelihood(both, lacking, rest) > least)
+        other = Gram(gram.matrix, both.T @ lacking, float(lacking @ lacking))
+        needed.append(whole - _likelihood(other, rest) > least)
     return [
-        wanted and not _contradicts(leftover, hypothesis, study.forwards[0].robot)
+        wanted and not _contradicts(leftover, hypothesis, study.simulations[0].robot)
         for wanted, hypothesis in zip(needed, fitted.model.hypotheses, strict=True)
     ]
 
@@ -195,9 +216,8 @@ def _contradicts(leftover: Leftover, hypothesis: Hypothesis, robot: Robot) -> bo
     return bool(wheels & set(hypothesis.where)) or "all_wheels" in hypothesis.where
 
 
-def _likelihood(columns: Array, residual: Array, chosen: Sequence[int]) -> float:
+def _likelihood(gram: Gram, chosen: Sequence[int]) -> float:
     """Log evidence of some columns, up to what all residuals of one weighting share."""
-    gram = Gram.of(columns, residual)
     return solve(gram, chosen).evidence - 0.5 * gram.square
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.linear import Gram, solve
 from tomr_reality_gap.fit.noise import Local, noise_of, rows_of
 from tomr_reality_gap.fit.probed import probed
@@ -39,7 +39,9 @@ class Likened:
         return np.asarray(np.einsum("wk,knw->nw", self.turns, bumps))
 
 
-def likened(simulations: Sequence[Forward], robot: Robot, torque: float) -> Likened | None:
+def likened(
+    simulations: Sequence[RecordingSimulation], robot: Robot, torque: float
+) -> Likened | None:
     """What simulations of a robot show beyond ours; None if that is next to nothing.
 
     Args:
@@ -51,13 +53,13 @@ def likened(simulations: Sequence[Forward], robot: Robot, torque: float) -> Like
         return None
     study = Study(tuple(simulations))
     nameless = probed(study, robot, torque, only=_VARIABLES)
-    values, slope = study.sloped([robot])
-    residual, nothing = study.value - values[0], np.zeros((len(study.value), 1))
+    value, slope, _ = study.sloped(robot, (), np.empty(0))
+    residual, nothing = study.value - value, np.zeros((len(study.value), 1))
     local = nameless.local
-    weight = noise_of(study.channels, residual, nothing, values[0], slope, local).weight
+    weight = noise_of(study.channels, residual, nothing, value, slope, local).weight
     fitted = [
         solve(
-            Gram.of(item.matrix * weight[item.rows, None], residual[item.rows] * weight[item.rows]),
+            Gram.of(item.matrix, residual[item.rows], weight[item.rows]),
             range(item.matrix.shape[1]),
         )
         for item in local

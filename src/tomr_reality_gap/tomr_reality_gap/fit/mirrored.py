@@ -11,9 +11,9 @@ from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.robot import Robot
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.leftover import Leftover
-from tomr_reality_gap.fit.linear import Gram, solve
+from tomr_reality_gap.fit.linear import Gram, Matrix, solve
 from tomr_reality_gap.fit.noise import Noise, rows_of
 from tomr_reality_gap.fit.probed import Probed, own_rows
 from tomr_reality_gap.fit.refine import Tick, refine
@@ -42,7 +42,7 @@ class Mirror:
 
     @classmethod
     def of(
-        cls, simulations: Sequence[Forward], real: Study, noise: Noise, described: Robot
+        cls, simulations: Sequence[RecordingSimulation], real: Study, noise: Noise, described: Robot
     ) -> "Mirror | None":
         """None without simulations; noise is that of the real recordings."""
         if not simulations:
@@ -72,7 +72,7 @@ class Mirror:
     def shows(self, leftover: Leftover, model: Model, nameless: Probed) -> bool:
         """Whether half of an effect without a name, or more, is in the simulation too."""
         robot, places = self.described, [family.variable for family in nameless.families]
-        motions = [motion_of(item, robot, item.run(robot)) for item in self.study.forwards]
+        motions = [motion_of(item, robot, item.run(robot)) for item in self.study.simulations]
         family = nameless.families[places.index(leftover.family.variable)]
         torques = [family.torques(motion) * nameless.size for motion in motions]
         response = (self.study.respond(robot, torques) - self.study.predict([robot])[0]).T
@@ -99,8 +99,8 @@ class Mirror:
         ]
         return float(both[0] @ both[1]) > _HALF * float(both[1] @ both[1])
 
-    def _fitted(self, columns: Array) -> Array:
-        gram = Gram.of(columns * self.weight[:, None], self.residual * self.weight)
+    def _fitted(self, columns: Matrix) -> Array:
+        gram = Gram.of(columns, self.residual, self.weight)
         return solve(gram, range(columns.shape[1])).mean
 
 

@@ -54,11 +54,16 @@ def refine(
 ) -> list[Fitted]:
     """Each model at its best turns; nuisances keep the derivatives of `columns`."""
     climbs = [_Climb(state) for state in states]
+    fixed = _Fixed.of(columns, noise)
     for _ in range(_MOST_STEPS):
         open_ones = [climb for climb in climbs if climb.is_open]
         if not open_ones:
             break
-        places = _places(study, [climb.state for climb in open_ones], columns, noise, tick)
+        points = _points(study, [climb.state[0] for climb in open_ones], tick)
+        places = [
+            _Equations.of(study, climb.state, point, fixed)
+            for climb, point in zip(open_ones, points, strict=True)
+        ]
         for climb, at in zip(open_ones, places, strict=True):
             climb.seen(at, columns)
         best = max(climb.evidence for climb in climbs)
@@ -106,17 +111,6 @@ class _Climb:
         return Fitted(model, at.evidence, at.chi2, instruments, covariance, at.value)
 
 
-def _places(
-    study: Study, states: Sequence[State], columns: Columns, noise: Noise, tick: Tick
-) -> "list[_Equations]":
-    """The equations of several models, simulated together."""
-    points = _points(study, [model for model, _ in states], tick)
-    return [
-        _Equations.of(study, state, point, columns, noise)
-        for state, point in zip(states, points, strict=True)
-    ]
-
-
 def _points(study: Study, models: Sequence[Model], tick: Tick) -> list[tuple[Array, Array]]:
     """Simulated values and derivatives by the models' own knobs (in spreads) of each model."""
     robots, sizes = [], []
@@ -145,6 +139,21 @@ def _points(study: Study, models: Sequence[Model], tick: Tick) -> list[tuple[Arr
 
 
 @frozen
+class _Fixed:
+    """Columns that all models share, whitened: nuisances and instruments."""
+
+    columns: Array  # (n, q)
+    gram: Array  # (q, q)
+    weight: Array  # (n,)
+    instruments: slice
+
+    @classmethod
+    def of(cls, columns: Columns, noise: Noise) -> "_Fixed":
+        whitened = columns.matrix[:, : columns.instruments.stop] * noise.weight[:, None]
+        return cls(whitened, whitened.T @ whitened, noise.weight, columns.instruments)
+
+
+@frozen
 class _Equations:
     """Normal equations of a model at one point, beliefs included."""
 
@@ -162,24 +171,24 @@ class _Equations:
         study: Study,
         state: State,
         point: tuple[Array, Array],
-        columns: Columns,
-        noise: Noise,
+        fixed: _Fixed,
     ) -> "_Equations":
         """From the simulated values and derivatives of a state."""
         (value, own), (model, instruments) = point, state
         turns = turns_of(model, instruments)
-        fixed = columns.matrix[:, : columns.instruments.stop]
-        matrix = np.concatenate([fixed, own], axis=1) * noise.weight[:, None]
-        shifted = value + columns.matrix[:, columns.instruments] @ instruments
-        residual = (study.value - shifted) * noise.weight
-        factor = cho_factor(matrix.T @ matrix + np.eye(matrix.shape[1]), lower=True)
+        own = own * fixed.weight[:, None]
+        cross, square = fixed.columns.T @ own, own.T @ own
+        matrix = np.block([[fixed.gram, cross], [cross.T, square]])
+        shifts = fixed.columns[:, fixed.instruments] @ instruments
+        residual = (study.value - value) * fixed.weight - shifts
+        factor = cho_factor(matrix + np.eye(len(matrix)), lower=True)
         largest = np.full(len(turns), LARGEST_STEP)
-        largest[fixed.shape[1] :] = [largest_step(knob) for knob in model.own]
+        largest[len(fixed.gram) :] = [largest_step(knob) for knob in model.own]
         return cls(
             turns,
-            shifted,
+            value + shifts / fixed.weight,
             float(residual @ residual),
-            matrix.T @ residual - turns,
+            np.concatenate([fixed.columns.T @ residual, own.T @ residual]) - turns,
             factor,
             sum(item.weight for item in model.hypotheses),
             largest,

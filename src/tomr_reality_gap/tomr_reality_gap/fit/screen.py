@@ -77,12 +77,11 @@ class _Linear:
 
     @classmethod
     def of(cls, columns: Columns, residual: Array, noise: Noise, kept: int) -> "_Linear":
-        weighted = columns.matrix * noise.weight[:, None]
-        gram = Gram.of(weighted, residual * noise.weight)
+        gram = Gram.of(columns.matrix, residual, noise.weight)
         base, held = _pinned(columns.model, gram, list(range(kept)))
         if held:
-            residual = residual - columns.matrix[:, list(held)] @ np.array(list(held.values()))
-            gram = evolve(gram, vector=weighted.T @ (residual * noise.weight))
+            known = gram.matrix[:, list(held)] @ np.array(list(held.values()))
+            gram = evolve(gram, vector=gram.vector - known)
         return cls(columns, gram, base, held)
 
     def rows(self, candidate: Hypothesis) -> list[int]:

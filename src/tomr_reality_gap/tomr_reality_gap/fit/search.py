@@ -11,7 +11,7 @@ with r the whitened residual, u all turns in units of their beliefs, G their nor
 
 from collections.abc import Sequence
 
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 
 from tomr_reality_gap.fit.noise import Local, Noise, noise_of
 from tomr_reality_gap.fit.probed import Probed
@@ -36,6 +36,10 @@ class Round:
     noise: Noise
     tried: tuple[Fitted, ...]  # refined additions, best first
     screened: tuple[Screened, ...]  # by their linear gains, best first
+
+    def without_derivatives(self) -> "Round":
+        """The same without what takes most of the memory."""
+        return evolve(self, columns=evolve(self.columns, matrix=self.columns.matrix[:0].copy()))
 
 
 @frozen
@@ -62,7 +66,8 @@ def search(
     local = nameless.local
     while True:
         open_ones = [item for item in candidates if item.name not in model.names]
-        columns = columns_at(study, model, open_ones, tick, rounds[0].columns if rounds else None)
+        columns = columns_at(study, model, open_ones, tick, rounds[-1].columns if rounds else None)
+        rounds = [item.without_derivatives() for item in rounds]
         noise = _noise(study, columns, local)
         start, screened = screen(study, columns, noise, open_ones)
         current, tried = _tried(study, start, screened, columns, noise, tick)

@@ -1,6 +1,6 @@
 """Recordings to be explained, as numbers: residuals and derivatives by every knob."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from attrs import evolve, field, frozen
@@ -8,7 +8,13 @@ from numpy.typing import NDArray
 
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS, Channel
-from tomr_reality_gap.alignment.forward import Forward, predict_all, respond_all
+from tomr_reality_gap.alignment.simulation import (
+    RecordingSimulation,
+    Tick,
+    predict_all,
+    respond_all,
+)
+from tomr_reality_gap.fit.linear import Matrix
 from tomr_reality_gap.hypotheses.knobs import Hypothesis, Knob, Turned
 
 Array = NDArray[np.float64]
@@ -24,34 +30,49 @@ _GYRO_SCALE = 0.01
 class Study:
     """All recordings together; rows are the channels of one after another."""
 
-    forwards: tuple[Forward, ...]
+    simulations: tuple[RecordingSimulation, ...]
     channels: tuple[Channel, ...] = field(init=False)
     value: Array = field(init=False)  # measured, (n,)
 
     def __attrs_post_init__(self) -> None:
-        channels = tuple(channel for item in self.forwards for channel in item.channels)
+        channels = tuple(channel for item in self.simulations for channel in item.channels)
         object.__setattr__(self, "channels", channels)
         object.__setattr__(self, "value", np.concatenate([item.value for item in channels]))
 
     def predict(
         self,
         robots: Sequence[Robot],
-        tick: Callable[[int], None] = lambda done: None,
+        tick: Tick = lambda done: None,
         later: Sequence[float] = (),
     ) -> Array:
-        """As `Forward.predict`, of all recordings' channels, (v + l, n)."""
-        return predict_all(self.forwards, robots, tick, later)
+        """As `RecordingSimulation.predict`, of all recordings' channels, (v + l, n)."""
+        return predict_all(self.simulations, robots, tick, later)
 
     def sloped(
-        self, robots: Sequence[Robot], tick: Callable[[int], None] = lambda done: None
-    ) -> tuple[Array, Array]:
-        """Values for each robot, (v, n), and the derivative of the first's in time, (n,)."""
-        values = self.predict(robots, tick, (_DELAY_STEP,))
-        return values[:-1], np.asarray((values[0] - values[-1]) / _DELAY_STEP)
+        self, robot: Robot, others: Sequence[Robot], scale: Array, tick: Tick = lambda done: None
+    ) -> tuple[Array, Array, NDArray[np.float32]]:
+        """Values of a robot, their derivative in time, (n,) each, and what others change in them.
+
+        Args:
+            robot: the robot.
+            others: others.
+            scale: what each of them changes is multiplied by this, (v,).
+            tick: called for each simulated robot.
+        """
+        value, slope, first = np.empty_like(self.value), np.empty_like(self.value), 0
+        changes = np.empty((len(others), len(value)), dtype=np.float32)
+        for item in self.simulations:
+            part = slice(first, first := first + item.size)
+            shown = item.predicted([robot, *others], tick, (_DELAY_STEP,))
+            value[part] = next(shown)
+            for row in range(len(others)):
+                changes[row, part] = (next(shown) - value[part]) * scale[row]
+            slope[part] = (value[part] - next(shown)) / _DELAY_STEP
+        return value, slope, changes
 
     def respond(self, robot: Robot, torques: Sequence[Array]) -> Array:
-        """As `Forward.respond`, torques one array (v, count, 3) per recording."""
-        return respond_all(self.forwards, robot, torques)
+        """As `RecordingSimulation.respond`, torques one array (v, count, 3) per recording."""
+        return respond_all(self.simulations, robot, torques)
 
     def instruments(self, value: Array, slope: Array) -> Array:
         """Columns of what instruments may be off, in units of their beliefs, (n, k).
@@ -66,7 +87,7 @@ class Study:
             column[part] = change[part]
             columns.append(column)
 
-        for item in self.forwards:
+        for item in self.simulations:
             size = sum(len(channel.time) for channel in item.channels)
             add(slice(row, row + size), -_DELAY_SPREAD * slope)
             for channel in item.channels:
@@ -163,7 +184,7 @@ class Columns:
     model: Model
     value: Array  # simulated, (n,)
     slope: Array  # in time, (n,)
-    matrix: Array  # (n, p): nuisances, instruments, the model's own, candidates
+    matrix: Matrix  # (n, p): nuisances, instruments, the model's own, candidates
     nuisance: slice
     instruments: slice
     own: tuple[slice, ...]  # of each of the model's hypotheses
@@ -174,7 +195,7 @@ def columns_at(
     study: Study,
     model: Model,
     candidates: Sequence[Hypothesis],
-    tick: Callable[[int], None] = lambda done: None,
+    tick: Tick = lambda done: None,
     before: Columns | None = None,
 ) -> Columns:
     """Derivatives by everything that a model and its possible additions can turn.
@@ -183,7 +204,7 @@ def columns_at(
     little from one model to the next, and cost most.
     """
     described = model.described
-    robots: list[Robot] = [described.robot]
+    robots: list[Robot] = []
     knobs: list[Knob] = list(model.own)
     if before is None:
         knobs = [*model.nuisances, *model.own]
@@ -197,22 +218,19 @@ def columns_at(
             robots.append(started.by([knob], [knob.first_step]).robot)
             steps.append(knob.first_step)
             knobs.append(knob)
-    values, slope = study.sloped(robots, tick)
-    spread = np.array([knob.spread for knob in knobs])
-    matrix = ((values[1:] - values[0]).T / np.array(steps)) * spread
-    instruments = study.instruments(values[0], slope)
+    scale = np.array([knob.spread for knob in knobs]) / np.array(steps)
+    value, slope, changes = study.sloped(described.robot, robots, scale, tick)
+    instruments = study.instruments(value, slope)
     first = len(model.nuisances)
     own = len(model.own)
+    nuisance: Matrix
+    others: list[Matrix]
     if before is None:
-        nuisance, mine, others = (
-            matrix[:, :first],
-            matrix[:, first : first + own],
-            matrix[:, first + own :],
-        )
+        nuisance, mine = changes[:first], changes[first : first + own]
+        others = [changes[first + own :]]
     else:
-        nuisance, mine = before.matrix[:, before.nuisance], matrix
-        rows = [before.matrix[:, before.candidates[item.key]] for item in candidates]
-        others = np.concatenate(rows, axis=1) if rows else np.empty((len(slope), 0))
+        nuisance, mine = before.matrix[:, before.nuisance].T, changes
+        others = [before.matrix[:, before.candidates[item.key]].T for item in candidates]
     edge = first + instruments.shape[1]
     parts, found = [], {}
     for hypothesis in model.hypotheses:
@@ -222,9 +240,9 @@ def columns_at(
         found[candidate.key] = slice(edge, edge := edge + sizes)
     return Columns(
         model,
-        values[0],
+        value,
         slope,
-        np.concatenate([nuisance, instruments, mine, others], axis=1),
+        np.concatenate([nuisance, instruments.T, mine, *others], dtype=np.float32).T,
         slice(0, first),
         slice(first, first + instruments.shape[1]),
         tuple(parts),

@@ -53,7 +53,7 @@ class Turned:
                 changed[key] = min(max(float(before) + float(turn), low), high)
         return Turned(MappingProxyType(changed), self.place)
 
-    def given(self, start: Mapping[str, float]) -> "Turned":
+    def given(self, start: Mapping[str, object]) -> "Turned":
         """The same with some values set, such as the shape of an effect that joins."""
         return Turned(MappingProxyType({**self.values, **start}), self.place)
 
