@@ -116,6 +116,8 @@ class Steps:
     copper: Array  # i^2 R [W], (m, n)
     torque: Array  # of each motor at the wheel [N m], (m, n)
     gap: Array  # sliding of the contacts in the rolling direction [m/s], (m, n)
+    asked: Array  # wheel speeds that the drivers are asked for [rad/s], (m, n)
+    sums: Array  # of the drivers' errors [rad], (m, n)
 
     @classmethod
     def of(cls, out: Array, wheels: int) -> "Steps":
@@ -133,6 +135,8 @@ class Steps:
             copper=own[..., at.OUT_COPPER],
             torque=own[..., at.OUT_TORQUE],
             gap=own[..., at.OUT_GAP],
+            asked=own[..., at.OUT_ASKED],
+            sums=own[..., at.OUT_SUM],
         )
 
 

@@ -138,14 +138,6 @@ class CommandPath:
         first, last = at.STATE_HEADER + field, len(self.state)
         return self.state[first : last : at.STATE_WHEEL]
 
-    def asked(self) -> list[float]:
-        """Wheel speeds that the drivers are asked for now [rad/s]."""
-        assert self.state is not None
-        p, (x, y, yaw) = self._simulation.numbers, self.state[at.SET : at.SET + 3]
-        records = range(at.HEADER, int(p[at.COUPLING]), int(p[at.STRIDE]))
-        rows = [p[first + at.ASK : first + at.ASK + 3] for first in records]
-        return [a * x + b * y + c * yaw for a, b, c in rows]
-
     def over(self, tick_ns: int, seen: Seen) -> Commanded | None:
         """Means over the window that ends at a tick, or None without a command.
 

@@ -17,7 +17,7 @@ Triple = tuple[float, float, float]
 _KEPT = 200  # samples whose stamps are looked at
 _LEAST = 50
 _EVERY = 25  # samples: how often
-_LONG = 200_000_000  # ns, of the fit beside a simulation
+LONG_S = 0.2  # of the fit beside a simulation
 _FIT = 5  # samples that it takes
 UNKNOWN: Triple = (float("nan"), float("nan"), float("nan"))
 
@@ -131,7 +131,7 @@ class EncoderWindow:
         What is measured less what is simulated changes slowly: it is fitted over a longer span,
         which leaves less of the noise in the acceleration.
         """
-        samples = self._until(tick_ns, max(self._span, _LONG))
+        samples = self._until(tick_ns, max(self._span, round(1e9 * LONG_S)))
         positions = np.array([sample.position for sample in samples])
         if len(samples) < _FIT or np.isnan(positions).any():
             return self.at(tick_ns)
