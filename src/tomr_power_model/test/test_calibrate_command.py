@@ -196,7 +196,7 @@ def test_the_command_writes_a_robot_and_a_page(
 def test_a_fitted_file_of_another_robot_is_refused(tmp_path: Path, make_drive: MakeDrive) -> None:
     bag = write_bag(make_drive(ROBOT, 1, seconds=25.0), tmp_path / "tour")
     out = tmp_path / "fitted.yaml"
-    assert main([str(bag), "--robot", "reference", "--out", str(out), "--alike", "all"]) == 0
+    assert main([str(bag), "--robot", "reference", "--out", str(out), "--shared", "all"]) == 0
     tree = yaml.safe_load(out.read_text())
     tree["/**"]["ros__parameters"]["robot"]["wheel_radius"] = 0.06
     out.write_text(yaml.safe_dump(tree))
@@ -208,7 +208,7 @@ def test_a_fitted_file_of_another_robot_is_refused(tmp_path: Path, make_drive: M
 def test_a_recorded_fault_is_one_line_and_skipping_it_helps(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    command = [str(FAULTY_BAG), "--robot", "reference", "--alike", "all"]
+    command = [str(FAULTY_BAG), "--robot", "reference", "--shared", "all"]
     assert main(command) == 2
     told = capsys.readouterr().err
     assert told.startswith(

@@ -9,13 +9,15 @@ from scipy.ndimage import maximum_filter1d
 
 from tomr_power_model.calibration.calibrate import Result, Timing, align, calibrate
 from tomr_power_model.calibration.fit import fit
-from tomr_power_model.calibration.intervals import autocorrelation_time
 from tomr_power_model.calibration.motion import wheel_motion
-from tomr_power_model.calibration.parameters import Choice, choose, with_values
+from tomr_power_model.calibration.parameters import Choice, choose
 from tomr_power_model.calibration.problem import Problem, modelled_power
 from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.calibration.samples import Samples, samples_of
 from tomr_power_model.errors import InputError
+from tomr_power_model.estimation.intervals import uninterrupted
+from tomr_power_model.estimation.parameter import ParameterisedRobot, prior_stds
+from tomr_power_model.estimation.statistics import autocorrelation_time
 from tomr_power_model.physics.model import PhysicalModel, WheelMotion
 from tomr_power_model.response.closed_loop import ClosedLoop
 from tomr_power_model.robot import (
@@ -49,8 +51,8 @@ def calibrated(
 
 def fitted_values(result: Result) -> dict[str, tuple[float, float]]:
     """Value and half of the 95 % interval by key."""
-    rows = zip(result.free, result.fitted.numbers, result.half_widths, strict=True)
-    return {item.key: (number, half) for item, number, half in rows}
+    rows = zip(result.parameters, result.fitted.numbers, result.half_widths, strict=True)
+    return {item.keys[0]: (number, half) for item, number, half in rows}
 
 
 def test_values_are_recovered_within_their_intervals(
@@ -105,17 +107,21 @@ def correlated_samples(seed: int, phi: float, truth: Robot) -> Samples:
 
 
 def test_intervals_hold_for_correlated_noise() -> None:
-    choice = Choice(keys=(*FRICTION, "robot.mass"), alike=("all",))
-    free = tuple(choose(VALUES, ROBOT.wheel_names, choice, "test"))
+    choice = Choice(keys=(*FRICTION, "robot.mass"), shared=("all",))
+    parameters = tuple(choose(VALUES, ROBOT.wheel_names, choice, "test"))
+    described = ParameterisedRobot(VALUES, "test")
     inside = []
     for seed in range(40):
         random = np.random.default_rng(seed + 500)
-        truth = [item.believed * (1.0 + 0.05 * random.standard_normal()) for item in free]
-        robot = robot_from_parameters(with_values(VALUES, free, truth), "test")
+        truth = {
+            item.name: item.prior_mean * (1.0 + 0.05 * random.standard_normal())
+            for item in parameters
+        }
+        robot = described.given(truth).robot
         samples = correlated_samples(seed, 0.9, robot)
-        found = fit(Problem(VALUES, free, (samples,), "test"))
-        width = found.spread.factor * found.spread.deviation * [item.spread for item in free]
-        inside.append(np.abs(found.numbers - truth) < width)
+        found = fit(Problem(described, parameters, (samples,)))
+        width = found.uncertainty.factor * found.uncertainty.deviation * prior_stds(parameters)
+        inside.append(np.abs(found.numbers - list(truth.values())) < width)
     # 160 intervals; counted as independent they would cover 91.6 % to 98.4 % in 19 of 20 runs.
     assert 0.90 < np.mean(inside) < 0.995
 
@@ -125,11 +131,13 @@ def test_autocorrelation_time_of_a_known_process() -> None:
     for seed in range(4):
         samples = correlated_samples(seed, 0.9, ROBOT)
         noise = samples.measured - modelled_power(ROBOT, samples.motion)
-        times += [autocorrelation_time((samples,), noise[:, wheel]) for wheel in range(3)]
+        times += [
+            autocorrelation_time(uninterrupted((samples,), noise[:, wheel])) for wheel in range(3)
+        ]
     # (1 + phi) / (1 - phi) = 19 samples.
     assert np.mean(times) == pytest.approx(19.0, rel=0.2)
     white = np.random.default_rng(0).standard_normal(2000)
-    assert autocorrelation_time((samples,), white) == pytest.approx(1.0, abs=0.3)
+    assert autocorrelation_time([white]) == pytest.approx(1.0, abs=0.3)
 
 
 def test_what_the_drives_do_not_tell_is_said(make_drive: MakeDrive) -> None:
@@ -155,7 +163,7 @@ def test_what_the_drives_do_not_tell_is_said(make_drive: MakeDrive) -> None:
 def test_motor_currents_without_sign_and_total_power_alone(make_drive: MakeDrive) -> None:
     drive = make_drive(ROBOT, 2, noise=0.0)
     empty = np.full_like(drive.power, np.nan)
-    choice = Choice(keys=("physics.friction.coulomb.torque",), alike=("all",))
+    choice = Choice(keys=("physics.friction.coulomb.torque",), shared=("all",))
     heavier = {**VALUES, "physics.friction.coulomb.torque": 0.09}
     total = align([evolve(drive, power=empty)], ROBOT, TIMING)
     found = calibrate(heavier, "test", total, (), choice)

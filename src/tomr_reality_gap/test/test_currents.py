@@ -7,6 +7,7 @@ import pytest
 from attrs import evolve
 
 from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
@@ -14,7 +15,6 @@ from tomr_reality_gap.alignment.forward import Forward, predict_all
 from tomr_reality_gap.alignment.response import leaps_of
 from tomr_reality_gap.explain import explain
 from tomr_reality_gap.explanation import Explanation
-from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.request import Request
 from tomr_sim_bridge.importers.dataset import choose, default_dataset, import_files, open_dataset
 from tomr_sim_bridge.importers.robotino import Drive, Run, write_run
@@ -70,8 +70,8 @@ def test_the_current_of_a_steady_spin_is_that_of_its_friction(robotino: Robot) -
     speed = (k * gain * 2.5 / motor.resistance - coulomb) / (
         k * (gain + k) / motor.resistance + viscous
     )
-    for turn in (-0.8, 0.8):  # rad/s: wheels turn by R / r as fast, against it
-        forward = _forward(robotino, np.tile([0.0, 0.0, turn], (100, 1)))
+    for offset in (-0.8, 0.8):  # rad/s: wheels offset by R / r as fast, against it
+        forward = _forward(robotino, np.tile([0.0, 0.0, offset], (100, 1)))
         value = forward.predict([robotino])[0]
         for channel, part in zip(forward.channels, rows_of(forward.channels), strict=True):
             if channel.kind == "current":

@@ -15,7 +15,7 @@ from tomr_power_model.effects import EFFECTS
 from tomr_reality_gap.explanation import Estimate, Explanation, Shape
 from tomr_reality_gap.report.html import channel_lines, picture_count, report_page
 from tomr_reality_gap.report.json import report_json
-from tomr_reality_gap.report.leftover import autocorrelation
+from tomr_reality_gap.report.residuals import autocorrelation
 from tomr_reality_gap.report.showing import best_view
 from tomr_reality_gap.report.words import effect_words, estimate_words, percent_words
 
@@ -146,7 +146,7 @@ def test_page_shows_the_shape_of_what_has_no_name(with_rest: Callable[..., Expla
 
 
 def test_page_stands_without_drives_and_maps(match: Explanation) -> None:
-    empty = evolve(match, comparisons=(), maps=(), smallest=(), alignment={}, whiteness={})
+    empty = evolve(match, comparisons=(), maps=(), detection_limits=(), alignment={}, whiteness={})
     page = Page(report_page(empty, "my_robot.yaml"))
     assert page.pictures == []
     assert page.open == []

@@ -119,7 +119,7 @@ class Explanation:
     comparisons: tuple[Comparison, ...]
     maps: tuple[Map, ...]
     alignment: Mapping[str, str]  # what was aligned, in words
-    smallest: tuple[tuple[str, str, str], ...]  # effect, place, smallest size that would be seen
+    detection_limits: tuple[tuple[str, str, str], ...]  # effect, place, size
     whiteness: Mapping[str, tuple[float, float]]  # lag-1 autocorrelation before, after by channel
     score: Score | None  # of everything together on held-out data
     explained: str  # text of robot_explained.yaml; empty where nothing changed

@@ -12,6 +12,8 @@ from tomr_power_model.calibration.checks import refuse_little_motion
 from tomr_power_model.calibration.recorded import Recorded, read_recorded
 from tomr_power_model.effects.scales import Scales
 from tomr_power_model.errors import InputError
+from tomr_power_model.estimation.noise import rows_of
+from tomr_power_model.estimation.parameter import ParameterisedRobot, per_wheel
 from tomr_power_model.recordings import open_recording, resolve_topic
 from tomr_power_model.robot import Robot, read_description, robot_from_parameters
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS, channels_of
@@ -19,10 +21,8 @@ from tomr_reality_gap.alignment.commands import shift_between
 from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.alignment.steady import steadied
 from tomr_reality_gap.alignment.usable import refuse_dull, refuse_faulty, refuse_unfollowed, usable
-from tomr_reality_gap.fit.likened import Likened, likened
-from tomr_reality_gap.fit.noise import rows_of
-from tomr_reality_gap.hypotheses.knobs import Turned, turned
-from tomr_reality_gap.hypotheses.scales import grips_of, scales_of
+from tomr_reality_gap.fit.simulator_discrepancy import DiscrepancyTorques, discrepancy_torques
+from tomr_reality_gap.hypotheses.scales import scales_of, traction_ratios_of
 from tomr_reality_gap.mismatch.probes import motion_of
 from tomr_reality_gap.request import Request
 
@@ -37,8 +37,8 @@ _SINGLE = 2.0  # s, of each
 class Prepared:
     """A description and recordings of its robot, ready to be compared."""
 
-    base: Turned  # the description, written out for each wheel
-    robot: Robot  # as the drivers believe it to be
+    base: ParameterisedRobot  # the description, written out for each wheel
+    robot: Robot  # as its drivers take it to be
     real: tuple[Forward, ...]
     held: tuple[Forward, ...]
     simulations: tuple[Forward, ...]  # of the user's
@@ -57,7 +57,7 @@ def prepared(request: Request) -> Prepared:
     refuse_dull(real)
     refuse_faulty((*real, *held), robot)
     sim = _read_all((request.sim,), request, robot) if request.sim else ()
-    _check_alike(real, sim, robot)
+    _check_same_commands(real, sim)
     prompt = _is_prompt(_forward((*sim, *real)[0], robot))
     forwards, held_out, simulations = (
         tuple(evolve(_forward(item, robot), prompt=prompt) for item in group)
@@ -66,21 +66,21 @@ def prepared(request: Request) -> Prepared:
     runs = tuple(item.run(base.robot) for item in forwards)
     refuse_unfollowed(forwards, runs)
     scales = _scales(forwards, runs, robot)
-    alike = likened(simulations, base.robot, scales.torque)
+    discrepancy = discrepancy_torques(simulations, base.robot, scales.torque)
     notes = [note for item in (*real, *held) for note in item.notes]
     return Prepared(
         base=base,
         robot=robot,
-        real=tuple(_with(alike, item, base.robot) for item in forwards),
-        held=tuple(_with(alike, item, base.robot) for item in held_out),
-        simulations=tuple(_with(alike, item, base.robot) for item in simulations),
+        real=tuple(_with(discrepancy, item, base.robot) for item in forwards),
+        held=tuple(_with(discrepancy, item, base.robot) for item in held_out),
+        simulations=tuple(_with(discrepancy, item, base.robot) for item in simulations),
         runs=runs,
         scales=scales,
-        notes=(*notes, *_sim_notes(simulations, alike)),
+        notes=(*notes, *_sim_notes(simulations, discrepancy)),
     )
 
 
-def _described(request: Request) -> tuple[Turned, Robot]:
+def _described(request: Request) -> tuple[ParameterisedRobot, Robot]:
     values = dict(read_description(request.robot))
     place = str(request.robot)
     robot = robot_from_parameters(values, place)
@@ -92,7 +92,7 @@ def _described(request: Request) -> tuple[Turned, Robot]:
             raise InputError(
                 f"--tolerance {key}: {place} has no such value: give a key as it stands there"
             )
-    return turned(values, robot.wheel_names, place), robot
+    return per_wheel(values, robot.wheel_names, place), robot
 
 
 def _has_total_only(paths: tuple[Path, ...], robot: Robot) -> bool:
@@ -148,12 +148,12 @@ def _forward(recorded: Recorded, robot: Robot) -> Forward:
     return Forward.of(even, robot, channels_of(even, robot, _WINDOW, jitters))
 
 
-def _with(alike: Likened | None, forward: Forward, robot: Robot) -> Forward:
+def _with(discrepancy: DiscrepancyTorques | None, forward: Forward, robot: Robot) -> Forward:
     """The recording, simulated with what the user's simulation resists beyond ours."""
-    if alike is None:
+    if discrepancy is None:
         return forward
     motion = motion_of(forward, robot, forward.run(robot))
-    return evolve(forward, resisting=alike.torque(motion))
+    return evolve(forward, resisting=discrepancy.torque(motion))
 
 
 def _is_prompt(forward: Forward) -> bool:
@@ -175,7 +175,7 @@ def _is_prompt(forward: Forward) -> bool:
     return errors[1] < errors[0]
 
 
-def _check_alike(real: tuple[Recorded, ...], sim: tuple[Recorded, ...], robot: Robot) -> None:
+def _check_same_commands(real: tuple[Recorded, ...], sim: tuple[Recorded, ...]) -> None:
     """A simulation must have been driven with the commands of a real recording."""
     for item in sim:
         moved = np.nanmax(np.abs(item.position - item.position[:1]), initial=0.0)
@@ -189,7 +189,9 @@ def _check_alike(real: tuple[Recorded, ...], sim: tuple[Recorded, ...], robot: R
             )
 
 
-def _sim_notes(simulations: Sequence[Forward], alike: Likened | None) -> tuple[str, ...]:
+def _sim_notes(
+    simulations: Sequence[Forward], discrepancy: DiscrepancyTorques | None
+) -> tuple[str, ...]:
     """How far the given simulation and the one used here agree."""
     notes = []
     for forward in simulations:
@@ -200,7 +202,7 @@ def _sim_notes(simulations: Sequence[Forward], alike: Likened | None) -> tuple[s
             for channel, part in zip(forward.channels, rows, strict=True)
             if channel.kind in DRAWN_KINDS
         ]
-        more = "" if alike is None else "; what it resists more is taken off"
+        more = "" if discrepancy is None else "; what it resists more is taken off"
         notes.append(
             f"{forward.recorded.name}: the simulation that the findings rest on differs from it by "
             f"an NRMSE of {max(errors):.3f} in what it draws{more}"
@@ -220,8 +222,10 @@ def _scales(
     scales = scales_of(
         robot, joined["speed"], joined["power"], joined["copper"], duration, currents
     )
-    grips = [
-        grips_of(robot, run["speed"], item.timeline.period)
+    ratios = [
+        traction_ratios_of(robot, run["speed"], item.timeline.period)
         for item, run in zip(forwards, runs, strict=True)
     ]
-    return evolve(scales, traction_ratios=tuple(max(levels) for levels in zip(*grips, strict=True)))
+    return evolve(
+        scales, traction_ratios=tuple(max(levels) for levels in zip(*ratios, strict=True))
+    )

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from tomr_power_model.calibration.checks import Finding
 from tomr_power_model.calibration.fit import Fit, fit
 from tomr_power_model.calibration.identify import warnings_of
-from tomr_power_model.calibration.parameters import Choice, Free, Values, choose
+from tomr_power_model.calibration.parameters import Choice, choose
 from tomr_power_model.calibration.problem import Problem
 from tomr_power_model.calibration.recorded import Recorded, read_recorded
 from tomr_power_model.calibration.samples import TOTAL, Samples, samples_of
 from tomr_power_model.calibration.scoring import Scores, score, suspicious
 from tomr_power_model.errors import InputError
-from tomr_power_model.robot import WHEELS, Robot, robot_from_parameters
+from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, Values, prior_stds
+from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
 Skips = Mapping[str, Sequence[tuple[float, float]]]
@@ -38,7 +39,7 @@ class Result:
     """All that a calibration found."""
 
     robot: Robot  # fitted
-    free: tuple[Free, ...]
+    parameters: tuple[Parameter, ...]
     fitted: Fit
     samples: tuple[Samples, ...]
     held_out: tuple[Samples, ...]
@@ -52,8 +53,8 @@ class Result:
     @property
     def half_widths(self) -> Array:
         """Half of the 95 % intervals, in the values' units."""
-        width = np.array([item.spread for item in self.free])
-        return np.asarray(self.fitted.spread.factor * self.fitted.spread.deviation * width)
+        found = self.fitted.uncertainty
+        return np.asarray(found.factor * found.deviation * prior_stds(self.parameters))
 
 
 def read_all(
@@ -156,16 +157,17 @@ def calibrate(
     tick: Callable[[], None] = lambda: None,
 ) -> Result:
     """Fit a description to samples and score it on others. Raises InputError."""
-    believed = robot_from_parameters(values, place)
+    described = ParameterisedRobot(values, place)
+    before = described.robot
     measured = [np.isfinite(item.measured) for item in samples]
     choice = evolve(
         choice,
-        quantity=believed.measurement.quantity,
+        quantity=before.measurement.quantity,
         has_total=any(item[:, TOTAL].any() for item in measured),
         has_motors=any(item[:, :WHEELS].any() for item in measured),
     )
-    free = tuple(choose(values, believed.wheel_names, choice, place))
-    problem = Problem(values, free, tuple(samples), place)
+    parameters = tuple(choose(values, before.wheel_names, choice, place))
+    problem = Problem(described, parameters, tuple(samples))
     fitted = fit(problem, robust, tick)
     robot = problem.robot(fitted.numbers)
     findings = [found for item in samples for found in suspicious(item, robot)]
@@ -173,20 +175,20 @@ def calibrate(
     elsewhere = [found for item in held_out for found in suspicious(item, robot)]
     return Result(
         robot=robot,
-        free=free,
+        parameters=parameters,
         fitted=fitted,
         samples=tuple(samples),
         held_out=tuple(held_out),
         scores=score(samples, robot),
-        scores_before=score(samples, believed),
+        scores_before=score(samples, before),
         held_out_scores=score(held_out, robot),
-        held_out_scores_before=score(held_out, believed),
-        warnings=tuple(warnings_of(free, fitted, robot.wheel_names)),
-        notes=_told([*findings, *elsewhere]),
+        held_out_scores_before=score(held_out, before),
+        warnings=tuple(warnings_of(parameters, fitted, robot.wheel_names)),
+        notes=_in_words([*findings, *elsewhere]),
     )
 
 
-def _told(findings: Sequence[Finding]) -> tuple[str, ...]:
+def _in_words(findings: Sequence[Finding]) -> tuple[str, ...]:
     """The longest ones in words, and how many more there are."""
     ordered = sorted(findings, key=lambda found: found.start - found.end)
     more = len(ordered) - _MOST_NOTES

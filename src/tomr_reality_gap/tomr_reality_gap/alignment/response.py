@@ -6,10 +6,10 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
+from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.alignment.forward import Forward, predict_all
-from tomr_reality_gap.fit.noise import rows_of
 
 Array = NDArray[np.float64]
 

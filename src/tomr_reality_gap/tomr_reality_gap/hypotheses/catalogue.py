@@ -9,18 +9,19 @@ from types import MappingProxyType
 
 from tomr_power_model.effects import EFFECTS, HypothesisPrior
 from tomr_power_model.effects.scales import Scales
-from tomr_reality_gap.hypotheses.knobs import (
-    Hypothesis,
-    Knob,
-    Turned,
+from tomr_power_model.estimation.parameter import (
+    Parameter,
+    ParameterisedRobot,
     bounds_of,
+    uniform_std,
     unit_of,
     wheel_key,
 )
+from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 
 ALL, BODY, SUPPLY = "all_wheels", "body", "supply"
 
-# Parameters that may be wrong, their spread relative to the value, and the place.
+# Parameters that may be wrong, their prior standard deviation over the value, and the place.
 _PARAMETERS: Mapping[str, tuple[float, str]] = {
     "robot.mass": (0.2, BODY),
     "robot.inertia_z": (0.3, BODY),
@@ -38,25 +39,25 @@ _PARAMETERS: Mapping[str, tuple[float, str]] = {
 }
 _DELAY_STEP = 0.002  # s
 _ROLLS = 1.05  # of the largest traction over load: with this friction no wheel slides
-_LEAST_GRIP = 0.01
+_LEAST_FRICTION = 0.01
 _LATE = (0.015, 0.03, 0.06, -0.02)  # s
-_EFFECT_PARAMETER = 0.4  # spread of an included effect's parameter, relative to its value
+_EFFECT_PARAMETER = 0.4  # prior deviation of an included effect's parameter, over its value
 _WRONG = 1.5  # tolerances that a parameter must be off to be called wrong
 _WRONG_PARAMETER = -math.log(2.0)  # what is left out is likelier than a wrong number
-_STEP = 0.1  # of the spread
+_STEP = 0.1  # of the prior_std
 _BEYOND = 1.25  # how far a tolerance is stretched before the value counts as wrong
-_SHAPE_SPREAD = 0.5  # of a shape's start
+_SHAPE_STD = 0.5  # of a shape's start
 
 
 def nuisances(
-    base: Turned,
+    base: ParameterisedRobot,
     wheels: Sequence[str],
     tolerance: float,
     tolerances: Mapping[str, float] = MappingProxyType({}),
-) -> tuple[Knob, ...]:
-    """Knobs for what may be off within the stated tolerance, each wheel by itself.
+) -> tuple[Parameter, ...]:
+    """Parameters for what may be off within the stated tolerance, each wheel by itself.
 
-    A tolerance is half of the range; all of it is equally likely, hence the spread of a uniform
+    A tolerance is half of the range; all of it is equally likely, hence the deviation of a uniform
     distribution. `tolerances` are those of single values, by their keys.
     """
     keys = ["robot.mass", "robot.inertia_z"]
@@ -73,8 +74,11 @@ def nuisances(
         own = tolerances.get(key, tolerances.get(_shared(key, wheels), tolerance))
         if isinstance(value, float) and value and own:
             half = own * abs(value)
-            spread = half / math.sqrt(3.0)
-            found.append(Knob(key, (key,), "", spread, spread, -_BEYOND * half, _BEYOND * half))
+            prior_std = uniform_std(half)
+            edge = _BEYOND * half
+            found.append(
+                Parameter(key, (key,), "", prior_std, step=prior_std, lower=-edge, upper=edge)
+            )
     return tuple(found)
 
 
@@ -86,12 +90,12 @@ def _shared(key: str, wheels: Sequence[str]) -> str:
 
 
 def catalogue(
-    base: Turned,
+    base: ParameterisedRobot,
     wheels: Sequence[str],
     scales: Scales,
     tolerance: float,
     orders: Sequence[float] = (),
-    leaps: Mapping[str, float] = MappingProxyType({}),
+    alternatives: Mapping[str, float] = MappingProxyType({}),
     currents_only: bool = False,
 ) -> tuple[Hypothesis, ...]:
     """All hypotheses about a robot.
@@ -102,7 +106,7 @@ def catalogue(
         scales: how large effects may be.
         tolerance: of the description's values.
         orders: of torque ripples that may be there.
-        leaps: values of the drivers that the wheels' speeds ask for, far from the described ones.
+        alternatives: values of the drivers, far from the described ones, that wheel speeds ask for.
         currents_only: whether nothing but the motors' currents is measured.
     """
     found = (
@@ -111,7 +115,7 @@ def catalogue(
         *_slipping(base, wheels, scales),
         *_late(base, wheels),
         *_wrong_parameters(base, wheels, tolerance),
-        *(_leap(base, key, value) for key, value in leaps.items()),
+        *(_alternative(base, key, value) for key, value in alternatives.items()),
     )
     if not currents_only:
         return found
@@ -124,22 +128,29 @@ def catalogue(
     )
 
 
-def _leap(base: Turned, key: str, value: float) -> Hypothesis:
+def _alternative(base: ParameterisedRobot, key: str, value: float) -> Hypothesis:
     """A value that is another one, not the same a little off; 0 may be either."""
     before = base.values.get(key, 0.0)
     assert isinstance(before, int | float)
-    turn = value - before
+    offset = value - before
     low, high = bounds_of(key)
-    step = _DELAY_STEP if key == "controller.delay" else _STEP * abs(turn)
-    knob = Knob(
-        "value", (key,), unit_of(key), abs(turn), step, low - before, high - before, leap=turn
+    step = _DELAY_STEP if key == "controller.delay" else _STEP * abs(offset)
+    parameter = Parameter(
+        "value",
+        (key,),
+        unit_of(key),
+        abs(offset),
+        step=step,
+        lower=low - before,
+        upper=high - before,
+        discrete_offset=offset,
     )
     place = _PARAMETERS.get(key, (0.0, BODY))[1]
-    return Hypothesis(f"parameter.{key}", (place,), (knob,), {}, _WRONG_PARAMETER)
+    return Hypothesis(f"parameter.{key}", (place,), (parameter,), log_prior=_WRONG_PARAMETER)
 
 
 def _ripples(
-    base: Turned, wheels: Sequence[str], scales: Scales, orders: Sequence[float]
+    base: ParameterisedRobot, wheels: Sequence[str], scales: Scales, orders: Sequence[float]
 ) -> Iterator[Hypothesis]:
     effect_id = "drivetrain.torque_ripple"
     if any(key.startswith(f"physics.{effect_id}.") for key in base.values):
@@ -149,21 +160,23 @@ def _ripples(
             name: _keys(effect_id, name, where, wheels) for name in ("torque", "order", "phase")
         }
         size = 0.3 * scales.torque
-        knobs = (
-            Knob("torque", keys["torque"], "N m", size, _STEP * size, 0.0),
-            Knob("order", keys["order"], "1/rev", 0.05, 0.005, is_shape=True),
-            Knob("phase", keys["phase"], "rad", 1.0, 0.05, is_shape=True),
+        parameters = (
+            Parameter("torque", keys["torque"], "N m", size, step=_STEP * size, lower=0.0),
+            Parameter("order", keys["order"], "1/rev", 0.05, step=0.005, is_shape=True),
+            Parameter("phase", keys["phase"], "rad", 1.0, step=0.05, is_shape=True),
         )
         for order in orders:
             for quarter in range(4):
                 start = dict.fromkeys(keys["torque"], 0.0)
                 start |= dict.fromkeys(keys["order"], order)
                 start |= dict.fromkeys(keys["phase"], 0.5 * math.pi * quarter)
-                yield Hypothesis(effect_id, where, knobs, start)
+                yield Hypothesis(effect_id, where, parameters, start=start)
 
 
-def _slipping(base: Turned, wheels: Sequence[str], scales: Scales) -> Iterator[Hypothesis]:
-    """Grips at which some of what the contacts carry is too much; above all of it nothing shows."""
+def _slipping(
+    base: ParameterisedRobot, wheels: Sequence[str], scales: Scales
+) -> Iterator[Hypothesis]:
+    """Friction at which some of what the contacts carry is too much; more of it shows nothing."""
     effect_id = "contact.slip"
     ratios = scales.traction_ratios
     if not ratios or any(key.startswith(f"physics.{effect_id}.") for key in base.values):
@@ -171,29 +184,41 @@ def _slipping(base: Turned, wheels: Sequence[str], scales: Scales) -> Iterator[H
     rolls = max(ratios)
     for where in _places(effect_id, wheels):
         keys = _keys(effect_id, "friction", where, wheels)
-        for number, grip in enumerate(scales.traction_ratios[1:]):
+        for number, friction_coefficient in enumerate(scales.traction_ratios[1:]):
             # Starts differ a little so that hypotheses do; at none of them does a wheel slide.
             start = rolls * (_ROLLS + 0.001 * number)
-            leap = grip - start
-            low = _LEAST_GRIP - start
-            knob = Knob("friction", keys, "", -leap, -_STEP * grip, low, 0.0, leap=leap)
-            yield Hypothesis(effect_id, where, (knob,), dict.fromkeys(keys, start))
+            offset = friction_coefficient - start
+            parameter = Parameter(
+                "friction",
+                keys,
+                "",
+                -offset,
+                step=-_STEP * friction_coefficient,
+                lower=_LEAST_FRICTION - start,
+                upper=0.0,
+                discrete_offset=offset,
+            )
+            yield Hypothesis(effect_id, where, (parameter,), start=dict.fromkeys(keys, start))
 
 
-def _late(base: Turned, wheels: Sequence[str]) -> Iterator[Hypothesis]:
+def _late(base: ParameterisedRobot, wheels: Sequence[str]) -> Iterator[Hypothesis]:
     """Power sensors that are late, or early, by more than a step in power lasts."""
     effect_id = "sensor.clock_offset"
     if any(key.startswith(f"physics.{effect_id}.") for key in base.values):
         return
     for where in _places(effect_id, wheels):
         keys = _keys(effect_id, "delay", where, wheels)
-        for number, leap in enumerate(_LATE):
+        for number, delay in enumerate(_LATE):
             start = 1e-6 * (number + 1)  # what tells hypotheses of one name apart
-            knob = Knob("delay", keys, "s", abs(leap), 0.1 * _LATE[0], leap=leap)
-            yield Hypothesis(effect_id, where, (knob,), dict.fromkeys(keys, start))
+            parameter = Parameter(
+                "delay", keys, "s", abs(delay), step=0.1 * _LATE[0], discrete_offset=delay
+            )
+            yield Hypothesis(effect_id, where, (parameter,), start=dict.fromkeys(keys, start))
 
 
-def _effects(base: Turned, wheels: Sequence[str], scales: Scales) -> Iterator[Hypothesis]:
+def _effects(
+    base: ParameterisedRobot, wheels: Sequence[str], scales: Scales
+) -> Iterator[Hypothesis]:
     for effect_id, effect in EFFECTS.items():
         prior = effect.prior
         if prior is None or any(key.startswith(f"physics.{effect_id}.") for key in base.values):
@@ -229,36 +254,46 @@ def _effect(
     scales: Scales,
     shape: Mapping[str, float],
 ) -> Hypothesis:
-    knobs, start = [], {}
-    parameters = EFFECTS[effect_id].parameters
+    found, start = [], {}
+    described = EFFECTS[effect_id].parameters
     for name, size in prior.sizes.items():
         keys = _keys(effect_id, name, where, wheels)
-        spread, neutral = size(scales), parameters[name].neutral
+        prior_std, neutral = size(scales), described[name].neutral
         start.update(dict.fromkeys(keys, neutral))
         low, high = bounds_of(keys[0])
-        step = (prior.sign or 1) * _STEP * spread
-        unit = parameters[name].unit
+        step = (prior.sign or 1) * _STEP * prior_std
+        unit = described[name].unit
         low, high = low - neutral, high - neutral
         if prior.sign > 0:
             low = max(low, 0.0)
         elif prior.sign < 0:
             high = min(high, 0.0)
-        knobs.append(Knob(name, keys, unit, spread, step, low, high))
+        found.append(Parameter(name, keys, unit, prior_std, step=step, lower=low, upper=high))
     for name, value in shape.items():
         keys = _keys(effect_id, name, where, wheels)
         start.update(dict.fromkeys(keys, value))
-        unit = parameters[name].unit
-        if unit == "rad":  # an angle may turn either way, and has no smallest value
-            knobs.append(Knob(name, keys, unit, 1.0, 0.05, is_shape=True))
+        unit = described[name].unit
+        if unit == "rad":  # an angle may be off either way, and has no smallest value
+            found.append(Parameter(name, keys, unit, 1.0, step=0.05, is_shape=True))
             continue
-        spread = _SHAPE_SPREAD * value
-        low, high = -0.9 * value, 9.0 * value
-        knobs.append(Knob(name, keys, unit, spread, _STEP * spread, low, high, True))
-    return Hypothesis(effect_id, where, tuple(knobs), start, 0.0, prior.least(scales))
+        prior_std = _SHAPE_STD * value
+        found.append(
+            Parameter(
+                name,
+                keys,
+                unit,
+                prior_std,
+                step=_STEP * prior_std,
+                lower=-0.9 * value,
+                upper=9.0 * value,
+                is_shape=True,
+            )
+        )
+    return Hypothesis(effect_id, where, tuple(found), start=start, least=prior.least(scales))
 
 
 def _wrong_parameters(
-    base: Turned, wheels: Sequence[str], tolerance: float
+    base: ParameterisedRobot, wheels: Sequence[str], tolerance: float
 ) -> Iterator[Hypothesis]:
     for general, (relative, place) in _PARAMETERS.items():
         if general.startswith("motor."):
@@ -279,7 +314,7 @@ def _wrong_parameters(
 
 
 def _wrong(
-    base: Turned, general: str, relative: float, wheels: Sequence[str], tolerance: float
+    base: ParameterisedRobot, general: str, relative: float, wheels: Sequence[str], tolerance: float
 ) -> Iterator[Hypothesis]:
     own = [(wheel, wheel_key(general, wheel)) for wheel in wheels]
     present = [(wheel, key) for wheel, key in own if base.values.get(key)]
@@ -292,7 +327,7 @@ def _wrong(
 
 
 def _wrong_at(
-    base: Turned,
+    base: ParameterisedRobot,
     general: str,
     keys: tuple[str, ...],
     relative: float,
@@ -301,8 +336,21 @@ def _wrong_at(
 ) -> Hypothesis:
     value = base.values[keys[0]]
     assert isinstance(value, float)
-    spread = relative * abs(value)
+    prior_std = relative * abs(value)
     low, high = bounds_of(keys[0])
-    knob = Knob("value", keys, unit_of(keys[0]), spread, _STEP * spread, low - value, high - value)
-    least = _WRONG * tolerance * abs(value)
-    return Hypothesis(f"parameter.{general}", where, (knob,), {}, _WRONG_PARAMETER, least)
+    parameter = Parameter(
+        "value",
+        keys,
+        unit_of(keys[0]),
+        prior_std,
+        step=_STEP * prior_std,
+        lower=low - value,
+        upper=high - value,
+    )
+    return Hypothesis(
+        f"parameter.{general}",
+        where,
+        (parameter,),
+        log_prior=_WRONG_PARAMETER,
+        least=_WRONG * tolerance * abs(value),
+    )

@@ -12,10 +12,10 @@ from tomr_power_model.robot import GRAVITY, Robot
 
 Array = NDArray[np.float64]
 
-_GRIPS = (1.0, 0.8, 0.64, 0.51, 0.41, 0.33, 0.26)  # of what the contacts carry at most
+_TRACTION_PARTS = (1.0, 0.8, 0.64, 0.51, 0.41, 0.33, 0.26)  # of what the contacts carry at most
 
 
-def grips_of(robot: Robot, speed: Array, period: float) -> tuple[float, ...]:
+def traction_ratios_of(robot: Robot, speed: Array, period: float) -> tuple[float, ...]:
     """The largest traction over load of any wheel that rolls, and parts of it, falling.
 
     Args:
@@ -29,7 +29,7 @@ def grips_of(robot: Robot, speed: Array, period: float) -> tuple[float, ...]:
     force = change @ body.mass_matrix.T + body.turning_force(twist)
     traction = np.abs(force @ body.from_force.T) / robot.wheel_radius
     most = float(np.max(traction / body.normal))
-    return tuple(part * most for part in _GRIPS)
+    return tuple(part * most for part in _TRACTION_PARTS)
 
 
 def scales_of(

@@ -5,11 +5,11 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.explanation import Comparison, Score
-from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.mismatch.probes import Motion, motion_of
 
 Array = NDArray[np.float64]

@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_power_model.estimation.noise import rows_of
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS, Channel
 from tomr_reality_gap.alignment.forward import Forward
 from tomr_reality_gap.explanation import Located, Map
-from tomr_reality_gap.fit.noise import rows_of
 
 Array = NDArray[np.float64]
 

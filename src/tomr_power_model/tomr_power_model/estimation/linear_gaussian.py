@@ -1,7 +1,7 @@
 """Linear Gaussian models of a mismatch: what each set of columns explains, and its evidence.
 
-With whitened data r (residuals / sigma), columns A of derivatives scaled by the spread of each
-knob's belief, and knobs x ~ N(0, 1), the log evidence against no columns at all is
+With whitened data r (residuals / sigma), columns A of derivatives scaled by the prior standard
+deviation of each parameter, and parameters x ~ N(0, 1), the log evidence against no columns is
 
     L = 1/2 b^T (I + G)^-1 b - 1/2 log|I + G|,   G = A^T A,  b = A^T r
 
@@ -28,25 +28,17 @@ class Gram:
 
     @classmethod
     def of(cls, columns: Array, residual: Array) -> "Gram":
-        """From whitened columns (n, p), scaled by their spreads, and residuals (n,)."""
+        """From whitened columns (n, p), in prior standard deviations, and residuals (n,)."""
         return cls(columns.T @ columns, columns.T @ residual, float(residual @ residual))
 
 
 @frozen
 class Solution:
-    """Posterior of one subset of columns, in units of their spreads."""
+    """Posterior of one subset of columns, in units of their prior standard deviations."""
 
-    evidence: float
+    evidence: float  # log, against no columns
     mean: Array  # (k,)
     covariance: Array  # (k, k)
-
-
-def evidence(gram: Gram, chosen: Sequence[int]) -> float:
-    """Log evidence of a subset of columns against none."""
-    rows = np.asarray(chosen)
-    factor = cho_factor(gram.matrix[np.ix_(rows, rows)] + np.eye(len(rows)), lower=True)
-    explained = float(gram.vector[rows] @ cho_solve(factor, gram.vector[rows]))
-    return 0.5 * explained - float(np.log(np.diag(factor[0])).sum())
 
 
 def solve(gram: Gram, chosen: Sequence[int]) -> Solution:
