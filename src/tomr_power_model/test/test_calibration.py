@@ -1,4 +1,4 @@
-"""Calibration on drives whose truth is known: values, intervals, what cannot be told."""
+"""Calibration on drives whose truth is known: values, intervals, what is not determined."""
 
 from collections.abc import Callable
 
@@ -144,7 +144,7 @@ def test_what_the_drives_do_not_tell_is_said(make_drive: MakeDrive) -> None:
     result = calibrated([make_drive(ROBOT, 1)], Choice())
     told = "\n".join(result.warnings)
     # Supply power depends on R and k through R / k^2 alone.
-    assert "motor.resistance and motor.torque_constant are told only together" in told
+    assert "motor.resistance and motor.torque_constant are determined only together" in told
     assert "motor.torque_constant of every wheel: not determined" in told
     assert "robot.inertia_z:" not in told
     steady = make_drive(ROBOT, 1)

@@ -26,7 +26,7 @@ def test_stamps_without_a_grid_are_left_alone() -> None:
 
 
 def _recorded(robot: Robot) -> Recorded:
-    """Thirty seconds of starts, offsets and stops, as the simulation itself would record them."""
+    """Thirty seconds of starts, turns and stops, as the simulation itself would record them."""
     command_time = np.arange(0.0, 30.0, 0.05)
     phase = command_time // 2.5
     command = (

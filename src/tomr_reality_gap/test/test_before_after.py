@@ -81,7 +81,7 @@ def test_energy_counts_by_the_weight_of_its_channel() -> None:
 
 
 def test_intervals_are_the_few_that_hold_half_of_the_energy() -> None:
-    """A burst of 3 s in 60 s holds four fifths; the rest is prior_std thinly."""
+    """A burst of 3 s in 60 s holds four fifths; the rest is spread thinly."""
     channel = evolve(_power(600), time=0.1 * np.arange(600) + 0.05)
     burst = (channel.time > 30.0) & (channel.time < 33.0)
     change = np.where(burst, 1.0, np.sqrt(0.25 * burst.sum() / (~burst).sum()))

@@ -70,8 +70,8 @@ def test_the_current_of_a_steady_spin_is_that_of_its_friction(robotino: Robot) -
     speed = (k * gain * 2.5 / motor.resistance - coulomb) / (
         k * (gain + k) / motor.resistance + viscous
     )
-    for offset in (-0.8, 0.8):  # rad/s: wheels offset by R / r as fast, against it
-        forward = _forward(robotino, np.tile([0.0, 0.0, offset], (100, 1)))
+    for turn in (-0.8, 0.8):  # rad/s: wheels turn by R / r as fast, against it
+        forward = _forward(robotino, np.tile([0.0, 0.0, turn], (100, 1)))
         value = forward.predict([robotino])[0]
         for channel, part in zip(forward.channels, rows_of(forward.channels), strict=True):
             if channel.kind == "current":

@@ -19,7 +19,7 @@ def for_users(analysis: AnalysisResult, model: Model) -> Model:
 
 
 def described(analysis: AnalysisResult, model: Model) -> str:
-    """Text of robot_explained.yaml: what is alike for all wheels is written once."""
+    """Text of robot_explained.yaml: what all wheels share is written once."""
     values = dict(model.described.values)
     wheels = analysis.robot.wheel_names
     for key in [key for key in values if f".{wheels[0]}." in key]:

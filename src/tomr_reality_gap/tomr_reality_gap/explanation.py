@@ -34,7 +34,7 @@ class Located:
 
 @frozen
 class Rival:
-    """Another explanation that the data cannot tell from the finding."""
+    """Another explanation that the data cannot separate from the finding."""
 
     effect: str
     where: tuple[str, ...]
@@ -46,7 +46,7 @@ class Rival:
 class Score:
     """Errors on held-out data; NRMSE as in the contract.
 
-    Of power, or of current where a robot tells no more: `quantity` says which, with its unit.
+    Of power, or of current where a robot measures no more: `quantity` says which, with its unit.
     """
 
     nrmse_before: float

@@ -1,4 +1,4 @@
-"""From files to what can be compared: recordings read, checked, aligned, and simulated alike."""
+"""From files to what can be compared: recordings read, checked, aligned, and simulated."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -13,7 +13,7 @@ from tomr_reality_gap.explanation import Estimate
 
 Array = NDArray[np.float64]
 
-_RIVAL = 5.0  # log odds within which data do not tell two explanations apart
+_RIVAL = 5.0  # log odds within which data do not separate two explanations
 _UNMODELLED_COST = 60.0  # log evidence that an effect without a name must bring
 _WIDE = 1.96
 _MUCH = 0.3  # of the mismatch left: what was named is not the whole story
@@ -54,12 +54,12 @@ def estimate_of(
 
 
 def is_rival(log_odds: float) -> bool:
-    """Whether the data do not tell it from the finding."""
+    """Whether the data do not separate it from the finding."""
     return log_odds > -_RIVAL
 
 
 def confidence_of(log_odds: Sequence[float]) -> float:
-    """How much of the belief a finding and its rivals hold together, from all others' log odds."""
+    """Posterior probability of a finding and its rivals together, from all others' log odds."""
     weights = [math.exp(max(min(odds, 0.0), -600.0) / SIMULATOR.temper) for odds in log_odds]
     near = 1.0 + sum(w for w, odds in zip(weights, log_odds, strict=True) if is_rival(odds))
     return _SURE * near / (1.0 + sum(weights))

@@ -9,7 +9,7 @@ from tomr_power_model.effects.base import Phase
 from tomr_power_model.effects.missions import INERTIAL, PAUSE, STAND, VARIED
 from tomr_reality_gap.explanation import Finding
 
-# What tells a wrong parameter, by the beginning of its key.
+# What shows a wrong parameter, by the beginning of its key.
 _PARAMETERS: tuple[tuple[str, Sequence[Phase]], ...] = (
     ("supply.auxiliary_power", STAND),
     ("robot.", INERTIAL),

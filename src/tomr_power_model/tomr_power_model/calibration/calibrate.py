@@ -74,7 +74,7 @@ def read_all(
 
 
 def names_of(paths: Sequence[Path]) -> list[str]:
-    """What to call each recording: its last part, with its folder where two are called alike."""
+    """What to call each recording: its last part, with its folder where two have one name."""
     short = [path.resolve().name for path in paths]
     names = [
         "/".join(path.resolve().parts[-2:]) if short.count(name) > 1 else name

@@ -30,7 +30,8 @@ def warnings_of(parameters: Sequence[Parameter], fitted: Fit, wheels: Sequence[s
         for name, _ in _by_kind(at_end, wheels)
     ]
     found += [
-        f"{name}: not determined, it stays near the description. To tell it: {drive_for(general)}"
+        f"{name}: not determined, it stays near the description. To determine it: "
+        f"{drive_for(general)}"
         for name, general in _by_kind(open_ones, wheels)
     ]
     found += _pairs(parameters, fitted, wheels)
@@ -70,9 +71,9 @@ def _pairs(parameters: Sequence[Parameter], fitted: Fit, wheels: Sequence[str]) 
                 where = "-".join(dict.fromkeys(names))
                 kinds.setdefault((one.name, other.name), []).append((where, together))
     return [
-        f"{one} and {other} are told only together, correlation "
+        f"{one} and {other} are determined only together, correlation "
         f"{max((value for _, value in pairs), key=abs):.2f}"
         + (f" ({', '.join(where for where, _ in pairs if where)})" if pairs[0][0] else "")
-        + f". To tell them apart: {drive_for(other)}"
+        + f". To separate them: {drive_for(other)}"
         for (one, other), pairs in kinds.items()
     ]

@@ -22,14 +22,14 @@ _ABSENT = {
     "supply.auxiliary_power": (0.0, 50.0),
 }
 
-# The drive that would tell a value, by the beginning of its key.
+# The drive that would determine a value, by the beginning of its key.
 _DRIVES = (
     ("robot.mass_center", "circles and spins while driving, at several headings"),
     ("robot.mass", "starts and stops at full acceleration, straight, at several headings"),
     ("robot.inertia_z", "spins on the spot that start and stop at full acceleration"),
     ("robot.wheel_inertia", "spins and straight starts: it shows only beside mass and inertia_z"),
     ("motor.rotor_inertia", "spins and straight starts: it shows only beside mass and inertia_z"),
-    ("motor.torque_constant", "none, power tells R / k^2 alone: measure the motor's idle speed"),
+    ("motor.torque_constant", "none, power shows R / k^2 alone: measure the motor's idle speed"),
     ("motor.resistance", "hard acceleration, where copper loss counts, and k known otherwise"),
     (
         "supply.auxiliary_power",

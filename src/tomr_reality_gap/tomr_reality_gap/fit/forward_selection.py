@@ -103,7 +103,7 @@ def finding_cost(samples: int, explained: float = 0.0) -> float:
 
 
 def _is_large_enough(fitted: FittedModel, first: int) -> bool:
-    """Whether every hypothesis from the first added on has a size that can be told from none."""
+    """Whether every hypothesis from the first added on has a size that is significant."""
     at = sum(len(item.parameters) for item in fitted.model.hypotheses[:first])
     for hypothesis, offsets in zip(
         fitted.model.hypotheses[first:], fitted.model.offsets[first:], strict=True

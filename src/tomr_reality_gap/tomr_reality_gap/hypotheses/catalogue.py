@@ -209,7 +209,7 @@ def _late(base: ParameterisedRobot, wheels: Sequence[str]) -> Iterator[Hypothesi
     for where in _places(effect_id, wheels):
         keys = _keys(effect_id, "delay", where, wheels)
         for number, delay in enumerate(_LATE):
-            start = 1e-6 * (number + 1)  # what tells hypotheses of one name apart
+            start = 1e-6 * (number + 1)  # what distinguishes hypotheses of one name
             parameter = Parameter(
                 "delay", keys, "s", abs(delay), step=0.1 * _LATE[0], discrete_offset=delay
             )

@@ -16,7 +16,7 @@ class Hypothesis:
     parameters: tuple[Parameter, ...]  # the first is the size
     start: Mapping[str, float] = field(kw_only=True, factory=dict)  # values that it brings along
     log_prior: float = field(kw_only=True, default=0.0)
-    # Smallest size that data sampled like these can tell from nothing.
+    # Smallest size that data sampled like these can show.
     least: float = field(kw_only=True, default=0.0)
 
     @property
@@ -31,5 +31,5 @@ class Hypothesis:
 
     @property
     def key(self) -> tuple[object, ...]:
-        """What tells it from others of its name: the shape that it starts from."""
+        """What distinguishes it from others of its name: the shape that it starts from."""
         return (self.name, *self.start.items())
