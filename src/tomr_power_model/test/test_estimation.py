@@ -17,7 +17,7 @@ from tomr_power_model.estimation.gauss_newton import (
 from tomr_power_model.estimation.linear_gaussian import Gram, solve
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, per_wheel
 from tomr_power_model.estimation.robust import soft_l1
-from tomr_power_model.estimation.statistics import autocorrelation_time, robust_std
+from tomr_power_model.estimation.statistics import autocorrelation, autocorrelation_time, robust_std
 from tomr_power_model.robot import read_description
 
 Array = NDArray[np.float64]
@@ -116,7 +116,9 @@ def test_hopeless_problems_are_left_alone(linear: tuple[Array, Array]) -> None:
 
 
 def test_autocorrelation_ends_with_each_piece() -> None:
-    """(1, 1) twice: lag one pairs within pieces only, 2 of 4."""
+    """(1, -1, 1, -1) twice: three pairs of product -1 over four squares in each."""
+    alternating = np.array([1.0, -1.0, 1.0, -1.0])
+    assert autocorrelation([alternating, alternating])[1] == pytest.approx(-6.0 / 8.0)
     assert autocorrelation_time([np.ones(2), np.ones(2)]) == pytest.approx(2.0)
     assert autocorrelation_time([np.ones(400)], 10, 0.03) > 15.0
     assert robust_std(np.array([-1.0, 1.0, 1.0, 50.0])) == pytest.approx(1.4826, rel=1e-4)
