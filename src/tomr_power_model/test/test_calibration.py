@@ -247,3 +247,10 @@ def test_closed_loop_feels_the_same_roller_drag(slip: float) -> None:
     torque = model.power(WheelMotion(np.array([speed]), np.zeros((1, 3)))).torque[0]
     loop = ClosedLoop.of(robot, model, 0.005)
     np.testing.assert_allclose(loop._body_torque(speed), torque, rtol=1e-9)
+
+
+def test_a_tolerance_is_half_of_a_range_in_which_all_is_equally_likely() -> None:
+    choice = Choice(keys=("robot.mass",), tolerances={"robot.mass": 0.03})
+    (mass,) = choose(VALUES, ROBOT.wheel_names, choice, "test")
+    assert mass.prior_mean == ROBOT.mass
+    assert mass.prior_std == pytest.approx(0.03 * ROBOT.mass / 3.0**0.5)

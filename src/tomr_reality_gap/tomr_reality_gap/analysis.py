@@ -8,7 +8,6 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.effects.scales import Scales
 from tomr_power_model.estimation.linear_gaussian import Gram, solve
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot
 from tomr_power_model.robot import Robot
@@ -32,7 +31,6 @@ class AnalysisResult:
     base: ParameterisedRobot
     robot: Robot  # as described
     source: str  # robot.yaml
-    scales: Scales
     candidates: tuple[Hypothesis, ...]
     basis: BasisResponses
     baseline: SimulatorBaseline | None = None

@@ -67,7 +67,6 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
         base,
         ready.robot,
         str(request.robot),
-        ready.scales,
         candidates,
         basis,
         baseline,

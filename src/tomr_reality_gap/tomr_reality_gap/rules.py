@@ -66,12 +66,9 @@ def confidence_of(log_odds: Sequence[float]) -> float:
 
 
 def is_unmodelled(evidence: float, named: float, cost: float) -> bool:
-    """Whether an effect without a name is there.
+    """Whether an effect without a name is there, from its log evidence and that of all named ones.
 
-    Args:
-        evidence: log, that it brings.
-        named: log evidence of all named findings.
-        cost: log evidence that any finding must bring.
+    `cost` is the log evidence that any finding must bring.
     """
     return evidence > max(_UNMODELLED_COST, cost, SIMULATOR.unmodelled * named)
 

@@ -17,7 +17,7 @@ from tomr_power_model.calibration.samples import TOTAL, Samples, samples_of
 from tomr_power_model.calibration.scoring import Scores, score, suspicious
 from tomr_power_model.errors import InputError
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, Values, prior_stds
-from tomr_power_model.robot import WHEELS, Robot
+from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
 Skips = Mapping[str, Sequence[tuple[float, float]]]
@@ -164,7 +164,6 @@ def calibrate(
         choice,
         quantity=before.measurement.quantity,
         has_total=any(item[:, TOTAL].any() for item in measured),
-        has_motors=any(item[:, :WHEELS].any() for item in measured),
     )
     parameters = tuple(choose(values, before.wheel_names, choice, place))
     problem = Problem(described, parameters, tuple(samples))

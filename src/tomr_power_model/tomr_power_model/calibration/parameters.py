@@ -49,7 +49,6 @@ class Choice:
     shared: tuple[str, ...] = ()  # of these one value for all wheels; EVERY: of all
     tolerances: Mapping[str, float] = field(factory=dict)  # relative half ranges, by general key
     has_total: bool = False  # whether the whole robot's power was measured
-    has_motors: bool = True
     quantity: str = "power"
 
 

@@ -36,7 +36,6 @@ class Round:
     jacobian: Jacobian
     noise: Noise
     tried: tuple[FittedModel, ...]  # refined additions, best first
-    screened: tuple[Screened, ...]  # by their linear gains, best first
 
 
 @frozen
@@ -72,7 +71,7 @@ def forward_selection(
         without = without or current
         cost = finding_cost(len(dataset.value), current.evidence - without.evidence)
         tried.sort(key=lambda item: len(item.model.hypotheses) * cost - item.evidence)
-        rounds.append(Round(jacobian, noise, tuple(tried), tuple(screened)))
+        rounds.append(Round(jacobian, noise, tuple(tried)))
         added = len(tried[0].model.hypotheses) - len(model.hypotheses) if tried else 0
         if not tried or tried[0].evidence < current.evidence + added * cost:
             break

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tomr_power_model.estimation.gauss_newton import Linearisation, Start, maximise
 from tomr_power_model.estimation.noise import Noise
-from tomr_power_model.estimation.parameter import Parameter, bounds, prior_stds
+from tomr_power_model.estimation.parameter import bounds, prior_stds
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.jacobian import Jacobian
 from tomr_reality_gap.fit.model import Model
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 Tick = Callable[[int], None]
 State = tuple[Model, Array]  # a model, and its sensor nuisances [prior standard deviations]
 
-LARGEST_STEP = 4.0  # prior standard deviations
+_LARGEST_STEP = 4.0  # prior standard deviations
 _MOST_OFF = 4.0  # of a sensor nuisance: farther off it is a finding, and its column not linear
 
 
@@ -76,8 +76,8 @@ def refine(
 
 def _start(model: Model, sensors: Array) -> Start:
     (low, high), (own_low, own_high) = bounds(model.nuisances), bounds(model.own)
-    std, own_std, off = prior_stds(model.nuisances), prior_stds(model.own), _MOST_OFF
-    edge = np.full(len(sensors), off)
+    std, own_std = prior_stds(model.nuisances), prior_stds(model.own)
+    edge = np.full(len(sensors), _MOST_OFF)
     lower = np.concatenate([low / std, -edge, own_low / own_std])
     upper = np.concatenate([high / std, edge, own_high / own_std])
     return Start(units_of(model, sensors), lower, upper, largest_steps(model, len(sensors)))
@@ -106,15 +106,10 @@ def _points(dataset: Dataset, models: Sequence[Model], tick: Tick) -> list[tuple
     return found
 
 
-def largest_step(parameter: Parameter) -> float:
-    """How far a derivative is good for [prior_std]: a discrete alternative is no small step."""
-    return 1.0 if parameter.discrete_offset else LARGEST_STEP
-
-
 def largest_steps(model: Model, sensors: int) -> Array:
-    """The same of all unknowns of a model, as `units_of` has them."""
-    kept = [LARGEST_STEP] * (len(model.nuisances) + sensors)
-    return np.array([*kept, *(largest_step(parameter) for parameter in model.own)])
+    """How far derivatives are good for [prior_stds]; a discrete alternative is no small step."""
+    kept = [_LARGEST_STEP] * (len(model.nuisances) + sensors)
+    return np.array([*kept, *(1.0 if p.discrete_offset else _LARGEST_STEP for p in model.own)])
 
 
 def units_of(model: Model, sensors: Array) -> Array:

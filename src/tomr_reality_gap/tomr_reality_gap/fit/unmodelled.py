@@ -60,7 +60,6 @@ class Unmodelled:
     family: Family
     evidence: float  # log, against nothing but the named model, of all wheels that have it
     wheels: tuple[int, ...]
-    by_wheel: tuple[float, ...]
     columns: Array  # of its basis functions at those wheels, whitened, (n, k)
     shapes: tuple[Shape, ...]
     weights: tuple[Array, ...]  # of the basis functions at those wheels [N m], (k,) each
@@ -106,9 +105,7 @@ def _fitted(rest: Remainder, basis: BasisResponses, family: Family, response: Ar
         weights.append(basis.size * whole.mean[rows])
         covariance = basis.size**2 * whole.covariance[np.ix_(rows, rows)]
         shapes.append(_shape(family, names[wheel], weights[-1], covariance))
-    return Unmodelled(
-        family, whole.evidence - alone, wheels, tuple(gains), chosen, tuple(shapes), tuple(weights)
-    )
+    return Unmodelled(family, whole.evidence - alone, wheels, chosen, tuple(shapes), tuple(weights))
 
 
 def _only(columns: Array, rows: NDArray[np.intp]) -> Array:
