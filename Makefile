@@ -58,10 +58,11 @@ test: lint ## run every check and test
 	$(BIN)/pytest -n $(WORKERS) -m "not serial" $(ARGS)
 	$(BIN)/pytest -m serial $(ARGS) || [ $$? -eq 5 ] # 5: none was selected
 
-lint: setup ## ruff and mypy only
+lint: setup ## ruff, mypy and import-linter only
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(BIN)/lint-imports --no-cache --no-logo
 
 format: setup ## rewrite the sources in the house format
 	$(BIN)/ruff check --fix

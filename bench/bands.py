@@ -10,7 +10,7 @@ bands. With recordings: a section for robot.yaml.
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,12 +25,12 @@ from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.calibrated import fit_bands
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
-from tomr_fault_diag.training.drives import random_drive
-from tomr_fault_diag.training.labels import spread
-from tomr_fault_diag.training.planar.generate import simulate
 from tomr_power_model.cli import run_main
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import load_robot, read_node_sections, shipped_robot
+from tomr_training.drives import random_drive
+from tomr_training.labels import spread
+from tomr_training.planar.generate import NORMAL, simulate
 
 Array = NDArray[np.float64]
 _FIRST_SEED = 30_000_000
@@ -47,17 +47,19 @@ def simulated(count: int) -> None:
     reference = shipped_robot("reference")
     seeds = range(_FIRST_SEED, _FIRST_SEED + count)
     drives = [evolve(random_drive(reference, seed, None), bumps=()) for seed in seeds]
-    batch = simulate(drives)
-    told = batch.labels == 0
-    told[0] = False
-    residual, _ = batch.compared.residuals(BandSettings())
-    change = spread(batch.compared.modelled)
-    rows = [np.moveaxis(part, 1, -1)[told] for part in (residual, batch.compared.modelled, change)]
-    fitted = fit_bands(*rows)
+    simulated = [simulate(drive) for drive in drives]
+    kept = [(drive.labels == NORMAL) & (np.arange(len(drive.labels)) > 0) for drive in simulated]
+
+    def joined(parts: Iterable[Array]) -> Array:
+        return np.concatenate([part[rows] for part, rows in zip(parts, kept, strict=True)])
+
+    modelled = [drive.compared.modelled for drive in simulated]
+    residual = joined(drive.compared.residuals(BandSettings())[0] for drive in simulated)
+    fitted = fit_bands(residual, joined(modelled), joined(map(spread, modelled)))
     print(yaml.safe_dump({"fitted": rounded(fitted)}, sort_keys=False))
     for name, bands in (("fitted", fitted), ("shipped", BandSettings()), ("paper", PAPER_BANDS)):
-        _, band = batch.compared.residuals(bands)
-        outside = np.abs(rows[0]) > np.moveaxis(band, 1, -1)[told]
+        band = joined(drive.compared.residuals(bands)[1] for drive in simulated)
+        outside = np.abs(residual) > band
         shares = ", ".join(
             f"{kind} {100 * outside[:, s].mean():.2f} %" for kind, s in _KINDS.items()
         )

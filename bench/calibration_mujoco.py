@@ -20,17 +20,17 @@ from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS
-from tomr_fault_diag.training.drives import every_value
 from tomr_power_model.calibrate_cli import main as tomr_calibrate
 from tomr_power_model.calibration.problem import modelled_power
-from tomr_power_model.calibration.recorded import read_recorded
 from tomr_power_model.calibration.samples import samples_of
+from tomr_power_model.drive.read import read_drive
 from tomr_power_model.messages.bag import bag_message
 from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import Robot, load_robot
 from tomr_sim_bridge.missions import drive, load_mission, start_mission
 from tomr_sim_bridge.plant.samples import build
+from tomr_training.drives import every_value
 
 Array = NDArray[np.float64]
 
@@ -104,7 +104,7 @@ def streamed(bag: Path, robot: str) -> tuple[Array, Array, Array]:
 
 def offline(bag: Path, robot: Robot) -> tuple[Array, Array]:
     """Measured and encoder-derived power of the motors, means of 50 ms, (n, 3) each."""
-    samples = samples_of(read_recorded(bag, robot), robot, 0.05, 0.005)
+    samples = samples_of(read_drive(bag, robot), robot, 0.05, 0.005)
     modelled = modelled_power(robot, samples.motion, samples.parts)[:, :3]
     window = np.unique(np.floor(samples.time / _WINDOW_S), return_inverse=True)[1]
     count = np.bincount(window)

@@ -23,10 +23,11 @@ from tqdm import tqdm
 
 from tomr_power_model.calibrate_cli import main as tomr_calibrate
 from tomr_power_model.calibration.problem import modelled_power
-from tomr_power_model.calibration.recorded import Recorded, read_recorded
 from tomr_power_model.calibration.samples import Samples, samples_of
+from tomr_power_model.drive.read import read_drive
+from tomr_power_model.drive.record import Drive
+from tomr_power_model.dynamics.drives import InverseDynamics
 from tomr_power_model.model.scores import accuracy
-from tomr_power_model.physics.model import PhysicalModel
 from tomr_power_model.robot import Robot, load_robot
 from tomr_sim_bridge.cli.import_robotino import import_robotino
 from tomr_sim_bridge.importers.dataset import default_dataset
@@ -53,7 +54,7 @@ MODELS: dict[str, tuple[str, ...] | None] = {
 
 
 @frozen
-class Drive:
+class Straight:
     """One straight drive."""
 
     heading: float  # degrees
@@ -65,7 +66,7 @@ class Drive:
         return round(self.heading / 5.0) % 2 == 1
 
 
-SETS: dict[str, Callable[[Drive], bool]] = {
+SETS: dict[str, Callable[[Straight], bool]] = {
     "0.1 m/s, fitted": lambda d: d.speed == 0.1 and d.fitted_heading,
     "0.1 m/s, other headings": lambda d: d.speed == 0.1 and not d.fitted_heading,
     "0.2 m/s, other headings": lambda d: d.speed == 0.2 and not d.fitted_heading,
@@ -74,23 +75,25 @@ SETS: dict[str, Callable[[Drive], bool]] = {
 }
 
 
-def drives_in(folder: Path) -> list[Drive]:
+def drives_in(folder: Path) -> list[Straight]:
     """The drives of an imported data set."""
     with (folder / "index.csv").open(newline="", encoding="utf-8") as file:
         return [
-            Drive(float(row["heading_deg"]), round(float(row["speed_m_s"]), 1), folder / row["bag"])
+            Straight(
+                float(row["heading_deg"]), round(float(row["speed_m_s"]), 1), folder / row["bag"]
+            )
             for row in csv.DictReader(file)
         ]
 
 
-def figures_of(recorded: Recorded, samples: Samples, robot: Robot) -> dict[str, Any]:
+def figures_of(recorded: Drive, samples: Samples, robot: Robot) -> dict[str, Any]:
     """Accuracies of one drive, and the mean currents of its wheels."""
     measured, model = samples.measured[:, :3], modelled_power(robot, samples.motion)[:, :3]
     second = np.unique(np.floor(samples.time / _SECOND), return_inverse=True)[1]
     total = np.column_stack([measured.sum(axis=1), model.sum(axis=1)])
     by_second = np.column_stack([np.bincount(second, column) for column in total.T])
     steady = samples.time > _STARTING
-    current = np.abs(PhysicalModel.of(robot).power(samples.mean_motion).current)
+    current = np.abs(InverseDynamics.of(robot).power(samples.mean_motion).current)
     rows = np.isin(recorded.power_time, samples.time[steady])
     return {
         "sample": accuracy(total[:, 0], total[:, 1]),
@@ -125,7 +128,7 @@ def summary(found: Sequence[dict[str, Any]]) -> dict[str, float]:
     }
 
 
-def _calibrated(options: Sequence[str], drives: Sequence[Drive], out: Path) -> str:
+def _calibrated(options: Sequence[str], drives: Sequence[Straight], out: Path) -> str:
     bags = [str(drive.path) for drive in drives]
     with contextlib.redirect_stdout(io.StringIO()):
         if tomr_calibrate([*bags, "--robot", ROBOT, "--out", str(out), *options]):
@@ -146,7 +149,7 @@ def measure_robotino() -> dict[str, Any]:
         robot = load_robot(ROBOT)
         prepared = []
         for drive in tqdm(drives, desc="reading", unit="drive"):
-            recorded = read_recorded(drive.path, robot)
+            recorded = read_drive(drive.path, robot)
             prepared.append((drive, recorded, samples_of(recorded, robot, _SPAN, 0.005)))
         report: dict[str, Any] = {}
         for number, (model, options) in enumerate(MODELS.items()):

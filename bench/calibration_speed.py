@@ -8,9 +8,10 @@ import numpy as np
 from attrs import evolve
 from rich.console import Console
 
+from tomr_power_model.dynamics.drives import InverseDynamics, WheelMotion
+from tomr_power_model.dynamics.simulation import Simulation
+from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.model.predictor import PowerPredictor
-from tomr_power_model.physics.model import PhysicalModel, WheelMotion
-from tomr_power_model.response.closed_loop import ClosedLoop
 from tomr_power_model.robot import Robot, load_robot
 
 _ROWS = 200_000
@@ -58,17 +59,18 @@ def measure_speed() -> dict[str, Any]:
         ("reference", load_robot("reference")),
         ("reference with roller drag", _with_drag(load_robot("reference"))),
     ):
-        model = PhysicalModel.of(robot)
+        model = InverseDynamics.of(robot)
         many = WheelMotion(random.normal(0, 5, (_ROWS, 3)), random.normal(0, 20, (_ROWS, 3)))
         one = WheelMotion(many.speed[:1], many.acceleration[:1])
-        loop = ClosedLoop.of(robot, model, 0.005)
+        simulation = Simulation(vehicle_of(robot))
 
-        def steps(loop: ClosedLoop = loop) -> None:
-            state = loop.moving((0.0, 0.0, 0.0))
+        def steps(simulation: Simulation = simulation) -> None:
+            state, inputs = simulation.start(), simulation.inputs()
+            inputs[:3] = (0.3, 0.1, 0.2)
             for _ in range(_STEPS):
-                state = loop.step(state, (0.3, 0.1, 0.2))
+                simulation.advance(state, inputs)
 
-        def single(model: PhysicalModel = model, one: WheelMotion = one) -> None:
+        def single(model: InverseDynamics = model, one: WheelMotion = one) -> None:
             for _ in range(_STEPS):
                 model.power(one)
 

@@ -11,10 +11,11 @@ calibrated on healthy drives and with the paper's fixed 5 %.
 A fault is observable in a tick if, free of sensor noise, it has changed the power of some motor or
 some reported wheel speed by more than 3 sigma of the sensor and the tolerance of a healthy robot in
 each of the last 0.2 s, against a twin of the same robot in the same drive without the fault; a
-slippery floor must make a wheel slip besides (`training/labels.py`). Decisions on observable faults
-count from 1 s after the fault has begun to show; what comes before is the delay, counted from the
-start of the first tick that differs. Shows that are a second or more apart count as onsets of their
-own; one that is not named until half a second after it has ceased to show has an infinite delay.
+slippery floor must make a wheel slip besides (`tomr_training/labels.py`). Decisions on observable
+faults count from 1 s after the fault has begun to show; what comes before is the delay, counted
+from the start of the first tick that differs. Shows that are a second or more apart count as onsets
+of their own; one that is not named until half a second after it has ceased to show has an infinite
+delay.
 The 3 s after a fault's end count for nothing.
 Standing still, "not observable in this motion" counts as naming no fault.
 
@@ -45,12 +46,12 @@ from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STATES
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
-from tomr_fault_diag.training.drives import Drive, random_drive
-from tomr_fault_diag.training.labels import SLIPPING, Flags, Noise, deviates, lasting
-from tomr_fault_diag.training.planar.residuals import Compared
-from tomr_fault_diag.training.watch import Plain, Watched, healthy_twin, watch
 from tomr_power_model.cli import run_main
 from tomr_power_model.robot import shipped_robot
+from tomr_training.drives import Drive, random_drive
+from tomr_training.labels import SLIPPING, Flags, GroundTruth, Noise, deviates, lasting
+from tomr_training.planar.residuals import Compared
+from tomr_training.simulated_drive import LabelledDrive, healthy_twin, simulated_drive
 
 FIRST_SEED = 1_000_000  # of faulty drives; healthy ones follow a million later
 _HEALTHY = 1_000_000
@@ -116,7 +117,7 @@ class Outcome:
 def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[ResidualFrame]:
     """The same residuals in other bands."""
     modelled = np.array([[item.modelled for item in frame.residuals] for frame in frames])
-    _, band = Compared(modelled[:, :, None], modelled[:, :, None]).residuals(bands)
+    _, band = Compared(modelled, modelled).residuals(bands)
     return [
         evolve(
             frame,
@@ -125,7 +126,7 @@ def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[Resid
                 for item, width in zip(frame.residuals, row, strict=True)
             ),
         )
-        for frame, row in zip(frames, band[:, :, 0], strict=True)
+        for frame, row in zip(frames, band, strict=True)
     ]
 
 
@@ -141,18 +142,12 @@ def named_by(kind: Kind, frames: Sequence[ResidualFrame]) -> Codes:
     return np.array(named)
 
 
-def observable(drive: Drive, watched: Watched, twin: Plain) -> Flags:
+def observable(drive: Drive, labelled: LabelledDrive, twin: GroundTruth) -> Flags:
     """Ticks in which the fault has been measurable for 0.2 s, (n,)."""
-    shows = deviates(
-        watched.plain.power[:, :, None],
-        watched.plain.speed[:, :, None],
-        twin.power[:, :, None],
-        twin.speed[:, :, None],
-        Noise.of([drive.plant]),
-    )[:, 0]
-    shows &= watched.faulty
+    shows = deviates(labelled.truth, twin, Noise.of(drive.plant))
+    shows &= labelled.faulty
     if drive.mission.faults[0].fault_id == "floor_slippery":
-        shows &= np.abs(watched.plain.slip).max(axis=1) > SLIPPING
+        shows &= np.abs(labelled.truth.slip).max(axis=1) > SLIPPING
     return lasting(shows)
 
 
@@ -165,11 +160,11 @@ def true_state(drive: Drive) -> int:
     return CONTROL if fault.fault_id == "control_signal_lost" else MOTOR + wheel
 
 
-def score_faulty(drive: Drive, watched: Watched, twin: Plain, named: Codes) -> Outcome:
+def score_faulty(drive: Drive, labelled: LabelledDrive, twin: GroundTruth, named: Codes) -> Outcome:
     """Hold the states named in a drive with a fault against the truth."""
     state, fault = true_state(drive), drive.mission.faults[0]
     severity = float(str(fault.settings["severity"]))
-    shows = observable(drive, watched, twin)
+    shows = observable(drive, labelled, twin)
     onsets, late = [], np.zeros(len(named), dtype=bool)
     for start, end in episodes(shows):
         hit = np.flatnonzero(named[start : end + 1 + _AFTER] == state)
@@ -178,7 +173,7 @@ def score_faulty(drive: Drive, watched: Watched, twin: Plain, named: Codes) -> O
         onsets.append(Onset(state, severity, float(first)))
         late[start : start + _GRACE] = True
     ticks = np.arange(len(named))
-    begin, end = np.flatnonzero(watched.faulty)[[0, -1]]
+    begin, end = np.flatnonzero(labelled.faulty)[[0, -1]]
     well = (ticks < begin) | (ticks > end + _RECOVERY)
     counted = shows & ~late
     wheel = fault.settings.get("wheel")
@@ -190,7 +185,7 @@ def score_faulty(drive: Drive, watched: Watched, twin: Plain, named: Codes) -> O
     return Outcome(
         decisions,
         counts(state, named[counted & idle]),
-        counts(state, named[watched.faulty & ~shows & ~late]),
+        counts(state, named[labelled.faulty & ~shows & ~late]),
         {bin_of(severity): (int((named[counted] == state).sum()), int(counted.sum()))},
         tuple(onsets),
         tuple(named[rises & (ticks < begin)].tolist()),
@@ -198,10 +193,10 @@ def score_faulty(drive: Drive, watched: Watched, twin: Plain, named: Codes) -> O
     )
 
 
-def score_healthy(watched: Watched, named: Codes) -> Outcome:
+def score_healthy(labelled: LabelledDrive, named: Codes) -> Outcome:
     """Count what was named in a drive without a fault."""
     rises = np.flatnonzero(np.diff(np.concatenate([[NORMAL], named])) & (named != NORMAL))
-    slips = np.abs(watched.plain.slip).max(axis=1) > SLIPPING
+    slips = np.abs(labelled.truth.slip).max(axis=1) > SLIPPING
     alarms, excused = [], 0
     for tick in rises:
         if named[tick] == SLIP and slips[max(0, tick - _EXCUSE) : tick + 1].any():
@@ -245,22 +240,23 @@ def bin_of(severity: float) -> str:
 _BINS = (("0.50 to 0.70", 0.7), ("0.70 to 0.85", 0.85), ("0.85 to 1", 0.999999), ("1", 1.0))
 
 
-def seen(seed: int, kind: str | None, folder: Path | None) -> tuple[Drive, Watched, Plain | None]:
+def seen(
+    seed: int, kind: str | None, folder: Path | None
+) -> tuple[Drive, LabelledDrive, GroundTruth | None]:
     """A drive, what the first two stages made of it, and its healthy twin if it has a fault."""
     drive = random_drive(shipped_robot("reference"), seed, kind)
     kept = None if folder is None else folder / f"{seed}.pickle"
     if kept is not None and kept.exists():
-        watched, twin = pickle.loads(kept.read_bytes())
-        return drive, watched, twin
-    watched = watch(drive)
+        labelled, twin = pickle.loads(kept.read_bytes())
+        return drive, labelled, twin
+    labelled = simulated_drive(drive)
     twin = None
     if drive.mission.faults:
-        rows = watched.first - 1 + np.arange(len(watched.frames))
-        plain = healthy_twin(drive)
-        twin = Plain(plain.power[rows], plain.speed[rows], plain.slip[rows])
+        rows = labelled.first - 1 + np.arange(len(labelled.frames))
+        twin = healthy_twin(drive).of_ticks(rows)
     if kept is not None:
-        kept.write_bytes(pickle.dumps((watched, twin)))
-    return drive, watched, twin
+        kept.write_bytes(pickle.dumps((labelled, twin)))
+    return drive, labelled, twin
 
 
 def simulated(seed: int, kind: str | None, folder: Path | None) -> None:
@@ -270,14 +266,14 @@ def simulated(seed: int, kind: str | None, folder: Path | None) -> None:
 
 def scored(seed: int, kind: str | None, folder: Path | None) -> dict[str, Outcome]:
     """A drive scored by every classifier."""
-    drive, watched, twin = seen(seed, kind, folder)
+    drive, labelled, twin = seen(seed, kind, folder)
     outcomes = {}
     for name, classifier in kinds().items():
-        named = named_by(classifier, rebanded(watched.frames, classifier.bands))
+        named = named_by(classifier, rebanded(labelled.frames, classifier.bands))
         outcomes[name] = (
-            score_healthy(watched, named)
+            score_healthy(labelled, named)
             if twin is None
-            else score_faulty(drive, watched, twin, named)
+            else score_faulty(drive, labelled, twin, named)
         )
     return outcomes
 

@@ -25,41 +25,35 @@ from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.classifier.states import FAULTLESS
 from tomr_fault_diag.residuals.frame import SPEEDS, Residual, ResidualFrame, Unit
 from tomr_fault_diag.residuals.settings import BandSettings
-from tomr_fault_diag.training.drives import random_drive
-from tomr_fault_diag.training.planar.generate import UNTOLD, simulate
 from tomr_power_model.cli import run_main
 from tomr_power_model.robot import shipped_robot
+from tomr_training.drives import random_drive
+from tomr_training.planar.generate import IGNORED, simulate
 
 _FIRST_SEED = 40_000_000
-_BATCH = 300
 _PERIOD = 50_000_000  # ns
 _UNITS: list[Unit] = ["rad/s" if channel in SPEEDS else "W" for channel in range(10)]
 
 
-def alarms(first: int) -> tuple[list[str], int, int]:
-    """Faults named in a batch of drives, those where a wheel did slip, and ticks."""
-    reference = shipped_robot("reference")
-    batch = simulate([random_drive(reference, seed, None) for seed in range(first, first + _BATCH)])
-    values = np.stack([*batch.compared.residuals(BandSettings()), batch.compared.modelled])
+def alarms(seed: int) -> tuple[list[str], int, int]:
+    """Faults named in a drive, those where a wheel did slip, and ticks."""
+    drive = simulate(random_drive(shipped_robot("reference"), seed, None))
+    values = np.stack([*drive.compared.residuals(BandSettings()), drive.compared.modelled])
+    classifier = FaultClassifier(make_judge(ClassifierSettings()))
     found: list[str] = []
-    slipped, ticks = 0, 0
-    for column in range(_BATCH):
-        classifier = FaultClassifier(make_judge(ClassifierSettings()))
-        length = int(np.flatnonzero(batch.labels[:, column] != UNTOLD)[-1]) + 1
-        ticks += length
-        for tick, rows in enumerate(values[:, :length, :, column].transpose(1, 2, 0).tolist()):
-            residuals = tuple(
-                Residual(residual, band, modelled, unit)
-                for (residual, band, modelled), unit in zip(rows, _UNITS, strict=True)
-            )
-            diagnosis = classifier.classify(ResidualFrame((tick + 1) * _PERIOD, residuals))
-            if diagnosis and diagnosis.changed and diagnosis.state.name not in FAULTLESS:
-                recent = batch.labels[max(0, tick - 10) : tick + 1, column]
-                if (recent == UNTOLD).any():
-                    slipped += 1
-                else:
-                    found.append(diagnosis.state.name)
-    return found, slipped, ticks
+    slipped = 0
+    for tick, rows in enumerate(values.transpose(1, 2, 0).tolist()):
+        residuals = tuple(
+            Residual(residual, band, modelled, unit)
+            for (residual, band, modelled), unit in zip(rows, _UNITS, strict=True)
+        )
+        diagnosis = classifier.classify(ResidualFrame((tick + 1) * _PERIOD, residuals))
+        if diagnosis and diagnosis.changed and diagnosis.state.name not in FAULTLESS:
+            if (drive.labels[max(0, tick - 10) : tick + 1] == IGNORED).any():
+                slipped += 1
+            else:
+                found.append(diagnosis.state.name)
+    return found, slipped, len(drive.labels)
 
 
 def _main(arguments: Sequence[str] | None) -> int:
@@ -68,10 +62,10 @@ def _main(arguments: Sequence[str] | None) -> int:
     )
     parser.add_argument("--hours", type=float, default=20.0)
     options = parser.parse_args(arguments)
-    count = max(1, round(options.hours * 3600.0 / 18.0 / _BATCH))
-    firsts = [_FIRST_SEED + _BATCH * batch for batch in range(count)]
+    count = max(1, round(options.hours * 3600.0 / 18.0))
+    seeds = range(_FIRST_SEED, _FIRST_SEED + count)
     with ProcessPoolExecutor(os.cpu_count()) as pool:
-        parts = list(tqdm(pool.map(alarms, firsts), total=count, unit="batch"))
+        parts = list(tqdm(pool.map(alarms, seeds, chunksize=20), total=count, unit="drive"))
     kinds = Counter(name for found, _, _ in parts for name in found)
     hours = sum(ticks for _, _, ticks in parts) * 0.05 / 3600.0
     total = sum(kinds.values())

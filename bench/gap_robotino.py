@@ -23,20 +23,19 @@ from time import monotonic, process_time
 from typing import Any
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
 from tomr_power_model.calibration.fitted import fitted_text
-from tomr_power_model.calibration.recorded import read_recorded
 from tomr_power_model.cli import run_main
+from tomr_power_model.drive.read import read_drive
 from tomr_power_model.model.scores import accuracy
 from tomr_power_model.robot import Robot, load_robot, read_description
 from tomr_reality_gap.alignment.channels import channels_of
-from tomr_reality_gap.alignment.forward import Forward
-from tomr_reality_gap.alignment.steady import steadied
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.explain import explain
 from tomr_reality_gap.explanation import Comparison, Explanation
 from tomr_reality_gap.mismatch.compare import comparison
@@ -202,10 +201,11 @@ def transferred(bags: Bags, surface: str, before: Path, after: Path) -> dict[str
 
 
 def _compared(path: Path, before: Robot, after: Robot) -> Comparison:
-    even, jitters = steadied(read_recorded(path, before))
-    forward = Forward.of(even, before, channels_of(even, before, 0.0, jitters))
-    values = forward.predict([before, after])
-    return comparison(forward, values, forward.run(after), is_held_out=True)
+    instant = evolve(before, sensors=evolve(before.sensors, power_window=0.0))
+    drive = read_drive(path, before)
+    simulation = RecordingSimulation.of(drive, before, channels_of(drive, instant))
+    values = simulation.predict([before, after])
+    return comparison(simulation, values, simulation.run(after), is_held_out=True)
 
 
 def measure(dataset: Path, surfaces: Sequence[str], out: Path) -> dict[str, Any]:

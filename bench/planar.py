@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from tomr_fault_diag.residuals.settings import BandSettings
-from tomr_fault_diag.training.drives import KINDS, random_drive
-from tomr_fault_diag.training.planar.generate import simulate
-from tomr_fault_diag.training.watch import watch
 from tomr_power_model.cli import run_main
 from tomr_power_model.robot import shipped_robot
+from tomr_training.drives import KINDS, random_drive
+from tomr_training.planar.generate import simulate
+from tomr_training.simulated_drive import simulated_drive
 
 Array = NDArray[np.float64]
 _FIRST_SEED = 600_000
@@ -31,12 +31,12 @@ _GROUPS = {"total power": [0], "motor powers": [1, 2, 3], "wheel speeds": [4, 5,
 def both(seed: int, kind: str | None) -> tuple[Array, Array]:
     """Residuals (ticks, 10) in MuJoCo and in the planar model, while the fault is in force."""
     drive = random_drive(shipped_robot("reference"), seed, kind)
-    watched = watch(drive)
-    planar, _ = simulate([drive]).compared.residuals(BandSettings())
-    frames = [[item.residual for item in frame.residuals] for frame in watched.frames]
-    ticks = watched.first - 1 + np.arange(len(frames))
-    chosen = (ticks < len(planar)) & (watched.faulty if kind else True)
-    return np.array(frames)[chosen], planar[ticks[chosen], :, 0]
+    labelled = simulated_drive(drive)
+    planar, _ = simulate(drive).compared.residuals(BandSettings())
+    frames = [[item.residual for item in frame.residuals] for frame in labelled.frames]
+    ticks = labelled.first - 1 + np.arange(len(frames))
+    chosen = (ticks < len(planar)) & (labelled.faulty if kind else True)
+    return np.array(frames)[chosen], planar[ticks[chosen]]
 
 
 def _main(arguments: Sequence[str] | None) -> int:

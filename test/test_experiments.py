@@ -20,7 +20,7 @@ from figures.result import Missing, Result  # noqa: E402
 from tomr_fault_diag.diagnosis.pipeline import Step  # noqa: E402
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame  # noqa: E402
 from tomr_power_model.cli import run_main  # noqa: E402
-from tomr_power_model.physics.model import PhysicalModel  # noqa: E402
+from tomr_power_model.dynamics.drives import InverseDynamics  # noqa: E402
 from tomr_sim_bridge.missions import parse_mission  # noqa: E402
 
 THETA = np.radians(heading.HEADINGS)
@@ -87,7 +87,7 @@ def test_steady_power_does_not_depend_on_the_mass_centre_without_drag() -> None:
     robot = simulated.reference()
     light = evolve(robot, physics={})
     middle, aside = mass_center.Position(0.0, 0.0), mass_center.Position(0.06, 1.0)
-    make = PhysicalModel.of
+    make = InverseDynamics.of
     straight, _ = mass_center._steady(make, middle.of(light))
     assert mass_center._steady(make, aside.of(light))[0] == pytest.approx(straight)
 

@@ -22,14 +22,14 @@ from others.library import columns_of, series_of, shape_of
 from others.refit import Fit, Refit, fitted, half_widths, parameters_of
 from others.sparse import Equation, Sparse
 
-from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.cli import run_main
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.parameter import ParameterisedRobot, per_wheel
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import read_description, robot_from_parameters
 from tomr_reality_gap.alignment.channels import channels_of
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 
 WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
 SECONDS = 10.0
@@ -43,7 +43,7 @@ def base() -> ParameterisedRobot:
 
 
 @pytest.fixture(scope="module")
-def forward(base: ParameterisedRobot) -> Forward:
+def forward(base: ParameterisedRobot) -> RecordingSimulation:
     """A drive in all directions, its channels not measured yet."""
     robot = base.robot
     command_time = np.arange(0.0, SECONDS, 0.05)
@@ -55,7 +55,7 @@ def forward(base: ParameterisedRobot) -> Forward:
     speed = held @ twist_to_wheels(robot).T
     power_time = np.arange(0.02, SECONDS, 0.02)
     blank = np.zeros((len(power_time), 3))
-    recorded = Recorded(
+    recorded = Drive(
         name="made",
         encoder_time=encoder_time,
         position=np.cumsum(speed, axis=0) * 0.01,
@@ -72,10 +72,10 @@ def forward(base: ParameterisedRobot) -> Forward:
         yaw_time=encoder_time,
         yaw_rate=np.zeros(len(encoder_time)),
     )
-    return Forward.of(recorded, robot, channels_of(recorded, robot, 0.005))
+    return RecordingSimulation.of(recorded, robot, channels_of(recorded, robot))
 
 
-def measuring(forward: Forward, real: ParameterisedRobot) -> Forward:
+def measuring(forward: RecordingSimulation, real: ParameterisedRobot) -> RecordingSimulation:
     """What the drive would have shown, had the robot been another one."""
     random = np.random.default_rng(0)
     value = forward.predict([real.robot])[0]
@@ -99,7 +99,7 @@ def test_everything_but_settings_and_geometry_is_refitted(base: ParameterisedRob
 
 
 def test_a_refit_finds_parameters_that_are_wrong(
-    base: ParameterisedRobot, forward: Forward
+    base: ParameterisedRobot, forward: RecordingSimulation
 ) -> None:
     names = ("robot.mass", "motor.wheel_2_joint.resistance", "motor.wheel_3_joint.resistance")
     parameters = [item for item in parameters_of(base, WHEELS) if item.name in names]
@@ -114,7 +114,7 @@ def test_a_refit_finds_parameters_that_are_wrong(
 
 
 def test_a_refit_stops_at_twice_the_described_value(
-    base: ParameterisedRobot, forward: Forward
+    base: ParameterisedRobot, forward: RecordingSimulation
 ) -> None:
     parameters = [
         parameter for parameter in parameters_of(base, WHEELS) if parameter.name == "robot.mass"
@@ -148,7 +148,7 @@ def test_intervals_are_those_of_least_squares() -> None:
     ],
 )
 def test_an_effect_has_the_terms_that_the_library_says(
-    effect: str, values: Mapping[str, float], base: ParameterisedRobot, forward: Forward
+    effect: str, values: Mapping[str, float], base: ParameterisedRobot, forward: RecordingSimulation
 ) -> None:
     """Its own terms tell most of the power that it adds, and more with those that come along."""
     given = {f"physics.{effect}.{name}": value for name, value in values.items()}

@@ -30,6 +30,7 @@ LIBRARIES = {
     "jinja2": ("python3-jinja2", "Jinja2"),
     "matplotlib": ("python3-matplotlib", "matplotlib"),
     "mujoco": ("python3-mujoco-pip", "mujoco"),
+    "numba": ("python3-numba", "numba"),
     "numpy": ("python3-numpy", "numpy"),
     "pytest": ("python3-pytest", "pytest"),
     "rich": ("python3-rich", "rich"),
@@ -38,8 +39,8 @@ LIBRARIES = {
     "tqdm": ("python3-tqdm", "tqdm"),
     "yaml": ("python3-yaml", "PyYAML"),
 }
-# Training simulates drives and needs torch; to diagnose needs neither, so neither is declared.
-TRAINING = {"torch", "tomr_sim_bridge"}
+# What no package.xml can name: requirements-train.txt.
+TRAINING = {"torch"}
 # Only a fleet of recordings needs Dask: requirements-fleet.txt.
 FLEET = {"distributed"}
 
@@ -66,10 +67,6 @@ def imports(path: Path) -> Iterator[str]:
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
             yield node.module
             yield from (f"{node.module}.{name.name}" for name in node.names)
-
-
-def trains(file: Path) -> bool:
-    return "training" in file.parts or file.name in ("train.py", "test_training.py")
 
 
 def each_package(*subset: str) -> pytest.MarkDecorator:
@@ -176,7 +173,11 @@ def test_imports_are_declared(package: Path) -> None:
     pinned = set(re.findall(r"^([\w-]+)", (ROOT / "requirements.txt").read_text(), re.MULTILINE))
     pinned |= {"hypothesis", "pytest"}
     for file in (*(package / package.name).rglob("*.py"), *package.glob("*/*.py")):
-        known = {package.name, *sys.stdlib_module_names, *(TRAINING if trains(file) else ())}
+        known = {
+            package.name,
+            *sys.stdlib_module_names,
+            *(TRAINING if package.name == "tomr_training" else ()),
+        }
         known |= FLEET if "fleet" in str(file.relative_to(package)) else set()
         for name in {full.partition(".")[0] for full in imports(file)} - known:
             key, requirement = LIBRARIES.get(name, (name, None))
@@ -185,31 +186,13 @@ def test_imports_are_declared(package: Path) -> None:
                 assert requirement in pinned, f"{file} imports {name}: not in requirements.txt"
 
 
-@each_package()
+@each_package("tomr_power_model", "tomr_fault_diag", "tomr_reality_gap", "tomr_sim_bridge")
 def test_only_nodes_import_rclpy(package: Path) -> None:
-    allowed = {"nodes", "cli", "demo"}
+    allowed = {"nodes", "cli"}
     for file in (package / package.name).rglob("*.py"):
         inside = file.relative_to(package / package.name).parts
         if inside[0] not in allowed and not file.name.endswith("_node.py"):
             assert not [name for name in imports(file) if name.split(".")[0] == "rclpy"], file
-
-
-@each_package("tomr_power_model", "tomr_fault_diag", "tomr_reality_gap")
-def test_no_package_imports_one_built_on_it(package: Path) -> None:
-    later = {"tomr_sim_bridge", "tomr_fault_diag", "tomr_reality_gap"} - {package.name}
-    for file in (package / package.name).rglob("*.py"):
-        roots = {name.partition(".")[0] for name in imports(file)}
-        assert not roots & (later - (TRAINING if trains(file) else set())), file
-
-
-@each_package("tomr_sim_bridge")
-def test_simulator_shares_no_physics_with_the_model(package: Path) -> None:
-    shared = {"physics", "geometry", "response", "model"}
-    for file in (package / package.name).rglob("*.py"):
-        for name in imports(file):
-            top, _, rest = name.partition(".")
-            if top == "tomr_power_model":
-                assert rest.partition(".")[0] not in shared, f"{file} imports {name}"
 
 
 def test_launch_files_start_commands_that_exist() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.calibration.calibrate import names_of
+from tomr_power_model.drive.cut import names_of
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.robot import WHEELS
 from tomr_reality_gap.prepared import prepared
@@ -50,14 +50,14 @@ def closed_loop(bag: Path, robot: Path, seconds: float = float("inf")) -> Predic
     """
     skips = {names_of((bag,))[0]: ((seconds, _FOREVER),)} if np.isfinite(seconds) else {}
     ready = prepared(Request(robot=robot, real=(bag,), skips=skips))
-    forward = ready.real[0]
-    values = forward.predict([ready.base.robot])[0]
-    recorded = forward.recorded
+    simulation = ready.real[0]
+    values = simulation.predict([ready.base.robot])[0]
+    recorded = simulation.recorded
     motors = {
         channel.wheel: MotorPower(
             _stamps(recorded.start_ns, channel.time), channel.value, values[part]
         )
-        for channel, part in zip(forward.channels, rows_of(forward.channels), strict=True)
+        for channel, part in zip(simulation.channels, rows_of(simulation.channels), strict=True)
         if channel.kind == "power"
     }
     return Prediction(

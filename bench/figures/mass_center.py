@@ -22,9 +22,9 @@ from tqdm import tqdm
 from figures.page import DERIVED, INK, MUTED, PHYSICAL, WANG2024, page, plain, titled
 from figures.result import Result
 from figures.simulated import driven, plain_mission, played, reference
+from tomr_power_model.dynamics.drives import InverseDynamics, PowerModel, WheelMotion
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.model.scores import accuracy, nrmse
-from tomr_power_model.physics.model import PhysicalModel, PowerModel, WheelMotion
 from tomr_power_model.robot import Robot
 from tomr_power_model.wang2024 import Coefficients, Wang2024Model
 from tomr_power_model.wang2024.fit import MOTOR_COEFFICIENTS
@@ -63,7 +63,7 @@ def fig4(scratch: Path) -> Result:
     ]
     robot = _dragging(reference())
     measured = _driven(robot, positions)
-    physical = np.array([_steady(PhysicalModel.of, place.of(robot)) for place in positions])
+    physical = np.array([_steady(InverseDynamics.of, place.of(robot)) for place in positions])
     found = {
         "measured": measured,
         "physical": physical,
@@ -196,7 +196,7 @@ def _map(axis: PolarAxes, positions: Sequence[Position], measured: Array, robot:
     """Change of power along +Y by position: the model as an area, the simulated robot as dots."""
     angles, distances = np.radians(np.arange(0, 361, 10)), np.arange(0.0, 0.0801, 0.005)
     steady = [
-        [_steady(PhysicalModel.of, Position(float(d), float(a)).of(robot))[0] for a in angles]
+        [_steady(InverseDynamics.of, Position(float(d), float(a)).of(robot))[0] for a in angles]
         for d in distances
     ]
     change = 100.0 * (np.array(steady) / steady[0][0] - 1.0)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from attrs import frozen
-from calibration_robotino import Drive, drives_in
+from calibration_robotino import Straight, drives_in
 from numpy.typing import NDArray
 from tqdm import tqdm
 
@@ -17,9 +17,9 @@ from tomr_fault_diag.cli.diagnose import STAGE_NODES
 from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
-from tomr_power_model.calibration.recorded import read_recorded
 from tomr_power_model.calibration.samples import Samples, samples_of
-from tomr_power_model.physics.model import WheelMotion
+from tomr_power_model.drive.read import read_drive
+from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import Robot, load_robot, read_node_sections
 from tomr_power_model.wang2024 import Samples as PaperSamples
@@ -38,7 +38,7 @@ STARTING = 1.0  # s, left out of a drive's mean: the wheels slip at the start
 class RealDrive:
     """One drive; motor power [W] is |i| (R |i| + k |omega|), its voltage being modelled."""
 
-    drive: Drive
+    drive: Straight
     samples: Samples
 
     @property
@@ -70,7 +70,7 @@ def drives(surface: str, scratch: Path, speeds: Sequence[float] = ()) -> list[Re
     described = robot()
     chosen = [item for item in drives_in(folder) if not speeds or item.speed in speeds]
     return [
-        RealDrive(item, samples_of(read_recorded(item.path, described), described, _SPAN, _WINDOW))
+        RealDrive(item, samples_of(read_drive(item.path, described), described, _SPAN, _WINDOW))
         for item in tqdm(chosen, desc=f"reading, {surface}", unit="drive", leave=False)
     ]
 

@@ -10,7 +10,7 @@ from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.parameter import ParameterisedRobot
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import Channel
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.prepared import prepared
 from tomr_reality_gap.request import Request
 
@@ -24,8 +24,8 @@ class Case:
     identity: str
     base: ParameterisedRobot
     robot: Robot
-    real: Forward
-    held: Forward
+    real: RecordingSimulation
+    held: RecordingSimulation
 
 
 def read_case(folder: Path) -> Case:
@@ -38,10 +38,10 @@ def read_case(folder: Path) -> Case:
     return Case(folder.name, ready.base, ready.robot, ready.real[0], ready.held[0])
 
 
-def residuals(forward: Forward, value: Array) -> list[Array]:
+def residuals(simulation: RecordingSimulation, value: Array) -> list[Array]:
     """Measured less simulated, by channel."""
-    rows = rows_of(forward.channels)
-    return [item.value - value[part] for item, part in zip(forward.channels, rows, strict=True)]
+    rows = rows_of(simulation.channels)
+    return [item.value - value[part] for item, part in zip(simulation.channels, rows, strict=True)]
 
 
 def powers(channels: tuple[Channel, ...]) -> list[int]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_reality_gap.alignment.channels import Channel
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 
 Array = NDArray[np.float64]
 Shape = tuple[frozenset[str], frozenset[str]]
@@ -21,16 +21,16 @@ Shape = tuple[frozenset[str], frozenset[str]]
 _SLOW = 0.15  # of the RMS speed: where friction at low speed is looked for
 
 
-def series_of(forward: Forward, robot: Robot) -> dict[str, Array]:
+def series_of(simulation: RecordingSimulation, robot: Robot) -> dict[str, Array]:
     """All terms for a recording driven by a robot: means over driver periods by wheel, (n, 3)."""
-    run, period = forward.run(robot), forward.timeline.period
-    w, power, copper = run["speed"], run["power"], run["copper"]
+    run, period = simulation.run(robot), simulation.timeline.period
+    w, power, copper = run.speed, run.power, run.copper
     idle = [robot.effect("electrical.driver_standby", wheel) for wheel in range(WHEELS)]
     mechanical = power - copper - np.array([item["power"] if item else 0.0 for item in idle])
     resistance = np.array([motor.resistance for motor in robot.motors])
     i = np.sign(mechanical * w) * np.sqrt(copper / resistance)
     angle = robot.wheel_offset + 2.0 * np.pi * np.arange(WHEELS) / WHEELS
-    h = period * np.cumsum(run["yaw_rate"])[:, None] + angle - 0.5 * np.pi
+    h = period * np.cumsum(run.yaw_rate)[:, None] + angle - 0.5 * np.pi
     twist = w @ np.linalg.inv(twist_to_wheels(robot)).T
     slides = np.sign(twist[:, :2] @ np.stack([np.cos(angle), np.sin(angle)]))  # along the axles
     rollers = 0.5 * (np.roll(slides, -1, axis=1) - np.roll(slides, 1, axis=1))
@@ -56,11 +56,12 @@ def series_of(forward: Forward, robot: Robot) -> dict[str, Array]:
     }
 
 
-def columns_of(forward: Forward, series: Mapping[str, Array], channel: Channel) -> Array:
+def columns_of(
+    simulation: RecordingSimulation, series: Mapping[str, Array], channel: Channel
+) -> Array:
     """Terms at a power channel's times, (n, terms); summed over the wheels for the total."""
-    line = forward.timeline
-    middle = line.start + line.period * (np.arange(line.count) + 0.5)
     when = channel.time - 0.5 * channel.span
+    middle = simulation.timeline.middle
     columns = [
         np.interp(
             when, middle, term.sum(axis=1) if channel.wheel is None else term[:, channel.wheel]

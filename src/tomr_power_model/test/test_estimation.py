@@ -17,7 +17,11 @@ from tomr_power_model.estimation.gauss_newton import (
 from tomr_power_model.estimation.linear_gaussian import Gram, solve
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, per_wheel
 from tomr_power_model.estimation.robust import soft_l1
-from tomr_power_model.estimation.statistics import autocorrelation, autocorrelation_time, robust_std
+from tomr_power_model.estimation.statistics import (
+    autocorrelation,
+    autocorrelation_time,
+    robust_scale,
+)
 from tomr_power_model.robot import read_description
 
 Array = NDArray[np.float64]
@@ -49,7 +53,7 @@ def test_a_linear_problem_takes_one_step(linear: tuple[Array, Array]) -> None:
     columns, measured = linear
     (found,) = maximise(
         [_start([0.5, 0.0, -1.0])],
-        lambda _, points: [Linearisation(measured - columns @ points[0], columns)],
+        lambda _, points: [Linearisation.of(measured - columns @ points[0], columns)],
         GaussNewtonSettings(most_steps=2, settled=-1.0),
     )
     whole = solve(Gram.of(columns, measured), [0, 1, 2])
@@ -65,7 +69,7 @@ def test_an_unknown_at_its_bound_is_held_and_the_others_go_on(linear: tuple[Arra
     columns = columns @ np.array([[1.0, 0.9, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 1.0]])  # correlated
     (found,) = maximise(
         [_start([0.0, 0.0, 0.0], edge=0.3)],
-        lambda _, points: [Linearisation(measured - columns @ points[0], columns)],
+        lambda _, points: [Linearisation.of(measured - columns @ points[0], columns)],
         PRECISE,
     )
     stacked = np.concatenate([columns, np.eye(3)]), np.concatenate([measured, np.zeros(3)])
@@ -87,7 +91,7 @@ def test_a_robust_nonlinear_problem_agrees_with_scipy() -> None:
         (a, b) = points[0]
         root, change = soft_l1(standard(points[0]))
         slope = np.stack([np.exp(-b * time), -a * time * np.exp(-b * time)], axis=1) / 0.1
-        return [Linearisation(root, change[:, None] * slope)]
+        return [Linearisation.of(root, change[:, None] * slope)]
 
     (found,) = maximise([_start([1.0, 0.2])], evaluate, PRECISE)
     expected = least_squares(
@@ -106,7 +110,7 @@ def test_hopeless_problems_are_left_alone(linear: tuple[Array, Array]) -> None:
         asked.append(list(numbers))
         scale = [1.0 if number else 100.0 for number in numbers]
         return [
-            Linearisation(s * (measured - 0.1 * columns @ point), 1e-3 * columns)
+            Linearisation.of(s * (measured - 0.1 * columns @ point), 1e-3 * columns)
             for s, point in zip(scale, points, strict=True)
         ]
 
@@ -121,7 +125,7 @@ def test_autocorrelation_ends_with_each_piece() -> None:
     assert autocorrelation([alternating, alternating])[1] == pytest.approx(-6.0 / 8.0)
     assert autocorrelation_time([np.ones(2), np.ones(2)]) == pytest.approx(2.0)
     assert autocorrelation_time([np.ones(400)], 10, 0.03) > 15.0
-    assert robust_std(np.array([-1.0, 1.0, 1.0, 50.0])) == pytest.approx(1.4826, rel=1e-4)
+    assert robust_scale(np.array([-1.0, 1.0, 1.0, 50.0])) == pytest.approx(1.4826, rel=1e-4)
 
 
 def test_offsets_stay_within_the_bounds_of_the_description() -> None:

@@ -6,9 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
-from tomr_power_model.physics.effects import modelled_effects
 from tomr_power_model.robot import load_robot, shipped_robots
 
 REFERENCE = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml").read_text()
@@ -35,10 +33,6 @@ def test_shipped_robots_load() -> None:
     assert {"reference", "robotino_v2"} <= set(shipped_robots())
     for name in shipped_robots():
         assert load_robot(name).mass > 0.0
-
-
-def test_the_vocabulary_covers_every_modelled_effect() -> None:
-    assert set(modelled_effects()) <= set(EFFECTS)
 
 
 @pytest.mark.parametrize(

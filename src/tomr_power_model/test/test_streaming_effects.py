@@ -8,13 +8,10 @@ import pytest
 from attrs import evolve
 
 from tomr_power_model.geometry.kinematics import twist_to_wheels
-from tomr_power_model.model.encoders import Triple, WheelEstimate
+from tomr_power_model.model.encoders import Triple
+from tomr_power_model.model.monitors import Monitors
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.predictor import PowerPredictor
-from tomr_power_model.model.slow_states import Monitors, Surroundings, Windings
-from tomr_power_model.physics.effects import COPPER, effects_of
-from tomr_power_model.physics.model import PhysicalModel
-from tomr_power_model.response.closed_loop import ClosedLoop, LoopState
 from tomr_power_model.robot import Robot, shipped_robot
 
 MS = 1_000_000
@@ -27,7 +24,11 @@ EVERY = {
     "sensor.power_bias": {"power": 0.5},
     "sensor.power_lag": {"time_constant": 0.1},
     "sensor.clock_offset": {"delay": 0.03},
-    "electrical.winding_heating": {"thermal_resistance": 50.0, "time_constant": 2.0},
+    "electrical.winding_heating": {
+        "thermal_resistance": 50.0,
+        "time_constant": 2.0,
+        "initial": 0.0,
+    },
     "drivetrain.torque_ripple": {"torque": 0.02, "order": 3.0, "phase": 0.4},
     "body.slope": {"angle": 0.05, "azimuth": 0.0},
 }
@@ -36,7 +37,11 @@ NEUTRAL = {
     "sensor.power_bias": {"power": 0.0},
     "sensor.power_lag": {"time_constant": 0.0},
     "sensor.clock_offset": {"delay": 0.0},
-    "electrical.winding_heating": {"thermal_resistance": 0.0, "time_constant": 2.0},
+    "electrical.winding_heating": {
+        "thermal_resistance": 0.0,
+        "time_constant": 2.0,
+        "initial": 0.0,
+    },
     "drivetrain.torque_ripple": {"torque": 0.0, "order": 3.0, "phase": 0.4},
     "body.slope": {"angle": 0.0, "azimuth": 0.0},
 }
@@ -49,14 +54,18 @@ def _robot(effects: Mapping[str, Mapping[str, float]], name: str = "reference") 
 
 
 def _drive(
-    predictor: PowerPredictor, twist: Triple, until_ms: int = 2000, angles: bool = True
+    predictor: PowerPredictor,
+    twist: Triple,
+    until_ms: int = 2000,
+    angles: bool = True,
+    commands: bool = True,
 ) -> list[Prediction]:
     """Commands at 20 Hz; encoders at 100 Hz that follow at once, from angle 0 on."""
     speed = twist_to_wheels(shipped_robot("reference")) @ twist
     found: list[Prediction] = []
     for at_ms in range(until_ms):
         stamp = BASE + at_ms * MS
-        if at_ms % 50 == 0:
+        if commands and at_ms % 50 == 0:
             predictor.command(stamp, twist)
         if at_ms % 10 == 3:
             first, second, third = (float(value) for value in speed)
@@ -90,8 +99,8 @@ def test_a_monitor_of_motor_current_shows_its_flaw_in_the_current() -> None:
 def test_the_lag_by_hand() -> None:
     # Step 0 -> 1 W, 0.1 s: the mean over the first 0.05 s is 1 - 2 (1 - e^-0.5) = 0.213061 and
     # the next 1 - e^-0.5 * 0.786939 = 0.522697.
-    effects = effects_of(_robot({"sensor.power_lag": {"time_constant": 0.1}}))
-    monitors = Monitors(effects, PERIOD)
+    monitors = Monitors.of(_robot({"sensor.power_lag": {"time_constant": 0.1}}), PERIOD)
+    assert monitors is not None
     found = [monitors.shown((power,) * 3)[0] for power in (0.0, 1.0, 1.0)]
     np.testing.assert_allclose(found, [0.0, 0.213061, 0.522697], atol=1e-6)
 
@@ -105,20 +114,10 @@ def test_the_lag_by_hand() -> None:
     ],
 )
 def test_the_offset_by_hand(delay: float, expected: list[float]) -> None:
-    monitors = Monitors(effects_of(_robot({"sensor.clock_offset": {"delay": delay}})), PERIOD)
+    monitors = Monitors.of(_robot({"sensor.clock_offset": {"delay": delay}}), PERIOD)
+    assert monitors is not None
     found = [monitors.shown((power,) * 3)[2] for power in (1.0, 2.0, 4.0, 8.0)]
     np.testing.assert_allclose(found, expected)
-
-
-def test_heat_by_hand() -> None:
-    # 2 A through 0.8 ohm: 3.2 W, settled 6.4 K; after 0.05 s of 10 s 6.4 (1 - e^-0.005). Wheel 2
-    # has no encoder: its command says 1 A. Of wheel 3 nothing is known.
-    heating = {"thermal_resistance": 2.0, "time_constant": 10.0}
-    model = PhysicalModel.of(_robot({"electrical.winding_heating": heating}))
-    windings = Windings.of(model, PERIOD)
-    assert windings is not None
-    windings.heat(np.array([4.0, math.nan, math.nan]), np.array([0.0, 1.0, math.nan]))
-    np.testing.assert_allclose(windings.warm, [0.0319202, 0.0079800, 0.0], atol=1e-7)
 
 
 def test_warm_windings_draw_more() -> None:
@@ -133,21 +132,6 @@ def test_warm_windings_draw_more() -> None:
     assert last.motors[2].power == pytest.approx(expected, rel=1e-2)
 
 
-def test_warm_windings_start_slower() -> None:
-    """Windings of twice the resistance halve the first step from standstill."""
-    robot = evolve(shipped_robot("reference"), physics={})
-    loop = ClosedLoop.of(robot, PhysicalModel.of(robot), 0.005)
-    cold = loop.step(LoopState(), UPHILL)
-    warm = loop.step(LoopState(), UPHILL, None, (1.0 / COPPER,) * 3)
-    assert abs(cold.speed[2]) > 0.0
-    np.testing.assert_allclose(warm.speed, 0.5 * np.array(cold.speed), rtol=1e-12, atol=1e-15)
-    # So the stage expects a slower start, not only more copper loss.
-    heating = {"thermal_resistance": 0.0, "time_constant": 1e9, "initial": 1.0 / COPPER}
-    hot = PowerPredictor(_robot({"electrical.winding_heating": heating}))
-    first, other = (_standing_start(p) for p in (PowerPredictor(_robot({})), hot))
-    assert 0.3 * first < other < 0.95 * first
-
-
 def _standing_start(predictor: PowerPredictor) -> float:
     """Wheel speed expected in the first tick after a command that finds the robot standing."""
     for at_ms in range(3, 100, 10):
@@ -160,14 +144,16 @@ def test_the_ripple_follows_the_measured_angle() -> None:
     # At constant speed w the ripple's mean over the tick around t is
     # torque sin(3 w t + 0.4) sin(x) / x, x = 3 w T / 2, for the angle w t; copper besides is small.
     ripple = EVERY["drivetrain.torque_ripple"]
-    with_it = _drive(PowerPredictor(_robot({"drivetrain.torque_ripple": ripple})), UPHILL)
-    without = _drive(PowerPredictor(shipped_robot("reference")), UPHILL)
+    rippled, plain = _robot({"drivetrain.torque_ripple": ripple}), shipped_robot("reference")
+    with_it, without = (
+        _drive(PowerPredictor(robot), UPHILL, commands=False) for robot in (rippled, plain)
+    )
     speed = float((twist_to_wheels(shipped_robot("reference")) @ UPHILL)[2])
     half = 1.5 * speed * PERIOD
-    for rippled, plain in zip(with_it[10:], without[10:], strict=True):
-        middle = 1e-9 * (rippled.stamp_ns - BASE) - 0.5 * PERIOD
+    for shown, smooth in zip(with_it[10:], without[10:], strict=True):
+        middle = 1e-9 * (shown.stamp_ns - BASE) - 0.5 * PERIOD
         mean = 0.02 * math.sin(3.0 * speed * middle + 0.4) * math.sin(half) / half
-        change = rippled.from_encoders[2].power - plain.from_encoders[2].power
+        change = shown.from_encoders[2].power - smooth.from_encoders[2].power
         assert change == pytest.approx(mean * speed, abs=0.012)
 
 
@@ -179,25 +165,6 @@ def test_without_angles_there_is_no_ripple() -> None:
         _drive(rippled, UPHILL, angles=False), _drive(plain, UPHILL, angles=False), strict=True
     ):
         np.testing.assert_allclose(_powers(one), _powers(other), rtol=1e-6)
-
-
-def test_the_slope_turns_against_the_heading() -> None:
-    # 15 kg * 9.80665 m/s^2 * sin 0.05 = 7.35192 N. Downhill ahead the wheels hold
-    # F r / sqrt 3 = 0.212231 N m; after a turn by 90 degrees, with downhill at the right,
-    # F r / 3 (-2, 1, 1).
-    model = PhysicalModel.of(_robot({"body.slope": EVERY["body.slope"]}))
-    slope = Surroundings.of(model, PERIOD, 10)
-    assert slope is not None
-    still = WheelEstimate(np.zeros(3), np.zeros(3))
-    ahead = slope.torque(still, np.zeros(3), math.nan)
-    np.testing.assert_allclose(ahead, np.tile([0.0, -0.212231, 0.212231], (10, 1)), atol=1e-6)
-    # -4 rad/s of all wheels are 1 rad/s: 30 ticks and then 0.070796 s more.
-    spin = WheelEstimate(np.full(3, -4.0), np.zeros(3))
-    for _ in range(30):
-        slope.torque(spin, np.zeros(3), math.nan)
-        slope.turn(None)
-    aside = slope.torque(still, np.zeros(3), 2.0 * 0.0707963 / PERIOD)
-    np.testing.assert_allclose(aside[0], 0.1225320 * np.array([-2.0, 1.0, 1.0]), atol=1e-6)
 
 
 def test_the_heading_is_summed_up_over_ticks() -> None:
@@ -212,13 +179,13 @@ def test_the_heading_is_summed_up_over_ticks() -> None:
     assert added == pytest.approx(expected, rel=1e-4)
 
 
-def test_the_expected_motion_gives_way_to_the_slope() -> None:
-    """Let go on a slope a robot rolls downhill, ahead, until its drivers push back."""
+def test_drivers_hold_a_robot_that_stands_on_a_slope() -> None:
+    """As it stands when the first command finds it, so it goes on: 0.212 N m on two wheels."""
     predictor = PowerPredictor(_robot({"body.slope": EVERY["body.slope"]}))
     found = _drive(predictor, (0.0, 0.0, 0.0))
-    assert found[0].speed[1] > 0.02
-    assert found[0].speed[2] < -0.02
-    assert abs(found[-1].speed[1]) < 0.01
+    assert max(abs(speed) for prediction in found for speed in prediction.speed) < 1e-6
+    # i = 0.212231 / 0.7 A: 0.8 ohm i^2 = 0.073537 W besides standby.
+    assert found[-1].motors[1].power == pytest.approx(1.2 + 0.073537, abs=1e-4)
 
 
 def test_uphill_lifts_the_body() -> None:

@@ -8,9 +8,9 @@ from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tomr_power_model.dynamics.body import Body
+from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.geometry.kinematics import twist_to_wheels
-from tomr_power_model.physics.body import wheel_loads
-from tomr_power_model.physics.model import WheelMotion
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_power_model.wang2024 import Coefficients, Wang2024Model
 from tomr_power_model.wang2024 import angles as a
@@ -188,7 +188,7 @@ class TestEquations:
     def test_17_is_the_static_balance(self, x: float, y: float, offset: float) -> None:
         robot = evolve(ROBOT, mass_center=(x, y, 0.1), wheel_offset=offset)
         found = a.N_i(robot.mass, robot.robot_radius, a.MassCenter.of(robot))
-        np.testing.assert_allclose(found, wheel_loads(robot), rtol=1e-9)
+        np.testing.assert_allclose(found, Body.of(robot).normal, rtol=1e-9)
 
     def test_roots_are_whole_above_standstill_and_end_at_rest(self) -> None:
         speeds = np.array([0.729**2, 0.02, 0.01, 0.0])

@@ -9,14 +9,13 @@ from attrs import evolve, fields
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.errors import InputError
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.model.power_models import POWER_MODELS, own_parameters
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.model.settings import MODEL_PARAMETERS, ModelSettings
-from tomr_power_model.physics.model import WheelMotion
-from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import shipped_robot
 from tomr_power_model.robot.parameters import check_all
 from tomr_power_model.wang2024 import Coefficients, Samples, Wang2024Model, fit_wang2024
@@ -124,11 +123,10 @@ class TestFit:
     def test_a_recording_can_be_fitted(self) -> None:
         if not BAG.exists():
             pytest.fail(f"{BAG} is missing: make bags")
-        with open_recording(BAG) as recording:
-            samples = read_samples(recording, ROBOT)
-            other = evolve(ROBOT, measurement=evolve(ROBOT.measurement, source="total_only"))
-            with pytest.raises(InputError, match="needs the power of each motor"):
-                read_samples(recording, other)
+        samples = read_samples(BAG, ROBOT)
+        other = evolve(ROBOT, measurement=evolve(ROBOT.measurement, source="total_only"))
+        with pytest.raises(InputError, match="needs the power of each motor"):
+            read_samples(BAG, other)
         found = fit_wang2024(ROBOT, samples)
         assert found.P_stanby == pytest.approx((1.2, 1.2, 1.2), abs=0.05)
         assert found.P_sensor + found.P_stanby_c == pytest.approx(12.0, abs=0.1)

@@ -10,21 +10,18 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
-from tomr_power_model.calibration.calibrate import (
-    Result,
-    Timing,
-    align,
-    calibrate,
-    read_all,
-    skips_of,
-)
-from tomr_power_model.calibration.checks import refuse_faults, refuse_little_motion
+from tomr_power_model.calibration.calibrate import Result, Timing, align, calibrate, read_all
 from tomr_power_model.calibration.fitted import fitted_text
+from tomr_power_model.calibration.following import lost_wheels
 from tomr_power_model.calibration.parameters import Choice
-from tomr_power_model.calibration.recorded import Recorded
 from tomr_power_model.calibration.scoring import COLUMNS
 from tomr_power_model.calibration.tables import rows, tables
 from tomr_power_model.cli import EXIT_OK, run_main
+from tomr_power_model.drive.clean import check_duration
+from tomr_power_model.drive.cut import skips_of
+from tomr_power_model.drive.excitation import check_excitation
+from tomr_power_model.drive.quality import Finding, refuse, sensor_faults
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
 from tomr_power_model.estimation.parameter import Values
 from tomr_power_model.robot import (
@@ -87,7 +84,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     add("--skip", action="append", default=[], metavar="BAG=FROM:TO", help="leave out [s]")
     add("--namespace", help="of the robot's topics, if a bag holds several")
-    add("--power-window", type=float, default=0.005, metavar="S", help="the power sensor's average")
+    add(
+        "--power-window",
+        type=float,
+        metavar="S",
+        help="the power sensor's average (default: sensors.power_window in robot.yaml)",
+    )
     add(
         "--encoder-window",
         type=float,
@@ -124,7 +126,7 @@ def _timing(options: argparse.Namespace) -> Timing:
     if span is None:
         span = read_node_sections(options.robot, ["power_model"]).get("encoder_window", 0.05)
     for name, value in (("--encoder-window", span), ("--power-window", options.power_window)):
-        if not isinstance(value, int | float) or not 0.0 < value <= 1.0:
+        if value is not None and not (isinstance(value, int | float) and 0.0 < value <= 1.0):
             raise InputError(f"{name} {value}: give seconds above 0 and up to 1")
     return Timing(float(span), options.power_window)
 
@@ -142,14 +144,14 @@ def _calibrate(arguments: Sequence[str] | None) -> int:
         tolerances=_numbers(options.tolerance, "--tolerance"),
     )
     timing = _timing(options)
-    recorded = _recorded(options, robot)
-    fitted, held_out = recorded[: len(options.bags)], recorded[len(options.bags) :]
+    drives = _drives(options, robot)
+    fitted, held_out = drives[: len(options.bags)], drives[len(options.bags) :]
     samples, unseen = align(fitted, robot, timing), align(held_out, robot, timing)
     with _bar("fitting", None, "evaluation") as tick:
         result = calibrate(
             values, options.robot, samples, unseen, choice, not options.squares, tick
         )
-    _print(result, [note for item in recorded for note in item.notes])
+    _print(result, [note for item in drives for note in item.notes])
     if options.out is not None:
         _write(options.out, _fitted_text(options.robot, values, result))
     if options.report is not None:
@@ -161,16 +163,21 @@ def _calibrate(arguments: Sequence[str] | None) -> int:
     return EXIT_OK
 
 
-def _recorded(options: argparse.Namespace, robot: Robot) -> tuple[Recorded, ...]:
+def _drives(options: argparse.Namespace, robot: Robot) -> tuple[Drive, ...]:
     """The recordings, those to fit before those held out, all found to be healthy."""
     bags = [*options.bags, *options.holdout]
     skips = skips_of(options.skip, bags)
     with _bar("reading", len(bags), "bag") as tick:
-        recorded = read_all(bags, robot, options.namespace, skips, tick)
-    refuse_little_motion(recorded[: len(options.bags)], robot)
+        drives = read_all(bags, robot, options.namespace, skips, tick)
+    check_duration(drives[: len(options.bags)])
+    check_excitation(drives[: len(options.bags)], robot)
+    findings: list[Finding] = []
     with _bar("looking for faults", len(bags), "bag") as tick:
-        refuse_faults(recorded, robot, tick)
-    return recorded
+        for item in drives:
+            findings += [*sensor_faults(item, robot), *lost_wheels(item, robot)]
+            tick()
+    refuse(findings)
+    return drives
 
 
 def _write(path: Path, text: str) -> None:

@@ -1,31 +1,22 @@
 """Stamps, channels and the simulation that is driven by a recording."""
 
+import os
+
 import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
+from tomr_power_model.dynamics.simulation import worker_count
+from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
-from tomr_reality_gap.alignment.channels import channels_of
-from tomr_reality_gap.alignment.commands import shift_between
-from tomr_reality_gap.alignment.forward import Forward
-from tomr_reality_gap.alignment.steady import steadied, steady
+from tomr_reality_gap.alignment.channels import Channel, channels_of
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
+from tomr_reality_gap.prepared import integrator_of
 
 
-def test_jitter_is_taken_off_and_gaps_are_kept() -> None:
-    grid = np.delete(np.arange(500) * 0.01, np.arange(200, 230))
-    noisy = grid + np.random.default_rng(1).normal(0.0, 5e-4, len(grid))
-    assert np.abs(steady(noisy) - grid).max() < 1e-4
-    assert np.diff(steady(noisy)).max() == pytest.approx(0.31, abs=1e-3)
-
-
-def test_stamps_without_a_grid_are_left_alone() -> None:
-    time = np.sort(np.random.default_rng(2).uniform(0.0, 5.0, 300))
-    np.testing.assert_array_equal(steady(time), time)
-
-
-def _recorded(robot: Robot) -> Recorded:
+def _recorded(robot: Robot) -> Drive:
     """Thirty seconds of starts, turns and stops, as the simulation itself would record them."""
     command_time = np.arange(0.0, 30.0, 0.05)
     phase = command_time // 2.5
@@ -41,7 +32,7 @@ def _recorded(robot: Robot) -> Recorded:
     speed = held @ twist_to_wheels(robot).T
     power_time = np.arange(0.02, 30.0, 0.02)
     blank = np.zeros((len(power_time), 3))
-    return Recorded(
+    return Drive(
         name="made",
         encoder_time=encoder_time,
         position=np.cumsum(speed, axis=0) * 0.01,
@@ -61,61 +52,86 @@ def _recorded(robot: Robot) -> Recorded:
 
 
 @pytest.fixture
-def forward() -> Forward:
+def simulation() -> RecordingSimulation:
     robot = shipped_robot("reference")
     recorded = _recorded(robot)
-    return Forward.of(recorded, robot, channels_of(recorded, robot, 0.005))
+    return RecordingSimulation.of(recorded, robot, channels_of(recorded, robot))
 
 
-def test_stretches_side_by_side_are_the_recording_in_one_piece(forward: Forward) -> None:
-    """Cutting the time line must not show: each stretch has forgotten how it began."""
-    line = forward.timeline
-    assert len(line.first) > 3
-    whole = evolve(line, first=line.first[:1], length=line.count)
-    cut = forward.predict([forward.robot])[0]
-    single = evolve(forward, timeline=whole).predict([forward.robot])[0]
-    power = forward.channels[0]
-    assert power.kind == "power"
-    difference = np.abs(cut - single)[: len(power.time)]
-    assert difference.max() < 0.02 * np.ptp(single[: len(power.time)])
+def test_ten_minutes_are_predicted_as_well_at_the_end_as_at_the_beginning() -> None:
+    """By a description that is wrong by a little, of a robot that stops and stands in between."""
+    robot = shipped_robot("reference")
+    tour = _recorded(robot)
+    command_time = np.arange(0.0, 600.0, 0.05)
+    long = evolve(
+        tour,
+        encoder_time=np.arange(0.0, 600.0, 0.05),
+        position=np.full((len(command_time), 3), np.nan),
+        velocity=np.zeros((len(command_time), 3)),
+        command_time=command_time,
+        command=np.tile(tour.command, (20, 1)),
+        power_time=command_time + 0.02,
+    )
+    time = long.power_time
+    span, value = np.full(len(command_time), 0.005), np.zeros(len(command_time))
+    drawn = tuple(Channel(str(wheel), "power", wheel, "W", time, span, value) for wheel in range(3))
+    made = RecordingSimulation.of(long, robot, drawn)
+    motors = tuple(evolve(motor, resistance=1.02 * motor.resistance) for motor in robot.motors)
+    heavier = evolve(robot, mass=1.03 * robot.mass, motors=motors)
+    error = np.subtract(*made.predict([robot, heavier])).reshape(3, 20, -1)
+    by_tour = np.sqrt((error**2).mean(axis=(0, 2)))
+    assert by_tour[0] > 0.01
+    assert by_tour[-1] == pytest.approx(by_tour[1], rel=0.05)
 
 
-def test_the_total_is_the_motors_and_the_rest(forward: Forward) -> None:
-    values = forward.predict([forward.robot])[0]
+def test_drivers_go_on_believing_the_description(simulation: RecordingSimulation) -> None:
+    """A robot that is wider than stated turns more slowly, its wheels do not."""
+    wider = evolve(simulation.robot, robot_radius=1.1 * simulation.robot.robot_radius)
+    stated, other = (simulation.run(robot) for robot in (simulation.robot, wider))
+    assert np.abs(stated.speed - other.speed).max() < 0.1 * np.abs(stated.speed).max()
+    ratio = float(other.yaw_rate @ stated.yaw_rate / (stated.yaw_rate @ stated.yaw_rate))
+    assert ratio == pytest.approx(1.0 / 1.1, abs=0.01)
+
+
+def test_the_total_is_the_motors_and_the_rest(simulation: RecordingSimulation) -> None:
+    values = simulation.predict([simulation.robot])[0]
     parts, at = {}, 0
-    for channel in forward.channels:
+    for channel in simulation.channels:
         parts[channel.name] = values[at : (at := at + len(channel.time))]
     motors = sum(parts[f"wheel_{number}/power"] for number in (1, 2, 3))
-    rest = forward.robot.supply.auxiliary_power
+    rest = simulation.robot.supply.auxiliary_power
     np.testing.assert_allclose(parts["battery_state"], motors + rest, rtol=1e-6)
 
 
-def test_flaws_of_a_sensor_change_what_it_reports_and_nothing_else(forward: Forward) -> None:
-    robot = forward.robot
+def test_flaws_of_a_sensor_change_what_it_reports_and_nothing_else(
+    simulation: RecordingSimulation,
+) -> None:
+    robot = simulation.robot
     flaw = ({"scale": 1.1}, None, None)
     flawed = evolve(robot, physics={**robot.physics, "sensor.power_scale": flaw})
-    values = forward.predict([robot, flawed])
+    values = simulation.predict([robot, flawed])
     at = 0
-    for channel in forward.channels:
+    for channel in simulation.channels:
         part = slice(at, at := at + len(channel.time))
         factor = 1.1 if channel.name == "wheel_1/power" else 1.0
         np.testing.assert_allclose(values[1, part], factor * values[0, part], rtol=1e-6, atol=1e-9)
 
 
-def test_jittered_recordings_are_told_from_steady_ones() -> None:
-    recorded = _recorded(shipped_robot("reference"))
-    jitter = np.random.default_rng(3).normal(0.0, 4e-4, len(recorded.encoder_time))
-    assert not steadied(recorded)[1]
-    even, changed = steadied(evolve(recorded, encoder_time=recorded.encoder_time + jitter))
-    assert changed
-    assert np.abs(even.encoder_time - recorded.encoder_time).max() < 1e-4
+@pytest.mark.parametrize("way", ["backward", "forward"])
+def test_the_drivers_sum_is_found_whatever_is_described(
+    simulation: RecordingSimulation, way: str
+) -> None:
+    robot = simulation.robot
+    real = evolve(robot, controller=evolve(robot.controller, integrator=way))
+    value = evolve(simulation, robot=real).predict([real])[0]
+    parts = zip(simulation.channels, rows_of(simulation.channels), strict=True)
+    channels = tuple(evolve(channel, value=value[part]) for channel, part in parts)
+    assert integrator_of(evolve(simulation, channels=channels)) == way
 
 
-def test_the_shift_between_recordings_of_the_same_commands(forward: Forward) -> None:
-    later = evolve(forward.recorded, command_time=forward.recorded.command_time + 0.7)
-    assert shift_between(forward.recorded, later) == pytest.approx(0.7, abs=1e-6)
-
-
-def test_other_commands_are_no_simulation_of_a_recording(forward: Forward) -> None:
-    other = evolve(forward.recorded, command=forward.recorded.command[::-1])
-    assert shift_between(forward.recorded, other) is None
+def test_a_process_among_others_simulates_on_one_core(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dask sets the limit for linear algebra; the simulation keeps to it."""
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    assert worker_count() == 1
+    monkeypatch.delenv("OMP_NUM_THREADS")
+    assert worker_count() == len(os.sched_getaffinity(0))

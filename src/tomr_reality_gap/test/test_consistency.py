@@ -24,7 +24,7 @@ def _made(
     offsets = np.repeat([[part / 0.01 for part in parts] for parts in off], ROWS, axis=0)
     value = (matrix[:, :3] * offsets).sum(axis=1) + noise * random.standard_normal(len(matrix))
     channel = SimpleNamespace(time=np.zeros(ROWS))
-    forwards = tuple(
+    simulations = tuple(
         SimpleNamespace(
             channels=(channel,), recorded=SimpleNamespace(name=f"tour{number}", duration=duration)
         )
@@ -42,7 +42,7 @@ def _made(
     )
     weight = np.full(len(matrix), 1.0 / noise)
     last = SimpleNamespace(jacobian=jacobian, noise=SimpleNamespace(weight=weight))
-    return SimpleNamespace(forwards=forwards, value=value), last
+    return SimpleNamespace(simulations=simulations, value=value), last
 
 
 def test_recordings_of_one_robot_go_together() -> None:

@@ -6,27 +6,28 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
-from tomr_reality_gap.alignment.forward import Forward, predict_all
 from tomr_reality_gap.alignment.response import leaps_of
+from tomr_reality_gap.alignment.simulation import RecordingSimulation, predict_all
 from tomr_reality_gap.explain import explain
 from tomr_reality_gap.explanation import Explanation
 from tomr_reality_gap.request import Request
 from tomr_sim_bridge.importers.dataset import choose, default_dataset, import_files, open_dataset
-from tomr_sim_bridge.importers.robotino import Drive, Run, write_run
+from tomr_sim_bridge.importers.robotino import Drive as RobotinoDrive
+from tomr_sim_bridge.importers.robotino import Run, write_run
 
 QUANTUM = 1.0 / 39.0  # A
 START_NS = 1_672_531_200_000_000_000
 
 
-def _recorded(robot: Robot, command: np.ndarray, time: np.ndarray) -> Recorded:
+def _recorded(robot: Robot, command: np.ndarray, time: np.ndarray) -> Drive:
     """A recording of commands, all else blank."""
     blank = np.zeros((len(time), 3))
-    return Recorded(
+    return Drive(
         name="made",
         encoder_time=time,
         position=np.full((len(time), 3), np.nan),
@@ -45,9 +46,9 @@ def _recorded(robot: Robot, command: np.ndarray, time: np.ndarray) -> Recorded:
     )
 
 
-def _forward(robot: Robot, command: np.ndarray) -> Forward:
+def _forward(robot: Robot, command: np.ndarray) -> RecordingSimulation:
     recorded = _recorded(robot, command, 0.0312 * np.arange(len(command)))
-    return Forward.of(recorded, robot, channels_of(recorded, robot, 0.005))
+    return RecordingSimulation.of(recorded, robot, channels_of(recorded, robot))
 
 
 def _to_and_fro(heading: float, speed: float, seconds: float = 13.0) -> np.ndarray:
@@ -71,51 +72,55 @@ def test_the_current_of_a_steady_spin_is_that_of_its_friction(robotino: Robot) -
         k * (gain + k) / motor.resistance + viscous
     )
     for turn in (-0.8, 0.8):  # rad/s: wheels turn by R / r as fast, against it
-        forward = _forward(robotino, np.tile([0.0, 0.0, turn], (100, 1)))
-        value = forward.predict([robotino])[0]
-        for channel, part in zip(forward.channels, rows_of(forward.channels), strict=True):
+        simulation = _forward(robotino, np.tile([0.0, 0.0, turn], (100, 1)))
+        value = simulation.predict([robotino])[0]
+        for channel, part in zip(simulation.channels, rows_of(simulation.channels), strict=True):
             if channel.kind == "current":
                 assert (channel.unit, channel.quantum) == ("A", pytest.approx(QUANTUM))
                 assert value[part][-1] == pytest.approx((coulomb + viscous * speed) / k, rel=2e-3)
             else:
                 assert abs(value[part][-1]) == pytest.approx(speed, rel=2e-3)
-        kinds = [channel.kind for channel in forward.channels]
+        kinds = [channel.kind for channel in simulation.channels]
         assert kinds == ["current"] * 3 + ["speed"] * 3
 
 
 def test_short_recordings_side_by_side_are_each_by_itself(robotino: Robot) -> None:
-    forwards = [
+    simulations = [
         _forward(robotino, _to_and_fro(0.3, 0.2)),
         _forward(robotino, _to_and_fro(1.9, 0.3, 7.0)),
     ]
     robots = [robotino, evolve(robotino, mass=1.2 * robotino.mass)]
-    together = predict_all(forwards, robots)
-    alone = np.concatenate([item.predict(robots) for item in forwards], axis=1)
+    together = predict_all(simulations, robots)
+    alone = np.concatenate([item.predict(robots) for item in simulations], axis=1)
     np.testing.assert_allclose(together, alone, atol=1e-9)
 
 
 def test_a_later_robot_is_the_same_robot_later(robotino: Robot) -> None:
-    forward = _forward(robotino, _to_and_fro(0.3, 0.2))
+    simulation = _forward(robotino, _to_and_fro(0.3, 0.2))
     controller = evolve(robotino.controller, delay=robotino.controller.delay + 0.0234)
-    value = forward.predict([evolve(robotino, controller=controller)])[0]
-    np.testing.assert_allclose(value, forward.predict([robotino], later=[0.0234])[1], atol=0.05)
+    value = simulation.predict([evolve(robotino, controller=controller)])[0]
+    np.testing.assert_allclose(value, simulation.predict([robotino], later=[0.0234])[1], atol=0.05)
 
 
 @pytest.mark.parametrize("integral", [0.0, 157.0])
 def test_delay_and_loop_are_seen_in_wheel_speeds(robotino: Robot, integral: float) -> None:
     """A loop without an integral stays behind what it is told; one with it does not."""
-    forward = _forward(robotino, _to_and_fro(0.3, 0.2))
+    simulation = _forward(robotino, _to_and_fro(0.3, 0.2))
     controller = evolve(robotino.controller, delay=0.1, integral=integral)
-    value = forward.predict([evolve(robotino, controller=controller)])[0]
+    value = simulation.predict([evolve(robotino, controller=controller)])[0]
     value = value + 0.05 * np.random.default_rng(1).standard_normal(len(value))
     channels = tuple(
         evolve(channel, value=value[part])
-        for channel, part in zip(forward.channels, rows_of(forward.channels), strict=True)
+        for channel, part in zip(simulation.channels, rows_of(simulation.channels), strict=True)
     )
-    right = Forward.of(forward.recorded, evolve(robotino, controller=controller), channels)
+    right = RecordingSimulation.of(
+        simulation.recorded, evolve(robotino, controller=controller), channels
+    )
     assert leaps_of([right], right.robot) == {}
     other = evolve(robotino.controller, delay=0.0, integral=157.0 - integral)
-    wrong = Forward.of(forward.recorded, evolve(robotino, controller=other), channels)
+    wrong = RecordingSimulation.of(
+        simulation.recorded, evolve(robotino, controller=other), channels
+    )
     found = leaps_of([wrong], wrong.robot)
     assert found["controller.integral"] == pytest.approx(integral)
     assert found["controller.delay"] == pytest.approx(0.1, abs=0.02)
@@ -127,17 +132,16 @@ def _written(path: Path, robot: Robot, command: np.ndarray, seed: int) -> Path:
     time = 0.0312 * np.arange(len(command))
     recorded = _recorded(robot, command, time)
     recorded = evolve(recorded, velocity=command @ twist_to_wheels(robot).T)
-    forward = Forward.of(recorded, robot, channels_of(recorded, robot, 0.005))
-    run, line = forward.run(robot), forward.timeline
-    middle = line.start + line.period * (np.arange(line.count) + 0.5)
-    speed = np.stack([np.interp(time, middle, column) for column in run["speed"].T], axis=1)
-    loss = np.stack([np.interp(time, middle, column) for column in run["copper"].T], axis=1)
+    simulation = RecordingSimulation.of(recorded, robot, channels_of(recorded, robot))
+    run, line = simulation.run(robot), simulation.timeline
+    speed = np.stack([np.interp(time, line.middle, column) for column in run.speed.T], axis=1)
+    loss = np.stack([np.interp(time, line.middle, column) for column in run.copper.T], axis=1)
     current = np.sqrt(loss / robot.motors[0].resistance) + random.normal(0.0, 0.05, loss.shape)
     told = speed + random.normal(0.0, 0.1, speed.shape)
     stamps = tuple(START_NS + int(1e9 * stamp) for stamp in time)
     rounded = np.abs(np.round(current / QUANTUM)) * QUANTUM
     angle = np.cumsum(speed, axis=0) * 0.0312
-    drive = Drive(command, np.zeros_like(command), np.zeros_like(command))
+    drive = RobotinoDrive(command, np.zeros_like(command), np.zeros_like(command))
     write_run(Run(stamps, angle, told, np.zeros_like(told), rounded, drive), path, "mcap")
     return path
 

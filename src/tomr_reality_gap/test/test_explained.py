@@ -65,7 +65,7 @@ def explained(folder: Path, effects: Mapping[str, Mapping[str, float]], wheels: 
     analysis = SimpleNamespace(
         robot=SimpleNamespace(wheel_names=WHEELS),
         source="reference",
-        dataset=SimpleNamespace(forwards=()),
+        dataset=SimpleNamespace(simulations=()),
     )
     path = folder / "robot_explained.yaml"
     path.write_text(

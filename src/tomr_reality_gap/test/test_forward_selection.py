@@ -7,7 +7,7 @@ from attrs import evolve
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, per_wheel
 from tomr_power_model.robot import Robot, read_description
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.basis_responses import basis_responses
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection, forward_selection
@@ -19,7 +19,7 @@ from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 from tomr_reality_gap.hypotheses.scales import scales_of, traction_ratios_of
 
-from .test_alignment import forward  # noqa: F401 -- the fixture
+from .test_alignment import simulation  # noqa: F401 -- the fixture
 
 NOISE = {"power": 0.1, "total": 0.2, "voltage": 3e-3, "speed": 0.02, "yaw": 2e-3}
 TRIED = ("friction.asymmetric", "friction.viscous", "electrical.switching_loss", "body.payload")
@@ -30,7 +30,7 @@ def _base(robot: Robot) -> ParameterisedRobot:
 
 
 def searched(
-    made: Forward, value: np.ndarray, tried: tuple[str, ...] = TRIED
+    made: RecordingSimulation, value: np.ndarray, tried: tuple[str, ...] = TRIED
 ) -> tuple[Dataset, Selection]:
     """Record values with noise, and search with the description of the reference robot."""
     random = np.random.default_rng(5)
@@ -40,8 +40,8 @@ def searched(
     )
     base, wheels = _base(made.robot), made.robot.wheel_names
     run = made.run(base.robot)
-    scales = scales_of(made.robot, run["speed"], run["power"], run["copper"], 30.0)
-    ratios = traction_ratios_of(made.robot, run["speed"], made.timeline.period)
+    scales = scales_of(made.robot, run.speed, run.power, run.copper, 30.0)
+    ratios = traction_ratios_of(made.robot, run.speed, made.timeline.period)
     scales = evolve(scales, traction_ratios=ratios)
     parameters = nuisances(base, wheels, 0.02)
     candidates = [
@@ -53,19 +53,19 @@ def searched(
     return dataset, forward_selection(dataset, model, candidates, basis)
 
 
-def _found(made: Forward, real: Robot, tried: tuple[str, ...] = TRIED) -> Selection:
+def _found(made: RecordingSimulation, real: Robot, tried: tuple[str, ...] = TRIED) -> Selection:
     return searched(made, made.predict([real])[0], tried)[1]
 
 
 def test_a_concealed_friction_is_named_with_its_wheel_and_size(
-    forward: Forward,  # noqa: F811
+    simulation: RecordingSimulation,  # noqa: F811
 ) -> None:
-    robot = forward.robot
+    robot = simulation.robot
     concealed = (None, {"torque": 0.02}, None)
     real = evolve(
         robot, mass=1.01 * robot.mass, physics={**robot.physics, "friction.asymmetric": concealed}
     )
-    found = _found(forward, real).best
+    found = _found(simulation, real).best
     assert [item.name for item in found.model.hypotheses] == [
         "friction.asymmetric at wheel_2_joint"
     ]
@@ -74,19 +74,23 @@ def test_a_concealed_friction_is_named_with_its_wheel_and_size(
     assert sigma < 0.004
 
 
-def test_deviations_within_the_tolerance_are_no_finding(forward: Forward) -> None:  # noqa: F811
-    robot = forward.robot
+def test_deviations_within_the_tolerance_are_no_finding(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    robot = simulation.robot
     motors = tuple(
         evolve(motor, resistance=motor.resistance * scale)
         for motor, scale in zip(robot.motors, (1.015, 0.99, 0.985), strict=True)
     )
     real = evolve(robot, mass=0.985 * robot.mass, motors=motors)
-    assert not _found(forward, real).best.model.hypotheses
+    assert not _found(simulation, real).best.model.hypotheses
 
 
-def test_two_wrongs_that_hide_each_other_are_found_together(forward: Forward) -> None:  # noqa: F811
+def test_two_wrongs_that_hide_each_other_are_found_together(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
     """Rollers that drag, behind a Coulomb friction that is stated too large."""
-    robot = forward.robot
+    robot = simulation.robot
     coulomb = robot.effect("friction.coulomb")
     assert coulomb is not None
     physics = {
@@ -95,20 +99,22 @@ def test_two_wrongs_that_hide_each_other_are_found_together(forward: Forward) ->
         "contact.roller_drag": ({"coefficient": 0.02, "slip": 0.0},) * 3,
     }
     tried = ("contact.roller_drag", "parameter.physics.friction.coulomb", "friction.quadratic")
-    best = _found(forward, evolve(robot, physics=physics), tried).best
+    best = _found(simulation, evolve(robot, physics=physics), tried).best
     assert best.model.names == {
         "contact.roller_drag at all_wheels",
         "parameter.physics.friction.coulomb.torque at all_wheels",
     }
 
 
-def test_a_wheel_that_slides_is_named_with_its_friction(forward: Forward) -> None:  # noqa: F811
+def test_a_wheel_that_slides_is_named_with_its_friction(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
     """Far from where nothing slides: no derivative there shows it."""
-    robot = forward.robot
+    robot = simulation.robot
     slips = (None, {"friction": 0.2}, None)
     real = evolve(robot, physics={**robot.physics, "contact.slip": slips})
     tried = ("contact.slip", "friction.viscous")
-    best = _found(forward, real, tried).best
+    best = _found(simulation, real, tried).best
     assert [item.name for item in best.model.hypotheses] == ["contact.slip at wheel_2_joint"]
     start = best.model.hypotheses[0].start[best.model.own[0].keys[0]]
     assert start + best.model.offsets[0][0] == pytest.approx(0.2, abs=0.004)
@@ -129,13 +135,15 @@ def test_a_parameter_that_an_addition_pushes_far_out_of_its_tolerance_comes_alon
         assert joint_candidates(model, np.array([offset]), added, [added, wrong]) == expected
 
 
-def test_late_power_sensors_are_distinguished_from_slow_ones(forward: Forward) -> None:  # noqa: F811
+def test_late_power_sensors_are_distinguished_from_slow_ones(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
     """15 ms, longer than a step in power lasts: its derivative at none shows nothing."""
-    robot = forward.robot
+    robot = simulation.robot
     late = ({"delay": 0.015},) * 3
     real = evolve(robot, physics={**robot.physics, "sensor.clock_offset": late})
     tried = ("sensor.clock_offset", "sensor.power_lag")
-    best = _found(forward, real, tried).best
+    best = _found(simulation, real, tried).best
     assert [item.name for item in best.model.hypotheses] == ["sensor.clock_offset at all_wheels"]
     assert best.model.offsets[0][0] == pytest.approx(0.015, abs=0.002)
 
@@ -157,12 +165,14 @@ def test_a_sensor_nuisance_is_off_by_a_little_or_not_at_all() -> None:
     np.testing.assert_array_equal(sensors, [0.5, 4.0, -4.0])
 
 
-def test_delays_of_power_sensors_are_tried_far_from_none(forward: Forward) -> None:  # noqa: F811
-    base, run = _base(forward.robot), forward.run(forward.robot)
-    scales = scales_of(forward.robot, run["speed"], run["power"], run["copper"], 30.0)
+def test_delays_of_power_sensors_are_tried_far_from_none(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    base, run = _base(simulation.robot), simulation.run(simulation.robot)
+    scales = scales_of(simulation.robot, run.speed, run.power, run.copper, 30.0)
     alternatives = {
         item.parameters[0].discrete_offset
-        for item in catalogue(base, forward.robot.wheel_names, scales, 0.02)
+        for item in catalogue(base, simulation.robot.wheel_names, scales, 0.02)
         if item.name == "sensor.clock_offset at all_wheels"
     }
     assert 0.0 in alternatives

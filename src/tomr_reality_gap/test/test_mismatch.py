@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.robot import shipped_robot
 from tomr_reality_gap.alignment.channels import Channel
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.basis_responses import basis_responses
 from tomr_reality_gap.fit.jacobian import linearise
 from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
@@ -19,7 +19,7 @@ from tomr_reality_gap.mismatch.orders import ripple_orders
 from tomr_reality_gap.mismatch.probes import motion_of
 
 from .test_alignment import _recorded as recorded_drive
-from .test_alignment import forward  # noqa: F401 -- the fixture
+from .test_alignment import simulation  # noqa: F401 -- the fixture
 from .test_forward_selection import searched
 
 POWER_TIME = np.arange(0.02, 60.0, 0.02)
@@ -50,7 +50,7 @@ def test_a_ripple_is_found_by_its_order_and_noise_has_none() -> None:
     speed = 5.0 + 3.0 * np.sin(0.4 * POWER_TIME)
     angle = np.cumsum(speed) * 0.02
     noise = np.random.default_rng(1).standard_normal(len(angle))
-    made: Recorded = evolve(
+    made: Drive = evolve(
         recorded_drive(shipped_robot("reference")),
         encoder_time=POWER_TIME - 0.0025,
         position=np.stack([angle] * 3, axis=1),
@@ -62,15 +62,15 @@ def test_a_ripple_is_found_by_its_order_and_noise_has_none() -> None:
 
 
 def test_what_has_no_name_is_found_with_its_wheel_and_variable(
-    forward: Forward,  # noqa: F811
+    simulation: RecordingSimulation,  # noqa: F811
 ) -> None:
     """A torque with a peak at one speed of wheel 3, outside the vocabulary."""
-    robot = forward.robot
-    speed = forward.run(robot)["speed"]
+    robot = simulation.robot
+    speed = simulation.run(robot).speed
     torque = np.zeros((1, *speed.shape))
     moving = np.tanh(speed[:, 2] / 0.1)
     torque[0, :, 2] = 0.15 * np.exp(-(((np.abs(speed[:, 2]) - 4.0) / 1.5) ** 2)) * moving
-    dataset, found = searched(forward, forward.respond(robot, torque)[0], ())
+    dataset, found = searched(simulation, next(simulation.respond(robot, torque)), ())
     jacobian = linearise(dataset, found.best.model, ())
     rest = Remainder.of(dataset, found.best.value, jacobian, found.noise)
     first, *others = unmodelled_effects(rest, basis_responses(dataset, robot, 0.3))
@@ -81,20 +81,23 @@ def test_what_has_no_name_is_found_with_its_wheel_and_variable(
     assert peak == pytest.approx(4.0, abs=1.0)
 
 
-def test_what_the_users_simulation_resists_more_is_taken_off(forward: Forward) -> None:  # noqa: F811
+def test_what_the_users_simulation_resists_more_is_taken_off(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
     """A simulation whose contacts creep, on another drive than the one to be explained."""
-    robot = forward.robot
+    robot = simulation.robot
     creeps = ({"coefficient": 0.01},) * 3
     theirs = evolve(robot, physics={**robot.physics, "contact.rolling_resistance": creeps})
-    value = forward.predict([robot, theirs])
+    value = simulation.predict([robot, theirs])
     channels = tuple(
         evolve(channel, value=value[1, part])
-        for channel, part in zip(forward.channels, rows_of(forward.channels), strict=True)
+        for channel, part in zip(simulation.channels, rows_of(simulation.channels), strict=True)
     )
-    more = discrepancy_torques([evolve(forward, channels=channels)], robot, 0.3)
+    more = discrepancy_torques([evolve(simulation, channels=channels)], robot, 0.3)
     assert more is not None
     turned = evolve(
-        forward, recorded=evolve(forward.recorded, command=forward.recorded.command[:, [1, 0, 2]])
+        simulation,
+        recorded=evolve(simulation.recorded, command=simulation.recorded.command[:, [1, 0, 2]]),
     )
     torque = more.torque(motion_of(turned, robot, turned.run(robot)))
     wanted, ours = turned.predict([theirs, robot])
@@ -110,17 +113,20 @@ def test_what_the_users_simulation_resists_more_is_taken_off(forward: Forward) -
     assert left < 0.25 * before
 
 
-def test_a_simulation_like_ours_is_left_alone(forward: Forward) -> None:  # noqa: F811
+def test_a_simulation_like_ours_is_left_alone(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
     random = np.random.default_rng(2)
-    value = forward.predict([forward.robot])[0]
+    value = simulation.predict([simulation.robot])[0]
     channels = tuple(
         evolve(c, value=value[part] + 0.05 * random.standard_normal(len(c.time)))
-        for c, part in zip(forward.channels, rows_of(forward.channels), strict=True)
+        for c, part in zip(simulation.channels, rows_of(simulation.channels), strict=True)
     )
-    assert discrepancy_torques([evolve(forward, channels=channels)], forward.robot, 0.3) is None
+    theirs = [evolve(simulation, channels=channels)]
+    assert discrepancy_torques(theirs, simulation.robot, 0.3) is None
 
 
-def _as_recorded(made: Forward, value: np.ndarray) -> Forward:
+def _as_recorded(made: RecordingSimulation, value: np.ndarray) -> RecordingSimulation:
     channels = tuple(
         evolve(channel, value=value[part])
         for channel, part in zip(made.channels, rows_of(made.channels), strict=True)
@@ -129,18 +135,18 @@ def _as_recorded(made: Forward, value: np.ndarray) -> Forward:
 
 
 def test_what_the_users_simulation_shows_of_a_finding_is_taken_off(
-    forward: Forward,  # noqa: F811
+    simulation: RecordingSimulation,  # noqa: F811
 ) -> None:
     """0.02 N m in reality: of 0.005 in the simulation a part, of 0.02 nothing is left."""
-    robot = forward.robot
+    robot = simulation.robot
 
     def resisting(torque: float) -> np.ndarray:
         physics = {**robot.physics, "friction.asymmetric": (None, {"torque": torque}, None)}
-        return forward.predict([evolve(robot, physics=physics)])[0]
+        return simulation.predict([evolve(robot, physics=physics)])[0]
 
-    dataset, found = searched(forward, resisting(0.02), ("friction.asymmetric",))
+    dataset, found = searched(simulation, resisting(0.02), ("friction.asymmetric",))
     for shown, left in ((0.005, 1), (0.02, 0)):
-        simulation = _as_recorded(forward, resisting(shown))
+        simulation = _as_recorded(simulation, resisting(shown))
         baseline = SimulatorBaseline.of([simulation], dataset, found.noise, robot)
         kept, theirs = beyond_baseline(dataset, found, baseline)
         assert len(kept.best.model.hypotheses) == left

@@ -4,15 +4,13 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import Channel, channels_of
-from tomr_reality_gap.alignment.forward import Forward
-from tomr_reality_gap.alignment.steady import steadied, steady
-from tomr_reality_gap.alignment.stretches import Timeline
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 
 from .test_alignment import _recorded as recorded_drive
-from .test_alignment import forward  # noqa: F401 -- the fixture
+from .test_alignment import simulation  # noqa: F401 -- the fixture
 
 
 @pytest.fixture
@@ -21,15 +19,15 @@ def robot() -> Robot:
 
 
 @pytest.fixture
-def recorded(robot: Robot) -> Recorded:
+def recorded(robot: Robot) -> Drive:
     return recorded_drive(robot)
 
 
-def _channel(recorded: Recorded, robot: Robot, name: str) -> Channel:
-    return next(item for item in channels_of(recorded, robot, 0.005) if item.name == name)
+def _channel(recorded: Drive, robot: Robot, name: str) -> Channel:
+    return next(item for item in channels_of(recorded, robot) if item.name == name)
 
 
-def test_a_gap_of_the_encoders_stays_a_gap(recorded: Recorded, robot: Robot) -> None:
+def test_a_gap_of_the_encoders_stays_a_gap(recorded: Drive, robot: Robot) -> None:
     """Nothing is said about the second between 10 and 11 s, and no mean bridges it."""
     kept = (recorded.encoder_time < 10.0) | (recorded.encoder_time >= 11.0)
     holed = evolve(
@@ -46,7 +44,7 @@ def test_a_gap_of_the_encoders_stays_a_gap(recorded: Recorded, robot: Robot) -> 
     assert not ((found.time - found.span < 10.5) & (found.time > 10.5)).any()
 
 
-def test_what_is_not_a_number_is_left_out(recorded: Recorded, robot: Robot) -> None:
+def test_what_is_not_a_number_is_left_out(recorded: Drive, robot: Robot) -> None:
     power = recorded.power.copy()
     power[100:200, 0] = np.nan
     position = recorded.position.copy()
@@ -59,7 +57,7 @@ def test_what_is_not_a_number_is_left_out(recorded: Recorded, robot: Robot) -> N
     assert not ((speed.time > 10.1) & (speed.time < 10.9)).any()
 
 
-def test_a_gap_of_the_gyro_stays_a_gap(recorded: Recorded, robot: Robot) -> None:
+def test_a_gap_of_the_gyro_stays_a_gap(recorded: Drive, robot: Robot) -> None:
     time = np.delete(np.arange(0.0, 4.0, 0.01), np.arange(202, 250))
     rate = np.where(time < 2.1, 1.0, -1.0)
     found = _channel(evolve(recorded, yaw_time=time, yaw_rate=rate), robot, "imu/data")
@@ -68,68 +66,34 @@ def test_a_gap_of_the_gyro_stays_a_gap(recorded: Recorded, robot: Robot) -> None
     assert not ((found.time > 2.1) & (found.time < 2.5)).any()
 
 
-def test_standing_still_says_nothing_about_the_stamps(recorded: Recorded) -> None:
-    """Jitter shows in motion only: a robot that mostly stands has it, too."""
-    jitter = np.random.default_rng(3).normal(0.0, 4e-4, len(recorded.encoder_time))
-    moving = recorded.encoder_time < 2.5
-    position = np.where(moving[:, None], recorded.position, recorded.position[moving][-1])
-    standing = evolve(recorded, position=position)
-    assert steadied(evolve(standing, encoder_time=recorded.encoder_time + jitter))[1]
-
-
-def test_samples_that_really_come_unevenly_keep_their_stamps(recorded: Recorded) -> None:
-    """Taken when they say: on an even grid their motion would be rougher."""
-    random = np.random.default_rng(3)
-    time = recorded.encoder_time + random.normal(0.0, 4e-4, 3000)
-    position = np.stack(
-        [np.interp(time, recorded.encoder_time, column) for column in recorded.position.T], axis=1
-    )
-    position += random.normal(0.0, 1e-3, position.shape)
-    found, changed = steadied(evolve(recorded, encoder_time=time, position=position))
-    assert not changed
-    np.testing.assert_array_equal(found.encoder_time, time)
-    assert np.abs(steady(time) - time).max() > 1e-3
-
-
-def test_power_within_a_step_runs_straight_through_its_mean(forward: Forward) -> None:  # noqa: F811
-    """Means of 2 W and 4 W over two steps of 1 s; in the first it rises from 1.5 W to 2.5 W."""
-    line = Timeline(0.0, 1.0, 2, 0, np.zeros(1, dtype=np.intp), 2)
-    made = evolve(forward, timeline=line)
-    series, tilt = np.array([[2.0, 4.0]]), np.array([[1.0, 0.0]])
-    total = np.cumsum(series, axis=1)
-    energy = made._sum_at(series, tilt, total, np.array([0.0, 0.25, 0.5, 1.0, 1.5]))
-    # integral of 1.5 + t: 0.25 s -> 0.40625 J, 0.5 s -> 0.875 J
-    np.testing.assert_allclose(energy[0], [0.0, 0.40625, 0.875, 2.0, 4.0], atol=1e-5)
-
-
 def _flawed(robot: Robot, effect: str, **values: float) -> Robot:
     return evolve(robot, physics={**robot.physics, effect: (values, None, None)})
 
 
-def test_a_clock_that_is_late_shows_what_was(forward: Forward) -> None:  # noqa: F811
+def test_a_clock_that_is_late_shows_what_was(simulation: RecordingSimulation) -> None:  # noqa: F811
     """What is stamped t is of t - delay, at that wheel alone."""
     delay = 0.013
-    first, second = forward.channels[:2]
+    first, second = simulation.channels[:2]
     moved = tuple(evolve(item, time=item.time - delay) for item in (first, second))
-    earlier = evolve(forward, channels=moved).predict([forward.robot])[0]
-    late = _flawed(forward.robot, "sensor.clock_offset", delay=delay)
-    found = evolve(forward, channels=(first, second)).predict([forward.robot, late])
+    earlier = evolve(simulation, channels=moved).predict([simulation.robot])[0]
+    late = _flawed(simulation.robot, "sensor.clock_offset", delay=delay)
+    found = evolve(simulation, channels=(first, second)).predict([simulation.robot, late])
     count = len(first.time)
     np.testing.assert_allclose(found[1, :count], earlier[:count], rtol=1e-6, atol=1e-9)
     np.testing.assert_array_equal(found[1, count:], found[0, count:])
     assert np.abs(found[1, :count] - found[0, :count]).max() > 0.5
 
 
-def test_a_slow_sensor_follows_by_its_time_constant(forward: Forward) -> None:  # noqa: F811
+def test_a_slow_sensor_follows_by_its_time_constant(simulation: RecordingSimulation) -> None:  # noqa: F811
     """y += (x - y) (1 - e^(-h/T)) in every period h, the first value taken as settled."""
-    line, lag = forward.timeline, 0.05
+    line, lag = simulation.timeline, 0.05
     time = line.start + line.period * np.arange(1.0, line.count + 1.0)
     dense = evolve(
-        forward.channels[0], time=time, span=np.full(line.count, line.period), value=0.0 * time
+        simulation.channels[0], time=time, span=np.full(line.count, line.period), value=0.0 * time
     )
-    made = evolve(forward, channels=(dense,))
+    made = evolve(simulation, channels=(dense,))
     true, shown = made.predict(
-        [forward.robot, _flawed(forward.robot, "sensor.power_lag", time_constant=lag)]
+        [simulation.robot, _flawed(simulation.robot, "sensor.power_lag", time_constant=lag)]
     )
     share = 1.0 - np.exp(-line.period / lag)
     np.testing.assert_allclose(np.diff(shown), share * (true[1:] - shown[:-1]), atol=1e-3)

@@ -1,7 +1,6 @@
 """All that a verdict rests on, and what it could not have seen."""
 
 import math
-from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from tomr_power_model.estimation.linear_gaussian import Gram, solve
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot
 from tomr_power_model.robot import Robot
+from tomr_reality_gap.alignment.simulation import Run
 from tomr_reality_gap.fit.basis_responses import BasisResponses
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection, finding_cost
@@ -45,19 +45,19 @@ class AnalysisResult:
         return tuple(self.dataset.predict([self.base.robot, *robots]))
 
     @cached_property
-    def runs(self) -> tuple[Mapping[str, Array], ...]:
+    def runs(self) -> tuple[Run, ...]:
         """Motion of the best model in each recording."""
         robot = self.found.best.model.described.robot
-        return tuple(item.run(robot) for item in self.dataset.forwards)
+        return tuple(item.run(robot) for item in self.dataset.simulations)
 
 
 def detection_limits(analysis: AnalysisResult) -> tuple[tuple[str, str, str], ...]:
     """The smallest size of each effect that would have been found."""
     step = analysis.found.rounds[-1]
     jacobian, noise = step.jacobian, step.noise
-    columns = jacobian.whitened(noise, slice(None))
-    gram = Gram.of(columns, np.zeros(len(columns)))
-    cost = finding_cost(len(columns))
+    samples = len(noise.weight)
+    gram = Gram.of(jacobian.matrix, np.zeros(samples), noise.weight)
+    cost = finding_cost(samples)
     base = list(range(jacobian.sensors.stop))
     inverse = solve(gram, base).covariance
     found: dict[str, tuple[float, Hypothesis, Parameter]] = {}

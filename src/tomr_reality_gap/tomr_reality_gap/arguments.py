@@ -89,7 +89,7 @@ def inputs_of(options: argparse.Namespace) -> Request:
     if not options.skip:
         return request
     # What fits takes a second to import: --help does without.
-    from tomr_power_model.calibration.calibrate import skips_of
+    from tomr_power_model.drive.cut import skips_of
 
     return evolve(request, skips=skips_of(options.skip, request.recordings))
 

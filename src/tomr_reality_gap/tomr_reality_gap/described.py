@@ -32,5 +32,5 @@ def described(analysis: AnalysisResult, model: Model) -> str:
                 del values[item]
     findings = ", ".join(item.name for item in model.hypotheses)
     header = [f"{analysis.source}, with what reality showed besides:", findings]
-    recordings = ", ".join(item.recorded.name for item in analysis.dataset.forwards)
+    recordings = ", ".join(item.recorded.name for item in analysis.dataset.simulations)
     return fitted_text(analysis.source, values, (), (), (), header, {"recordings": recordings})

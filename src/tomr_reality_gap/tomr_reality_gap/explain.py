@@ -1,6 +1,6 @@
 """From recordings to an explanation: align, compare, name, model, show."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from attrs import evolve
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tomr_power_model.estimation.noise import rows_of
 from tomr_reality_gap.alignment.response import leaps_of
+from tomr_reality_gap.alignment.simulation import Run
 from tomr_reality_gap.analysis import AnalysisResult
 from tomr_reality_gap.explanation import Explanation
 from tomr_reality_gap.fit.backward_elimination import backward_elimination
@@ -88,17 +89,15 @@ class _Counter:
         self._progress("naming", 0.1 + 0.75 * part)
 
 
-def _orders(dataset: Dataset, runs: Sequence[Mapping[str, Array]]) -> tuple[float, ...]:
+def _orders(dataset: Dataset, runs: Sequence[Run]) -> tuple[float, ...]:
     """Orders of ripples that any recording shows."""
     found: list[float] = []
-    for item, run in zip(dataset.forwards, runs, strict=True):
+    for item, run in zip(dataset.simulations, runs, strict=True):
         value = item.predict([item.robot])[0]
-        line = item.timeline
-        middle = line.start + line.period * (np.arange(line.count) + 0.5)
         residuals, speeds = [], []
         for channel, part in zip(item.channels, rows_of(item.channels), strict=True):
             residuals.append(channel.value - value[part])
-            own = run["speed"][:, channel.wheel or 0]
-            speeds.append(np.interp(channel.time - 0.5 * channel.span, middle, own))
+            own = run.speed[:, channel.wheel or 0]
+            speeds.append(np.interp(channel.time - 0.5 * channel.span, item.timeline.middle, own))
         found += ripple_orders(item.recorded, item.channels, residuals, speeds)
     return tuple(dict.fromkeys(found))

@@ -8,7 +8,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.estimation.discrepancy import SIMULATOR
-from tomr_power_model.estimation.statistics import robust_std
+from tomr_power_model.estimation.statistics import robust_scale
 from tomr_reality_gap.explanation import Estimate
 
 Array = NDArray[np.float64]
@@ -114,7 +114,7 @@ def unexplained(channels: Sequence[Residuals]) -> tuple[float, float]:
     for item in channels:
         steps = np.abs(np.diff(item.after))
         noise = max(
-            0.5 * robust_std(steps) ** 2,
+            0.5 * robust_scale(steps) ** 2,
             0.5 * float(np.mean(np.minimum(steps, 5.0 * np.median(steps)) ** 2)),
             item.quantum**2 / 12.0,
         )

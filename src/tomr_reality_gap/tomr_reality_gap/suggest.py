@@ -51,6 +51,6 @@ class _Plain(yaml.SafeDumper):
 def _phases(name: str) -> Sequence[Phase]:
     key = name.removeprefix("parameter.").removeprefix("physics.")
     for effect_id, effect in EFFECTS.items():
-        if key.startswith(effect_id):
+        if key == effect_id or key.startswith(f"{effect_id}."):
             return effect.mission
     return next(phases for start, phases in _PARAMETERS if key.startswith(start))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.statistics import autocorrelation
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.analysis import AnalysisResult, detection_limits
 from tomr_reality_gap.described import described, for_users
 from tomr_reality_gap.explanation import Comparison, Explanation, Finding
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 
 def explanation_of(
-    analysis: AnalysisResult, held: Sequence[Forward], notes: tuple[str, ...]
+    analysis: AnalysisResult, held: Sequence[RecordingSimulation], notes: tuple[str, ...]
 ) -> Explanation:
     """The whole explanation."""
     dataset, found = analysis.dataset, analysis.found
@@ -92,13 +92,13 @@ def _comparisons(
     model: Model,
     effect: Unmodelled | None,
     after: Array,
-    held: Sequence[Forward],
+    held: Sequence[RecordingSimulation],
 ) -> tuple[Comparison, ...]:
     """All recordings before and after, with what the effect without a name amounts to."""
     described, explained = analysis.base.robot, model.described.robot
     besides = effect.torque if effect is not None else None
     found, at = [], 0
-    for item, run in zip(analysis.dataset.forwards, analysis.runs, strict=True):
+    for item, run in zip(analysis.dataset.simulations, analysis.runs, strict=True):
         part = slice(at, at := at + sum(len(channel.time) for channel in item.channels))
         values: Array = np.stack([analysis.simulated[0][part], after[part]])
         if besides is not None:
@@ -129,7 +129,7 @@ def _variables(analysis: AnalysisResult) -> Mapping[str, Array]:
     """Variables at all samples of all recordings."""
     parts = [
         variables_at(item, run, item.channels)
-        for item, run in zip(analysis.dataset.forwards, analysis.runs, strict=True)
+        for item, run in zip(analysis.dataset.simulations, analysis.runs, strict=True)
     ]
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
@@ -137,11 +137,11 @@ def _variables(analysis: AnalysisResult) -> Mapping[str, Array]:
 def _alignment(analysis: AnalysisResult) -> dict[str, str]:
     """What the fit found about the timing of each recording."""
     found = {}
-    for item in analysis.dataset.forwards:
+    for item in analysis.dataset.simulations:
         line = item.timeline
         found[item.recorded.name] = (
-            f"drivers' periods of {1e3 * line.period:g} ms begin {-1e3 * line.start:.2f} ms before "
-            f"the first encoder sample; {len(line.first)} stretches simulated side by side"
+            f"drivers' periods of {1e3 * line.period:g} ms begin {1e3 * line.phase:.2f} ms before "
+            "the first encoder sample"
         )
     return found
 

@@ -17,10 +17,11 @@ from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_fault_diag.residuals.messages import residual_message
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
-from tomr_power_model.messages.inputs import TWIST_STAMPED, Complaints, Input, model_inputs
+from tomr_power_model.messages.inputs import Complaints, Input, model_inputs
 from tomr_power_model.messages.intake import WheelFinder
 from tomr_power_model.messages.outgoing import Outgoing
 from tomr_power_model.messages.predictions import prediction_messages
+from tomr_power_model.messages.types import TWIST_STAMPED
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import Robot

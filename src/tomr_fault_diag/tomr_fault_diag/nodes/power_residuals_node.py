@@ -12,7 +12,7 @@ from tomr_fault_diag.residuals.settings import (
 )
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
-from tomr_power_model.messages.inputs import BATTERY, JOINT_STATE, Input, guarded
+from tomr_power_model.messages.inputs import Input, guarded
 from tomr_power_model.messages.intake import stamp_of
 from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.predictions import (
@@ -20,6 +20,7 @@ from tomr_power_model.messages.predictions import (
     PredictionAssembler,
     prediction_topics,
 )
+from tomr_power_model.messages.types import BATTERY, JOINT_STATE
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.nodes.command_line import node_arguments
 from tomr_power_model.nodes.stage_node import STAGE_QOS, StageNode, run_node

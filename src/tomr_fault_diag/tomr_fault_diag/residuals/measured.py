@@ -6,7 +6,9 @@ from collections import deque
 from attrs import frozen
 
 from tomr_fault_diag.residuals.frame import Unit
+from tomr_power_model.drive.sources import PowerReading
 from tomr_power_model.messages.readings import NAN
+from tomr_power_model.model.ticks import of_tick
 
 
 @frozen
@@ -33,20 +35,14 @@ class SupplyWindow:
         """Forget all samples."""
         self._samples.clear()
 
-    def add(self, stamp_ns: int, voltage: float, current: float) -> None:
-        """Take a reading: voltage [V] or NaN, current [A] negative while drawing."""
-        drawn = -current if self._signed else abs(current)
-        self._samples.append((stamp_ns, -voltage * current, drawn))
+    def add(self, reading: PowerReading) -> None:
+        """Take a reading newer than those before."""
+        drawn = reading.current if self._signed else abs(reading.current)
+        self._samples.append((reading.stamp_ns, reading.power, drawn))
 
     def at(self, tick_ns: int) -> Measured:
         """Mean over (tick - period, tick]: power, or current if the voltage is unknown."""
-        samples = self._samples
-        while len(samples) > 1 and samples[1][0] <= tick_ns - self._period:
-            samples.popleft()
-        start = tick_ns - self._period
-        inside = [s for s in samples if start < s[0] <= tick_ns]
-        if not inside:
-            inside = [s for s in samples if tick_ns - self._stale < s[0] <= tick_ns][-1:]
+        inside = of_tick(self._samples, tick_ns, self._period, self._stale)
         if not inside:
             return Measured(NAN, "W")
         powers = [s[1] for s in inside if s[1] == s[1]]  # not NaN

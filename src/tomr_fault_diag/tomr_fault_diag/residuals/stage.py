@@ -9,6 +9,7 @@ from attrs import evolve, frozen
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame, Unit, rounded
 from tomr_fault_diag.residuals.measured import Measured, SupplyWindow
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
+from tomr_power_model.drive.sources import TOTAL, TOTAL_TOPIC, PowerReading
 from tomr_power_model.messages.readings import NAN, UNKNOWN_READING
 from tomr_power_model.model.encoders import UNKNOWN, EncoderSample, EncoderWindow, Triple
 from tomr_power_model.model.prediction import Prediction
@@ -17,7 +18,6 @@ from tomr_power_model.robot import WHEELS, Robot
 
 PREDICTIONS = "predictions"
 ENCODERS = "joint_states"
-TOTAL_SUPPLY = "battery_state"
 
 # The model's change over so many ticks widens the band: where power jumps, a lag of a few
 # milliseconds between the streams is a large residual.
@@ -60,10 +60,12 @@ class ResidualStage:
         ticks = self.settings.ticks
         self._clock = TickClock(ticks, expected=(PREDICTIONS,))
         signed = robot.measurement.signed
-        self._motors = [
-            SupplyWindow(ticks.period, self.settings.stale, signed) for _ in range(WHEELS)
+        # Of the motors, then of the whole robot.
+        self._supplies = (*self._topics, TOTAL_TOPIC)
+        self._windows = [
+            SupplyWindow(ticks.period, self.settings.stale, signed or supply == TOTAL_TOPIC)
+            for supply in self._supplies
         ]
-        self._supply = SupplyWindow(ticks.period, self.settings.stale)
         self._encoders = EncoderWindow(
             self.settings.encoder_window, ticks.period, self.settings.stale
         )
@@ -88,18 +90,11 @@ class ResidualStage:
             self._encoders.add(EncoderSample(stamp_ns, position, velocity))
         return arrival
 
-    def motor(self, wheel: int, stamp_ns: int, voltage: float, current: float) -> Arrival:
-        """Take a motor's reading: voltage [V] or NaN, current [A] negative while drawing."""
-        arrival = self._arrive(self._topics[wheel], stamp_ns)
+    def power(self, reading: PowerReading) -> Arrival:
+        """Take what a motor or the whole robot draws."""
+        arrival = self._arrive(self._supplies[reading.wheel], reading.stamp_ns)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
-            self._motors[wheel].add(stamp_ns, voltage, current)
-        return arrival
-
-    def supply(self, stamp_ns: int, voltage: float, current: float) -> Arrival:
-        """Take the whole robot's reading."""
-        arrival = self._arrive(TOTAL_SUPPLY, stamp_ns)
-        if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
-            self._supply.add(stamp_ns, voltage, current)
+            self._windows[reading.wheel].add(reading)
         return arrival
 
     def due(self) -> list[ResidualFrame]:
@@ -109,7 +104,7 @@ class ResidualStage:
     def _arrive(self, stream: str, stamp_ns: int) -> Arrival:
         arrival = self._clock.arrive(stream, stamp_ns)
         if arrival is Arrival.RESTARTED:
-            for window in (*self._motors, self._supply):
+            for window in self._windows:
                 window.clear()
             self._encoders.clear()
             self._predictions.clear()
@@ -122,7 +117,7 @@ class ResidualStage:
         known = self._predictions.pop(tick, None)
         prediction = known or _no_prediction(tick)
         self._recent.append(_Modelled.of(prediction))
-        motors = [window.at(tick) for window in self._motors]
+        motors = [window.at(tick) for window in self._windows[:WHEELS]]
         absent = "" if known else "no prediction: is the power_model node running?"
         return ResidualFrame(
             tick,
@@ -144,7 +139,7 @@ class ResidualStage:
             models = [math.fsum(past.of_unit(unit)[:WHEELS]) for past in self._recent]
             missing = "no fresh power of every motor"
         else:
-            value = self._supply.at(tick).value if source == "battery_state" else NAN
+            value = self._windows[TOTAL].at(tick).value if source == "battery_state" else NAN
             models = [past.power[WHEELS] for past in self._recent]
             missing = "no fresh battery_state"
         least = self._least(unit) * self.settings.bands.total_factor

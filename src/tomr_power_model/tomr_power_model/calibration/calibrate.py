@@ -1,29 +1,33 @@
 """A calibration from recordings to figures: read, check, fit, score."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.calibration.checks import Finding
 from tomr_power_model.calibration.fit import Fit, fit
 from tomr_power_model.calibration.identify import warnings_of
 from tomr_power_model.calibration.parameters import Choice, choose
 from tomr_power_model.calibration.problem import Problem
-from tomr_power_model.calibration.recorded import Recorded, read_recorded
 from tomr_power_model.calibration.samples import TOTAL, Samples, samples_of
 from tomr_power_model.calibration.scoring import Scores, score, suspicious
+from tomr_power_model.calibration.structure import structure_warnings
+from tomr_power_model.drive.clean import cleaned
+from tomr_power_model.drive.cut import Skips, names_of, without
+from tomr_power_model.drive.quality import Finding
+from tomr_power_model.drive.read import read_drive
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, Values, prior_stds
 from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
-Skips = Mapping[str, Sequence[tuple[float, float]]]
 
 _MOST_NOTES = 4
 _WORST_SHARE = 0.05  # of the time that may look like a fault
+_ONE_PIECE = 0.4  # of such time
 
 
 @frozen
@@ -31,7 +35,7 @@ class Timing:
     """How motion and power are brought to the same instants [s]."""
 
     span: float = 0.05  # of the fit to the encoders
-    window: float = 0.005  # of the power sensor
+    window: float | None = None  # of the power sensor; None: sensors.power_window
 
 
 @frozen
@@ -63,80 +67,20 @@ def read_all(
     namespace: str | None,
     skips: Skips,
     tick: Callable[[], None] = lambda: None,
-) -> tuple[Recorded, ...]:
+) -> tuple[Drive, ...]:
     """Read recordings and cut out what is to be skipped. Raises InputError."""
     found = []
     for path, name in zip(paths, names_of(paths), strict=True):
-        recorded = evolve(read_recorded(path, robot, namespace), name=name)
-        found.append(without(recorded, skips.get(name, ())))
+        drive = evolve(read_drive(path, robot, namespace), name=name)
+        found.append(without(cleaned(drive, robot), skips.get(name, ())))
         tick()
     return tuple(found)
 
 
-def names_of(paths: Sequence[Path]) -> list[str]:
-    """What to call each recording: its last part, with its folder where two have one name."""
-    short = [path.resolve().name for path in paths]
-    names = [
-        "/".join(path.resolve().parts[-2:]) if short.count(name) > 1 else name
-        for path, name in zip(paths, short, strict=True)
-    ]
-    twice = {name for name in names if names.count(name) > 1}
-    if twice:
-        raise InputError(f"{min(twice)} is given twice: give each recording once")
-    return names
-
-
-def skips_of(given: Sequence[str], bags: Sequence[Path]) -> Skips:
-    """What `--skip BAG=FROM:TO` leaves out. Raises InputError for what names no recording."""
-    found: dict[str, list[tuple[float, float]]] = {}
-    names = names_of(bags)
-    for text in given:
-        name, _, interval = text.rpartition("=")
-        start, _, end = interval.partition(":")
-        try:
-            limits = float(start), float(end)
-        except ValueError:
-            raise InputError(f"--skip {text}: give BAG=FROM:TO in seconds") from None
-        if name not in names:
-            raise InputError(f"--skip {text}: no recording {name}: {', '.join(names)} are given")
-        found.setdefault(name, []).append(limits)
-    return found
-
-
-def without(recorded: Recorded, intervals: Sequence[tuple[float, float]]) -> Recorded:
-    """A recording without some intervals [s]. Raises InputError if nothing is left."""
-
-    def kept(time: Array) -> NDArray[np.bool_]:
-        keep = np.ones(len(time), dtype=bool)
-        for start, end in intervals:
-            keep &= (time < start) | (time > end)
-        return keep
-
-    if not intervals:
-        return recorded
-    encoders, power = kept(recorded.encoder_time), kept(recorded.power_time)
-    total = kept(recorded.total_time)
-    if np.count_nonzero(encoders) < 2:
-        raise InputError(f"--skip {recorded.name}: nothing is left: leave the recording out")
-    return evolve(
-        recorded,
-        encoder_time=recorded.encoder_time[encoders],
-        position=recorded.position[encoders],
-        velocity=recorded.velocity[encoders],
-        power_time=recorded.power_time[power],
-        power=recorded.power[power],
-        reading=recorded.reading[power],
-        voltage=recorded.voltage[power],
-        total_time=recorded.total_time[total],
-        total=recorded.total[total],
-        total_voltage=recorded.total_voltage[total],
-    )
-
-
-def align(recorded: Sequence[Recorded], robot: Robot, timing: Timing) -> tuple[Samples, ...]:
+def align(drives: Sequence[Drive], robot: Robot, timing: Timing) -> tuple[Samples, ...]:
     """Samples of recordings. Raises InputError for one whose power and encoders never meet."""
     found = []
-    for item in recorded:
+    for item in drives:
         samples = samples_of(item, robot, timing.span, timing.window)
         if not len(samples.time):
             raise InputError(
@@ -170,7 +114,7 @@ def calibrate(
     fitted = fit(problem, robust, tick)
     robot = problem.robot(fitted.numbers)
     findings = [found for item in samples for found in suspicious(item, robot)]
-    _refuse_faults(findings, samples)
+    _refuse_episode(findings, samples)
     elsewhere = [found for item in held_out for found in suspicious(item, robot)]
     return Result(
         robot=robot,
@@ -182,7 +126,10 @@ def calibrate(
         scores_before=score(samples, before),
         held_out_scores=score(held_out, robot),
         held_out_scores_before=score(held_out, before),
-        warnings=tuple(warnings_of(parameters, fitted, robot.wheel_names)),
+        warnings=(
+            *structure_warnings((*samples, *held_out), robot),
+            *warnings_of(parameters, fitted, robot.wheel_names),
+        ),
         notes=_in_words([*findings, *elsewhere]),
     )
 
@@ -195,10 +142,14 @@ def _in_words(findings: Sequence[Finding]) -> tuple[str, ...]:
     return (*notes, f"{more} shorter stretches are like that") if more > 0 else tuple(notes)
 
 
-def _refuse_faults(findings: Sequence[Finding], samples: Sequence[Samples]) -> None:
-    """Raise InputError where too much of the time looks like a fault."""
+def _refuse_episode(findings: Sequence[Finding], samples: Sequence[Samples]) -> None:
+    """Raise InputError where much of the time is out of line, and mostly in one piece.
+
+    Something happened there; what a model leaves out comes back wherever the robot drives alike.
+    """
     total = sum(float(item.time[-1] - item.time[0]) for item in samples)
     odd = sum(found.end - found.start for found in findings)
     if odd > _WORST_SHARE * total:
         longest = max(findings, key=lambda found: found.end - found.start)
-        raise InputError(f"{longest} ({odd:.0f} s of {total:.0f} s are like that)")
+        if longest.end - longest.start > _ONE_PIECE * odd:
+            raise InputError(f"{longest} ({odd:.0f} s of {total:.0f} s are like that)")

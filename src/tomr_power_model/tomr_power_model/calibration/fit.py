@@ -25,7 +25,7 @@ from tomr_power_model.estimation.gauss_newton import (
 from tomr_power_model.estimation.intervals import Uncertainty, block_jackknife, uninterrupted
 from tomr_power_model.estimation.parameter import bounds, prior_stds
 from tomr_power_model.estimation.robust import soft_l1
-from tomr_power_model.estimation.statistics import autocorrelation_time, robust_std
+from tomr_power_model.estimation.statistics import autocorrelation_time, robust_scale
 
 Array = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ def fit(problem: Problem, robust: bool = True, tick: Callable[[], None] = lambda
             slope = problem.jacobian(numbers, _STEP * std, tick) * std
             known = np.isfinite(root)
             slope *= (weight * change / scale)[:, :, None]
-            return [Linearisation((weight * root)[known], slope[known])]
+            return [Linearisation.of((weight * root)[known], slope[known])]
 
         start = Start(units, lower, upper, np.full(len(std), np.inf))
         (found,) = maximise([start], evaluate, _SETTINGS)
@@ -87,7 +87,7 @@ def _weights(problem: Problem, residual: Array) -> tuple[Array, Array]:
     for channel in range(CHANNELS):
         known = residual[np.isfinite(residual[:, channel]), channel]
         if len(known):
-            scale[channel] = max(robust_std(known), _LEAST_SCALE)
+            scale[channel] = max(robust_scale(known), _LEAST_SCALE)
             series = soft_l1(residual[:, channel] / scale[channel])[0]
             weight[channel] = autocorrelation_time(uninterrupted(problem.samples, series)) ** -0.5
     return scale, weight

@@ -34,11 +34,6 @@ _FIXED = {
     for spec in ROBOT_PARAMETERS
     if spec.kind == "float" and not spec.name.startswith(("motor.", "sensors."))
 }
-_KNOWN = (
-    *_FIXED,
-    *_MOTOR,
-    *(f"physics.{name}.{key}" for name, effect in EFFECTS.items() for key in effect.parameters),
-)
 
 
 @frozen
@@ -97,6 +92,12 @@ def wheel_of(parameter: Parameter, wheels: Sequence[str]) -> str | None:
     return next((wheel for wheel in wheels if f".{wheel}." in parameter.keys[0]), None)
 
 
+def _known() -> list[str]:
+    """General keys of all that can be fitted."""
+    physics = [f"physics.{name}.{key}" for name, item in EFFECTS.items() for key in item.parameters]
+    return [*_FIXED, *_MOTOR, *physics]
+
+
 def _expand(
     key: str, values: Values, wheels: Sequence[str], choice: Choice, place: str
 ) -> list[Parameter]:
@@ -107,10 +108,8 @@ def _expand(
     own = next((wheel for wheel in wheels if f".{wheel}." in key), None)
     general = key if own is None else key.replace(f".{own}.", ".")
     for_wheels = general in _MOTOR or _is_of_wheels(general)
-    if general not in _KNOWN or (own and not for_wheels):
-        raise InputError(
-            f"--fit {key}: no such value in a robot.yaml: {closest(key, list(_KNOWN))}"
-        )
+    if general not in _known() or (own and not for_wheels):
+        raise InputError(f"--fit {key}: no such value in a robot.yaml: {closest(key, _known())}")
     modelled = general in _MOTOR and general != "motor.rotor_inertia"
     if modelled and choice.quantity == "motor_current":
         raise InputError(
@@ -131,7 +130,7 @@ def _expand(
 
 
 def _is_of_wheels(general: str) -> bool:
-    if general not in _KNOWN or not general.startswith("physics."):
+    if general not in _known() or not general.startswith("physics."):
         return False
     return EFFECTS[split_effect(general)[0]].place == "wheel"
 

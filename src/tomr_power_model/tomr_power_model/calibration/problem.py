@@ -7,11 +7,14 @@ from attrs import field, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.calibration.samples import CHANNELS, TOTAL, Samples, motor_power
+from tomr_power_model.dynamics.drives import InverseDynamics, WheelMotion
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot
-from tomr_power_model.physics.model import PhysicalModel, WheelMotion
 from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
+
+_STILL = 0.15  # rad/s
+_DRY = ("friction.coulomb", "friction.stribeck", "contact.rolling_resistance")
 
 
 def modelled_power(robot: Robot, motion: WheelMotion, parts: int = 1) -> Array:
@@ -19,7 +22,7 @@ def modelled_power(robot: Robot, motion: WheelMotion, parts: int = 1) -> Array:
 
     The mean over each `parts` rows of the motion: the power sensor's window.
     """
-    drives = PhysicalModel.of(robot).power(motion)
+    drives = InverseDynamics.of(robot).power(motion)
     power = drives.power
     if robot.measurement.quantity == "motor_current":
         power = motor_power(robot, drives.current, motion.speed)
@@ -27,6 +30,19 @@ def modelled_power(robot: Robot, motion: WheelMotion, parts: int = 1) -> Array:
     rows[:, :WHEELS] = power
     rows[:, TOTAL] = drives.power.sum(axis=1) + robot.supply.auxiliary_power
     return rows if parts == 1 else np.asarray(rows.reshape(-1, parts, CHANNELS).mean(axis=1))
+
+
+def determined(samples: Samples, robot: Robot) -> Array:
+    """Measured power without that of standing wheels that may hold any torque, (n, 4) [W].
+
+    Where a wheel stops in dry friction, the sum of its driver's errors goes on holding a voltage.
+    """
+    dry = any(robot.effect(effect, wheel) for effect in _DRY for wheel in range(WHEELS))
+    if not (robot.controller.integral and dry):
+        return samples.measured
+    held = np.abs(samples.mean_motion.speed) < _STILL
+    unknown = np.column_stack([held, held.any(axis=1)])
+    return np.where(unknown, np.nan, samples.measured)
 
 
 @frozen
@@ -45,7 +61,8 @@ class Problem:
             np.concatenate([item.motion.acceleration for item in self.samples]),
         )
         object.__setattr__(self, "_motion", joined)
-        measured = np.concatenate([item.measured for item in self.samples])
+        described = self.described.robot
+        measured = np.concatenate([determined(item, described) for item in self.samples])
         object.__setattr__(self, "measured", measured)
 
     @property

@@ -6,9 +6,9 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.calibration.motion import median_period, wheel_motion
-from tomr_power_model.calibration.recorded import Recorded
-from tomr_power_model.physics.model import WheelMotion
+from tomr_power_model.drive.motion import median_period, wheel_motion
+from tomr_power_model.drive.record import Drive
+from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
@@ -51,28 +51,29 @@ class Samples:
         )
 
 
-def samples_of(recorded: Recorded, robot: Robot, span: float, window: float) -> Samples:
+def samples_of(drive: Drive, robot: Robot, span: float, window: float | None = None) -> Samples:
     """Motion where power was measured.
 
     Instants without a known motion of all wheels are left out.
 
     Args:
-        recorded: the recording.
+        drive: the recording.
         robot: its description; R and k turn motor currents into power.
         span: of the fit to the encoders [s].
-        window: over which the power sensor averages before its stamp [s].
+        window: over which the power sensor averages before its stamp [s]; None: the robot's.
     """
-    time = np.union1d(recorded.power_time, recorded.total_time)
+    window = robot.sensors.power_window if window is None else window
+    time = np.union1d(drive.power_time, drive.total_time)
     measured = np.full((len(time), CHANNELS), np.nan)
-    rows = np.searchsorted(time, recorded.power_time)
-    measured[rows, :WHEELS] = recorded.power
-    measured[np.searchsorted(time, recorded.total_time), TOTAL] = recorded.total
-    parts = max(1, math.ceil(window / median_period(recorded.encoder_time) - 1e-9))
+    rows = np.searchsorted(time, drive.power_time)
+    measured[rows, :WHEELS] = drive.power
+    measured[np.searchsorted(time, drive.total_time), TOTAL] = drive.total
+    parts = max(1, math.ceil(window / median_period(drive.encoder_time) - 1e-9))
     back = window * (1.0 - (np.arange(parts) + 0.5) / parts)
     motion = wheel_motion(
-        recorded.encoder_time,
-        recorded.position,
-        recorded.velocity,
+        drive.encoder_time,
+        drive.position,
+        drive.velocity,
         (time[:, None] - back).ravel(),
         span,
     )
@@ -80,7 +81,7 @@ def samples_of(recorded: Recorded, robot: Robot, span: float, window: float) -> 
         speed = motion.speed.reshape(-1, parts, WHEELS).mean(axis=1)
         measured[:, :WHEELS] = motor_power(robot, measured[:, :WHEELS], speed)
     stretch = np.concatenate([[0], np.cumsum(np.diff(time) > _STRETCH_GAP)])
-    samples = Samples(recorded.name, time, measured, motion, parts, stretch)
+    samples = Samples(drive.name, time, measured, motion, parts, stretch)
     known = np.isfinite(motion.speed).all(axis=1).reshape(-1, parts).all(axis=1)
     return samples.keep(known & np.isfinite(measured).any(axis=1))
 

@@ -7,10 +7,10 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from tomr_power_model.calibration.checks import Finding, runs
-from tomr_power_model.calibration.motion import median_period
-from tomr_power_model.calibration.problem import modelled_power
+from tomr_power_model.calibration.problem import determined, modelled_power
 from tomr_power_model.calibration.samples import TOTAL, Samples
+from tomr_power_model.drive.motion import median_period
+from tomr_power_model.drive.quality import Finding, runs
 from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.robot import WHEELS, Robot
 
@@ -129,14 +129,15 @@ def _reachable(measured: Array, modelled: Array) -> float:
 def suspicious(samples: Samples, robot: Robot) -> Iterator[Finding]:
     """Stretches whose power is far from the fitted model for a second or more."""
     modelled = modelled_power(robot, samples.motion, samples.parts)
-    has_motors = bool(np.isfinite(samples.measured[:, :WHEELS]).any())
+    measured = determined(samples, robot)
+    has_motors = bool(np.isfinite(measured[:, :WHEELS]).any())
     names = robot.wheel_names if has_motors else ("",) * WHEELS + ("the whole robot",)
     for wheel, name in enumerate(names):
-        known = np.isfinite(samples.measured[:, wheel])
+        known = np.isfinite(measured[:, wheel])
         time = samples.time[known]
         if len(time) < _LEAST_SAMPLES:
             continue
-        drawn, model = samples.measured[known, wheel], modelled[known, wheel]
+        drawn, model = measured[known, wheel], modelled[known, wheel]
         misfit = np.abs(drawn - model)
         usual, lasting = float(np.median(misfit)), _lasting(time, misfit)
         level = np.maximum(_lasting(time, np.abs(drawn)), _lasting(time, np.abs(model)))

@@ -30,7 +30,7 @@ from tomr_power_model.dynamics.start import begin
 from tomr_power_model.dynamics.step import advance
 
 # Kinds of channels, as numbers that compiled code can hold.
-SPEED, POWER, TOTAL, VOLTAGE, YAW, CURRENT, MAGNITUDE = range(7)
+SPEED, POWER, TOTAL, SUPPLY_VOLTAGE, YAW, CURRENT, MAGNITUDE = range(7)
 
 
 def run(
@@ -86,7 +86,7 @@ def series(p: Numbers, steps: Any, kind: int, wheel: int, value: Any, tilt: Any,
                 total += steps[k, OUT_HEADER + i * OUT_WHEEL + OUT_POWER]
                 change += steps[k, OUT_HEADER + i * OUT_WHEEL + OUT_TILT]
             value[k], tilt[k] = total, change
-        elif kind == VOLTAGE:
+        elif kind == SUPPLY_VOLTAGE:
             value[k] = steps[k, OUT_VOLTAGE]
         elif kind == YAW:
             value[k] = steps[k, OUT_YAW]

@@ -1,17 +1,20 @@
 """The step bound to the laws of the effects: as it is, or compiled.
 
 `step`, `contacts`, `inverse`, `start` and `batch` are plain functions that call each other and four
-laws by name. Binding makes copies of them in one namespace in which the laws are those of the
-effects: of those that a robot has, in plain Python; of all, where numba compiles them. So there
-is one source of the dynamics, and an effect is one file.
+laws by name. Binding makes copies of them for which the laws are those of the effects: of those
+that a robot has, in plain Python; of all, where numba compiles them. So there is one source of the
+dynamics, and an effect is one file.
 """
 
 import hashlib
-import importlib.util
+import inspect
 import os
+import pickletools
 import tempfile
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
@@ -21,8 +24,9 @@ from tomr_power_model.dynamics.numbers import law_offsets
 from tomr_power_model.effects import EFFECTS, LAWS, base
 
 _MODULES = (contacts, step, inverse, start, batch)
-_ENTRIES = ("advance", "begin", "drive_powers", "predict", "run")
+_ENTRIES = ("advance", "begin", "drive_power", "drive_powers", "predict", "read", "run")
 _CACHE = "TOMR_CACHE_DIR"  # where compiled code is kept; default: the user's cache folder
+_ROOM = 2_000_000  # bytes that it takes, and some more
 
 Jit = Callable[[Any], Any]
 
@@ -100,50 +104,63 @@ def _law(name: str, effect_ids: Iterable[str], jit: Jit) -> Any:
 
 
 def _bound(effect_ids: Iterable[str], jit: Jit, entry: Jit) -> Any:
-    """Copies of all functions of the dynamics, in one namespace with the laws."""
+    """Copies of all functions of the dynamics, which call each other and the laws."""
     ids = tuple(effect_ids)
-    # numba looks the module up by its name when it loads what it compiled.
-    names: dict[str, Any] = {"__builtins__": __builtins__, "__name__": step.__name__}
-    plain: dict[str, FunctionType] = {}
-    for module in _MODULES:
-        for name, value in vars(module).items():
-            if isinstance(value, FunctionType) and value.__module__ == module.__name__:
-                plain[name] = value
-            elif not name.startswith("__"):
-                names.setdefault(name, value)
-    for name, function in plain.items():
-        copy = FunctionType(function.__code__, names, name, function.__defaults__)
-        names[name] = (entry if name in _ENTRIES else jit)(copy)
-    for law in LAWS:
-        names[law] = _law(law, ids, jit)
-    return SimpleNamespace(**{name: names[name] for name in _ENTRIES})
+    copies: dict[Any, Any] = {getattr(step, law): _law(law, ids, jit) for law in LAWS}
+    # One namespace a module: a name may be a place in the layout here, a kind of channel there.
+    spaces = [dict(vars(module)) for module in _MODULES]
+    for names in spaces:
+        for name, value in names.items():
+            own = isinstance(value, FunctionType) and value.__module__ == names["__name__"]
+            if own and value not in copies:
+                copy = FunctionType(value.__code__, names, name, value.__defaults__)
+                copies[value] = (entry if name in _ENTRIES else jit)(copy)
+    for names in spaces:
+        names.update({k: copies[v] for k, v in names.items() if isinstance(v, FunctionType)})
+    found = {name: names[name] for names in spaces for name in _ENTRIES if name in names}
+    return SimpleNamespace(**found)
+
+
+def plain(effect_ids: tuple[str, ...]) -> Any:
+    """The dynamics as they are, with the laws of some effects only: others would add nothing."""
+    return _plain(tuple(name for name in law_offsets() if name in effect_ids), tuple(EFFECTS))
 
 
 @cache
-def plain(effect_ids: tuple[str, ...]) -> Any:
-    """The dynamics as they are, with the laws of some effects only: others would add nothing."""
-    present = [name for name in law_offsets() if name in effect_ids]
+def _plain(present: tuple[str, ...], vocabulary: tuple[str, ...]) -> Any:
+    """Where a law finds its parameters depends on the vocabulary as well."""
     return _bound(present, _as_it_is, _as_it_is)
 
 
-def has_compiler() -> bool:
-    """Whether numba is installed."""
-    return importlib.util.find_spec("numba") is not None
-
-
-@cache
 def compiled() -> Any:
     """The dynamics compiled, with the laws of all effects; plain where there is no numba.
 
     Compiled code is kept in a folder named after all that it was made of, if there is one that
     can be written to; else it is made anew in each process.
     """
-    if not has_compiler():
-        return plain(tuple(EFFECTS))
+    return _compiled(tuple(EFFECTS))
+
+
+@cache
+def _compiled(vocabulary: tuple[str, ...]) -> Any:
+    try:
+        import numba
+    except ImportError as error:
+        warnings.warn(
+            f"no compiler ({error}): simulations take a hundred times as long; pip install numba",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+        return plain(vocabulary)
+    jit, entry = _compilers(_cache_folder(numba.__version__))
+    return _bound(vocabulary, jit, entry)
+
+
+def _compilers(folder: Path | None) -> tuple[Jit, Jit]:
+    """For inner functions, and for entries, whose compiled code is kept in a folder if there is."""
     import numba
 
     config: Any = numba.config
-    folder = _cache_folder(numba.__version__)
 
     def jit(function: Any) -> Any:
         return numba.njit(nogil=True, error_model="numpy")(function)
@@ -157,7 +174,7 @@ def compiled() -> Any:
         finally:
             config.CACHE_DIR = before
 
-    return _bound(EFFECTS, jit, entry)
+    return jit, entry
 
 
 def _cache_folder(version: str) -> Path | None:
@@ -165,28 +182,45 @@ def _cache_folder(version: str) -> Path | None:
     digest = hashlib.sha256(version.encode())
     for source in sorted(_sources()):
         digest.update(source.read_bytes())
-    given = os.environ.get(_CACHE)
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tomr"
-    places = [Path(given)] if given else [home, Path(tempfile.gettempdir()) / f"tomr-{_user()}"]
-    for place in places:
+    for place in _cache_places():
         folder = place / digest.hexdigest()[:16]
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                return folder
+            with tempfile.TemporaryFile(dir=folder) as probe:
+                probe.write(bytes(_ROOM))
+            for kept in folder.rglob("*.nb[ci]"):
+                if not _is_whole(kept):
+                    kept.unlink(missing_ok=True)
+            return folder
         except OSError:
             continue
     return None
 
 
-def _user() -> int:
-    return os.getuid()
+def _cache_places() -> list[Path]:
+    given = os.environ.get(_CACHE)
+    if given:
+        return [Path(given)]
+    # Path.home() raises where there is none; "~" then stays as it is.
+    home = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
+    spare = Path(tempfile.gettempdir()) / f"tomr-{os.getuid()}"
+    return [home / "tomr", spare] if home.is_absolute() else [spare]
+
+
+def _is_whole(file: Path) -> bool:
+    """Whether a file is of complete pickles: a robot switched off while it writes leaves others."""
+    data = BytesIO(file.read_bytes())
+    size = len(data.getvalue())
+    try:
+        while data.tell() < size:
+            for _ in pickletools.genops(data):
+                pass
+    except (ValueError, IndexError, UnicodeDecodeError):
+        return False
+    return size > 0
 
 
 def _sources() -> set[Path]:
     modules: list[ModuleType] = [*_MODULES, layout, base]
     files = {Path(__file__), *(Path(str(module.__file__)) for module in modules)}
-    for effect in EFFECTS.values():
-        module = importlib.import_module(effect.__module__)
-        files.add(Path(str(module.__file__)))
-    return files
+    return files | {Path(inspect.getfile(effect)) for effect in EFFECTS.values()}

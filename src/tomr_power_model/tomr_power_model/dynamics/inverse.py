@@ -4,7 +4,7 @@
     i = tau / k,  v = R i + k omega,  P = supplied(v i) + driver losses
 
 A wheel at rest may hold any torque up to its dry friction, which motion does not tell: there dry
-friction fades over STICKING_SPEED.
+friction fades over STICKING_SPEED, unless the voltage that its driver holds is known.
 """
 
 import math
@@ -33,6 +33,7 @@ from tomr_power_model.dynamics.layout import (
     MOTION_RESISTING,
     MOTION_RISE,
     MOTION_SPEED,
+    MOTION_VOLTAGE,
     MOTION_WHEEL,
     MOTION_YAW,
     NOMINAL_RADIUS,
@@ -43,6 +44,7 @@ from tomr_power_model.dynamics.layout import (
     POWER_WHEEL,
     RESISTANCE,
     ROLLER_SLIP,
+    ROTOR,
     STRIDE,
     TO_TWIST,
     VISCOUS,
@@ -58,6 +60,8 @@ from tomr_power_model.effects.base import Wheel
 
 # Wheel speed below which dry friction fades instead of jumping with the encoder's noise [rad/s].
 STICKING_SPEED = 0.1
+MESHING_SWEEPS = 8  # at most, of friction that grows with the torque that the gear carries
+SETTLED = 1e-6  # N m
 
 
 def carried_force(
@@ -112,13 +116,25 @@ def drive_power(p: Numbers, m: Numbers, out: Mutable, n: int) -> None:
         carried = p[w + TO_TWIST] * fx + p[w + TO_TWIST + 1] * fy + p[w + TO_TWIST + 2] * mz
         carried += p[w + AXLE_INERTIA] * m[a + MOTION_ACCELERATION]
         load = max(p[w + LOAD] + p[w + LOAD_X] * along_x + p[w + LOAD_Y] * along_y, 0.0)
-        wheel = Wheel(speed, load, carried, m[a + MOTION_ANGLE], p[w + NOMINAL_RADIUS], p[w + GEAR])
-        torque = carried + p[w + VISCOUS] * speed + m[a + MOTION_RESISTING]
-        torque += max(dry_torque(p, w, wheel), 0.0) * math.tanh(speed / STICKING_SPEED)
-        torque += moving_torque(p, w, wheel)
-        k = p[w + CONSTANT]
+        k, hot = p[w + CONSTANT], p[w + RESISTANCE] * (1.0 + COPPER * m[a + MOTION_RISE])
+        carried += p[w + VISCOUS] * speed + m[a + MOTION_RESISTING]
+        moves, held = math.tanh(speed / STICKING_SPEED), m[a + MOTION_VOLTAGE]
+        torque = carried
+        for _ in range(MESHING_SWEEPS):  # the gear carries what friction at the axle takes as well
+            before = torque
+            gear = before - p[w + ROTOR] * m[a + MOTION_ACCELERATION]
+            wheel = Wheel(
+                speed, load, gear, m[a + MOTION_ANGLE], p[w + NOMINAL_RADIUS], p[w + GEAR]
+            )
+            dry, free = max(dry_torque(p, w, wheel), 0.0), carried + moving_torque(p, w, wheel)
+            rests = 0.0
+            if held == held:
+                rests = (1.0 - abs(moves)) * min(max(k / hot * held - free, -dry), dry)
+            torque = free + dry * moves + rests
+            if abs(torque - before) < SETTLED:
+                break
         current = torque / k
-        volts = p[w + RESISTANCE] * (1.0 + COPPER * m[a + MOTION_RISE]) * current + k * speed
+        volts = hot * current + k * speed
         out[o + POWER_TORQUE] = torque
         out[o + POWER_CURRENT] = current
         out[o + POWER_VOLTAGE] = volts

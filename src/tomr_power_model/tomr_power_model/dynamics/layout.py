@@ -161,8 +161,9 @@ MOTION_HEADER = 2
     MOTION_ANGLE,  # rad; NaN: not known
     MOTION_RESISTING,  # torque that resists besides [N m]
     MOTION_RISE,  # of the winding above 25 C [K]
-) = range(5)
-MOTION_WHEEL = 5
+    MOTION_VOLTAGE,  # that the driver holds, should the wheel be at rest [V]; NaN: not known
+) = range(6)
+MOTION_WHEEL = 6
 # What comes of it, of a wheel: out[wheel * POWER_WHEEL + FIELD].
 (
     POWER_TORQUE,  # of the motor at the wheel [N m]

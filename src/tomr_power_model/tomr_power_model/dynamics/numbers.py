@@ -101,7 +101,9 @@ def _rows(wheel: WheelPlace, radius: float) -> tuple[Array, Array, float]:
         return np.array([x, y, wheel.x * y - wheel.y * x])
 
     share = math.cos(held - wheel.drive)
-    if abs(share) < _SIDEWAYS:
+    if share < 0.0:  # grip counts forwards
+        held, share = held + math.pi, -share
+    if share < _SIDEWAYS:
         raise ValueError(f"a wheel at ({wheel.x:g}, {wheel.y:g}) m drives along its rollers")
     return row(held) / (radius * share), row(free), radius * share
 

@@ -36,17 +36,25 @@ class Simulation:
         self.row = at.output_size(self.wheels)
         self._step = plain(tuple(vehicle.physics))
 
-    def start(self, twist: Triple = _REST, rate: Triple = _REST, heading: float = 0.0) -> State:
+    def start(
+        self,
+        twist: Triple = _REST,
+        rate: Triple = _REST,
+        heading: float = 0.0,
+        angle: float = 0.0,
+    ) -> State:
         """A state that drives on steadily.
 
         Args:
             twist: of the body [m/s, m/s, rad/s].
             rate: its change [m/s^2, m/s^2, rad/s^2].
             heading: rad.
+            angle: of all wheels [rad]; NaN: not known.
         """
         state = [0.0] * at.state_size(self.wheels)
         state[at.TWIST : at.TWIST + 3], state[at.RATE : at.RATE + 3] = twist, rate
         state[at.HEADING] = heading
+        state[at.STATE_HEADER + at.ANGLE :: at.STATE_WHEEL] = [angle] * self.wheels
         motion = [0.0] * (at.MOTION_HEADER + self.wheels * at.MOTION_WHEEL)
         power = [0.0] * (self.wheels * at.POWER_WHEEL)
         self._step.begin(self.numbers, state, motion, power, self.wheels)
@@ -98,6 +106,7 @@ class Variant:
 class Steps:
     """What came out of a drive, means over its m steps."""
 
+    rows: Array = field(repr=False)  # as `layout` has them, (m, output_size)
     voltage: Array  # of the supply [V], (m,)
     yaw_rate: Array  # rad/s, (m,)
     speed: Array  # of the wheels [rad/s], (m, n)
@@ -114,6 +123,7 @@ class Steps:
         rows = out.reshape(-1, at.output_size(wheels))
         own = rows[:, at.OUT_HEADER :].reshape(len(rows), wheels, at.OUT_WHEEL)
         return cls(
+            rows=rows,
             voltage=rows[:, at.OUT_VOLTAGE],
             yaw_rate=rows[:, at.OUT_YAW],
             speed=own[..., at.OUT_SPEED],
@@ -170,10 +180,10 @@ def predict(
     readout: Readout,
     wheels: int = 3,
     tick: Callable[[int], None] = lambda done: None,
-) -> list[Array]:
+) -> Iterator[Array]:
     """Values that the sensors show of each variant, (delays of its `later`, rows) each.
 
-    Variants run on all cores side by side.
+    Variants run side by side on as many cores as `worker_count` says.
     """
     buffers = _Buffers()
     dynamics: Any = compiled()
@@ -202,7 +212,16 @@ def predict(
         )
         return found
 
-    return list(_mapped(one, variants, tick))
+    return _mapped(one, variants, tick)
+
+
+def worker_count() -> int:
+    """Threads that simulate side by side: OMP_NUM_THREADS, as for linear algebra, or all cores.
+
+    Who runs several processes, such as Dask, sets it to 1.
+    """
+    given = os.environ.get("OMP_NUM_THREADS", "")
+    return max(1, int(given)) if given.isdecimal() else len(os.sched_getaffinity(0))
 
 
 def drive(variant: Variant, excitation: Excitation, wheels: int = 3) -> Steps:
@@ -217,16 +236,29 @@ def drive(variant: Variant, excitation: Excitation, wheels: int = 3) -> Steps:
     return Steps.of(out, wheels)
 
 
+def shown(
+    variant: Variant, excitation: Excitation, steps: Steps, readout: Readout, wheels: int = 3
+) -> Array:
+    """Values that the sensors show of a drive, (rows,); without the variant's `later`."""
+    found = np.empty(len(readout.time))
+    work = np.empty((3, len(steps.rows) + 1))
+    given, start = variant.numbers, excitation.start
+    rows, time, span = readout.channels, readout.time, readout.span
+    compiled().read(given, steps.rows, start, 0.0, rows, time, span, found, work, wheels)
+    return found
+
+
 def _mapped(
     one: Callable[[Variant], Array], variants: Sequence[Variant], tick: Callable[[int], None]
 ) -> Iterator[Array]:
     """Each variant's result, in order; compiled code sets the interpreter free meanwhile."""
-    if len(variants) < 2:
+    workers = min(worker_count(), len(variants))
+    if workers < 2:
         for variant in variants:
             yield one(variant)
             tick(1)
         return
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(workers) as pool:
         for found in pool.map(one, variants):
             yield found
             tick(1)

@@ -6,13 +6,16 @@ from tomr_power_model.dynamics.contacts import Mutable, Numbers
 from tomr_power_model.dynamics.inverse import drive_power
 from tomr_power_model.dynamics.layout import (
     ANGLE,
+    AUXILIARY,
     COUNTED,
+    DRAWN,
     HEADER,
     HEADING,
     INITIAL_RISE,
     INTEGRAL,
     INTEGRAL_GAIN,
     LOAD,
+    MEAN,
     MEASURED,
     MOTION_ACCELERATION,
     MOTION_ANGLE,
@@ -21,13 +24,16 @@ from tomr_power_model.dynamics.layout import (
     MOTION_RESISTING,
     MOTION_RISE,
     MOTION_SPEED,
+    MOTION_VOLTAGE,
     MOTION_WHEEL,
     MOTION_YAW,
+    POWER_DRAWN,
     POWER_VOLTAGE,
     POWER_WHEEL,
     RATE,
     RISE,
     ROLL,
+    SAG,
     SET,
     SPEED,
     STATE_HEADER,
@@ -35,15 +41,17 @@ from tomr_power_model.dynamics.layout import (
     STRIDE,
     TURNED,
     TWIST,
+    VOLTAGE,
     WHEEL_LOAD,
 )
+from tomr_power_model.dynamics.step import supply_current
 
 
 def begin(p: Numbers, s: Mutable, motion: Mutable, power: Mutable, n: int) -> None:
     """Complete a state of which TWIST, RATE, HEADING and the wheels' ANGLE are given.
 
-    Its drivers' sums hold that motion, the set point is its twist. `motion` and `power` are
-    scratch, as long as a motion and its power are.
+    Its drivers' sums hold that motion, the supply sags with it, the set point is its twist.
+    `motion` and `power` are scratch, as long as a motion and its power are.
     """
     stride = int(p[STRIDE])
     motion[MOTION_YAW], motion[MOTION_HEADING] = math.nan, s[HEADING]
@@ -54,15 +62,21 @@ def begin(p: Numbers, s: Mutable, motion: Mutable, power: Mutable, n: int) -> No
         for k in range(3):
             speed += p[w + ROLL + k] * s[TWIST + k]
             change += p[w + ROLL + k] * s[RATE + k]
-        s[z + SPEED], s[z + MEASURED], s[z + RISE] = speed, speed, p[w + INITIAL_RISE]
+        s[z + SPEED], s[z + MEASURED], s[z + MEAN] = speed, speed, speed
+        s[z + RISE] = p[w + INITIAL_RISE]
         s[z + WHEEL_LOAD], s[z + TURNED], s[z + COUNTED] = p[w + LOAD], 0.0, 0.0
         motion[a + MOTION_SPEED], motion[a + MOTION_ACCELERATION] = speed, change
         motion[a + MOTION_ANGLE], motion[a + MOTION_RESISTING] = s[z + ANGLE], 0.0
-        motion[a + MOTION_RISE] = p[w + INITIAL_RISE]
+        motion[a + MOTION_RISE], motion[a + MOTION_VOLTAGE] = p[w + INITIAL_RISE], math.nan
     drive_power(p, motion, power, n)
+    drawn = p[AUXILIARY]
+    for i in range(n):
+        drawn += power[i * POWER_WHEEL + POWER_DRAWN]
+    s[DRAWN] = supply_current(p, drawn)
+    share = 1.0 - p[SAG] * s[DRAWN] / p[VOLTAGE]
     for i in range(n):
         z = STATE_HEADER + i * STATE_WHEEL
-        volts = power[i * POWER_WHEEL + POWER_VOLTAGE]
+        volts = power[i * POWER_WHEEL + POWER_VOLTAGE] / share
         s[z + INTEGRAL] = volts / p[INTEGRAL_GAIN] if p[INTEGRAL_GAIN] > 0.0 else 0.0
     for k in range(3):
         s[SET + k] = s[TWIST + k]

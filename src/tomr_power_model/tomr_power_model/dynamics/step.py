@@ -154,8 +154,8 @@ def advance(p: Numbers, s: Mutable, u: Numbers, out: Mutable, n: int) -> None:
     for k in range(steps):
         substep(p, s, u, n)
         drawn += report(p, s, u, out, k * width, n)
-    bus = p[VOLTAGE] - p[SAG] * s[DRAWN]
-    s[DRAWN] = (drawn / steps + p[AUXILIARY]) / bus
+    # Half of what was drawn before: a sag answered a period late would ring where it is large.
+    s[DRAWN] = 0.5 * (s[DRAWN] + supply_current(p, drawn / steps + p[AUXILIARY]))
     for k in range(steps):
         out[k * width + OUT_VOLTAGE] = p[VOLTAGE] - p[SAG] * s[DRAWN]
     for i in range(n):
@@ -171,6 +171,13 @@ def advance(p: Numbers, s: Mutable, u: Numbers, out: Mutable, n: int) -> None:
             s[z + MEASURED] = s[z + SPEED]
         else:
             s[z + MEASURED] = turned / p[PERIOD]
+
+
+def supply_current(p: Numbers, power: float) -> float:
+    """Current I of the whole robot [A] that draws a power: I (V - R I) = P, at most at V / 2."""
+    volts, sag = p[VOLTAGE], p[SAG]
+    power = min(power, 0.25 * volts * volts / sag) if sag > 0.0 else power
+    return 2.0 * power / (volts + math.sqrt(max(volts * volts - 4.0 * sag * power, 0.0)))
 
 
 def control(p: Numbers, s: Mutable, u: Numbers, n: int) -> None:
@@ -282,7 +289,8 @@ def torques(p: Numbers, s: Mutable, u: Numbers, n: int) -> None:
         conducting = 1.0 if u[a + CONNECTED] > 0.0 else 0.0
         # The discretised damping is that of connected, cold windings: what is less is given back.
         less = k * (k + back) * (1.0 / cold - conducting / hot)
-        s[z + TORQUE] = torque + conducting * k / hot * s[z + VOLTS] + less * speed
+        ahead = 2.0 * speed - s[z + MEAN]  # in the middle of this step, as the last one went on
+        s[z + TORQUE] = torque + conducting * k / hot * s[z + VOLTS] + less * ahead
         s[z + SIDE_LIMIT] = p[w + DRAG] * s[z + WHEEL_LOAD]
 
 

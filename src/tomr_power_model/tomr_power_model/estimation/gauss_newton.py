@@ -43,10 +43,16 @@ class Start:
 
 @frozen
 class Linearisation:
-    """A problem at one point."""
+    """A problem at one point: its residuals and the normal equations of the data."""
 
     residual: Array  # whitened, (n,)
-    jacobian: Array  # of the whitened prediction by the unknowns, (n, p)
+    information: Array  # A^T A, (p, p)
+    gradient: Array  # A^T r, (p,)
+
+    @classmethod
+    def of(cls, residual: Array, jacobian: Array) -> "Linearisation":
+        """From the derivatives A of the whitened prediction by the unknowns, (n, p)."""
+        return cls(residual, jacobian.T @ jacobian, jacobian.T @ residual)
 
 
 @frozen
@@ -61,9 +67,8 @@ class MapEstimate:
     @classmethod
     def at(cls, units: Array, point: Linearisation) -> "MapEstimate":
         """From the normal equations at a point."""
-        matrix, residual = point.jacobian, point.residual
-        factor = cho_factor(matrix.T @ matrix + np.eye(len(units)), lower=True)
-        return cls(units, residual, matrix.T @ residual - units, factor)
+        factor = cho_factor(point.information + np.eye(len(units)), lower=True)
+        return cls(units, point.residual, point.gradient - units, factor)
 
     @property
     def chi2(self) -> float:

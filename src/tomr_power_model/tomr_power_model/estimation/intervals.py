@@ -135,11 +135,9 @@ def blocks(recordings: Sequence[Sampled], length: float) -> NDArray[np.int64]:
 
 
 def uninterrupted(recordings: Sequence[Sampled], series: Array) -> list[Array]:
-    """A series of all recordings' instants, cut into uninterrupted stretches; NaN become 0."""
+    """A series of all recordings' instants, cut into uninterrupted stretches."""
     pieces, start = [], 0
     for item in recordings:
         values = series[start : (start := start + len(item.time))]
-        for stretch in np.unique(item.stretch):
-            piece = values[item.stretch == stretch]
-            pieces.append(np.where(np.isfinite(piece), piece, 0.0))
+        pieces += [values[item.stretch == stretch] for stretch in np.unique(item.stretch)]
     return pieces

@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 Array = NDArray[np.float64]
+Matrix = NDArray[np.float32] | Array  # columns may be stored in single precision
+
+_ROWS = 8192  # in double precision at a time
 
 
 @frozen
@@ -27,9 +30,27 @@ class Gram:
     square: float  # r^T r
 
     @classmethod
-    def of(cls, columns: Array, residual: Array) -> "Gram":
-        """From whitened columns (n, p), in prior standard deviations, and residuals (n,)."""
-        return cls(columns.T @ columns, columns.T @ residual, float(residual @ residual))
+    def of(cls, columns: Matrix, residual: Array, weight: Array | None = None) -> "Gram":
+        """From columns (n, p), in prior standard deviations, and residuals (n,).
+
+        Both are whitened already, or to be multiplied by `weight`, (n,).
+        """
+        count = columns.shape[1]
+        matrix, vector = np.zeros((count, count)), np.zeros(count)
+        weight = np.ones(len(residual)) if weight is None else weight
+        whitened = residual * weight
+        for first in range(0, len(residual), _ROWS):
+            rows = slice(first, first + _ROWS)
+            part = columns[rows] * weight[rows, None]
+            matrix += part.T @ part
+            vector += part.T @ whitened[rows]
+        return cls(matrix, vector, float(whitened @ whitened))
+
+
+def product(columns: Matrix, units: Array) -> Array:
+    """Columns (n, p) times units (p,), in double precision."""
+    parts = [columns[row : row + _ROWS] @ units for row in range(0, len(columns), _ROWS)]
+    return np.concatenate([np.empty(0), *parts])
 
 
 @frozen
@@ -38,7 +59,12 @@ class Solution:
 
     evidence: float  # log, against no columns
     mean: Array  # (k,)
-    covariance: Array  # (k, k)
+    factor: tuple[Array, bool]  # Cholesky factor of I + G
+
+    @property
+    def covariance(self) -> Array:
+        """Of the mean, (k, k)."""
+        return np.asarray(cho_solve(self.factor, np.eye(len(self.mean))))
 
 
 def solve(gram: Gram, chosen: Sequence[int]) -> Solution:
@@ -48,4 +74,4 @@ def solve(gram: Gram, chosen: Sequence[int]) -> Solution:
     mean = cho_solve(factor, gram.vector[rows])
     explained = float(gram.vector[rows] @ mean)
     value = 0.5 * explained - float(np.log(np.diag(factor[0])).sum())
-    return Solution(value, mean, cho_solve(factor, np.eye(len(rows))))
+    return Solution(value, mean, factor)

@@ -14,10 +14,12 @@ from typing import Protocol
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dpstrf
 from scipy.optimize import nnls
 
 from tomr_power_model.estimation.discrepancy import SIMULATOR
-from tomr_power_model.estimation.statistics import autocorrelation_time, robust_std
+from tomr_power_model.estimation.linear_gaussian import Gram, Matrix, product
+from tomr_power_model.estimation.statistics import autocorrelation_time, robust_scale
 
 Array = NDArray[np.float64]
 
@@ -68,7 +70,7 @@ def rows_of(channels: Sequence[Channel]) -> list[slice]:
 def noise_of(
     channels: Sequence[Channel],
     residual: Array,
-    columns: Array,
+    columns: Matrix,
     value: Array,
     time_derivative: Array,
     local: Sequence[Local] = (),
@@ -89,6 +91,7 @@ def noise_of(
         variance[part] = _scale(residual[part], channel.quantum) ** 2
     times = np.ones(len(rows))
     outlier = np.ones_like(residual)
+    columns = columns[:, _distinct(columns, _weight(rows, variance, times, outlier))]
     for _ in range(_ROUNDS):
         weight = _weight(rows, variance, times, outlier)
         left = _left(columns, residual, weight, local)
@@ -113,33 +116,39 @@ def _weight(rows: Sequence[slice], variance: Array, times: Array, outlier: Array
     return weight
 
 
-def _left(columns: Array, residual: Array, weight: Array, local: Sequence[Local]) -> Array:
+def _distinct(columns: Matrix, weight: Array) -> NDArray[np.intp]:
+    """Columns of which the others leave more than nothing (pivoted Cholesky)."""
+    gram = Gram.of(columns, np.zeros_like(weight), weight)
+    _, pivots, rank, _ = dpstrf(gram.matrix, tol=_RIDGE)
+    return np.sort(pivots[:rank] - 1)
+
+
+def _left(columns: Matrix, residual: Array, weight: Array, local: Sequence[Local]) -> Array:
     """What a ridge regression on all columns leaves.
 
     Local columns of different rows meet in the others only, so their blocks are eliminated:
     (A - sum C_w D_w^-1 C_w^T) x = a - sum C_w D_w^-1 d_w.
     """
-    weighted, wanted = columns * weight[:, None], residual * weight
-    matrix = weighted.T @ weighted + _RIDGE * np.eye(columns.shape[1])
-    vector = weighted.T @ wanted
+    wanted, gram = residual * weight, Gram.of(columns, residual, weight)
+    matrix, vector = gram.matrix + _RIDGE * np.eye(columns.shape[1]), gram.vector.copy()
     blocks = []
     for item in local:
         own = item.matrix * weight[item.rows, None]
-        cross = weighted[item.rows].T @ own
+        cross = columns[item.rows].T @ (own * weight[item.rows, None])
         inner = own.T @ own + _RIDGE * np.eye(own.shape[1])
         solved = np.linalg.solve(inner, np.column_stack([cross.T, own.T @ wanted[item.rows]]))
         matrix -= cross @ solved[:, :-1]
         vector -= cross @ solved[:, -1]
         blocks.append(solved)
-    found = np.linalg.solve(matrix, vector)
-    left = residual - columns @ found
+    found = np.asarray(np.linalg.solve(matrix, vector), dtype=np.float64)
+    left = residual - product(columns, found)
     for item, solved in zip(local, blocks, strict=True):
         left[item.rows] -= item.matrix @ (solved[:, -1] - solved[:, :-1] @ found)
     return np.asarray(left)
 
 
 def _scale(noise: Array, quantum: float) -> float:
-    return max(robust_std(noise), 0.1 * float(np.std(noise)), quantum / math.sqrt(12.0), 1e-9)
+    return max(robust_scale(noise), 0.1 * float(np.std(noise)), quantum / math.sqrt(12.0), 1e-9)
 
 
 def _variance(channel: Channel, noise: Array, before: Array, value: Array, change: Array) -> Array:

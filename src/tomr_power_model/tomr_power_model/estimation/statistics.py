@@ -1,4 +1,4 @@
-"""Statistics of residuals."""
+"""Robust scales and correlation of residuals."""
 
 from collections.abc import Sequence
 
@@ -9,22 +9,31 @@ from scipy.stats import median_abs_deviation
 Array = NDArray[np.float64]
 
 
-def robust_std(values: Array) -> float:
-    """Standard deviation about zero of what is normal but for outliers."""
-    return float(median_abs_deviation(values, center=lambda x, axis: 0.0, scale="normal"))
+def robust_scale(residual: Array) -> float:
+    """Standard deviation of residuals about zero, from their median magnitude; NaN are left out."""
+    return float(
+        median_abs_deviation(
+            residual, center=lambda values, axis: 0.0, scale="normal", nan_policy="omit"
+        )
+    )
 
 
 def autocorrelation(pieces: Sequence[Array], lags: int | None = None) -> Array:
     """Of residuals about zero, from lag 0 on; pairs do not reach from one piece into the next.
 
     The mean is not taken off: an offset that lasts a whole drive is the most correlated of all.
+
+    Args:
+        pieces: uninterrupted series, NaN where unknown, each (n,).
+        lags: how many; None: as many as the longest piece has samples.
     """
     longest = max(len(piece) for piece in pieces)
     products = np.zeros(longest)
     for piece in pieces:
-        size = 1 << (2 * len(piece) - 1).bit_length()
-        power = np.abs(np.fft.rfft(piece, size)) ** 2
-        products[: len(piece)] += np.fft.irfft(power, size)[: len(piece)]
+        known = np.where(np.isfinite(piece), piece, 0.0)
+        size = 1 << (2 * len(known) - 1).bit_length()
+        power = np.abs(np.fft.rfft(known, size)) ** 2
+        products[: len(known)] += np.fft.irfft(power, size)[: len(known)]
     share = products / products[0] if products[0] > 0.0 else np.eye(1, longest)[0]
     return np.asarray(share[:lags])
 
@@ -35,7 +44,7 @@ def autocorrelation_time(
     """1 + 2 sum_k rho_k in samples: n correlated samples count as n over it.
 
     Args:
-        pieces: series without gaps.
+        pieces: uninterrupted series, NaN where unknown, each (n,).
         lags: at most summed; None: half of the longest piece.
         negligible: sum up to the first lag below; None: until two lags in a row leave nothing
             (Geyer 1992).

@@ -5,6 +5,13 @@ from typing import Any
 
 from attrs import frozen
 
+from tomr_power_model.drive.sources import (
+    ENCODER_TOPIC,
+    PowerReading,
+    PowerTopic,
+    motor_topics,
+    total_topics,
+)
 from tomr_power_model.messages.intake import (
     Triple,
     Unusable,
@@ -13,17 +20,12 @@ from tomr_power_model.messages.intake import (
     twist_of,
     yaw_rate_of,
 )
+from tomr_power_model.messages.types import IMU, JOINT_STATE, TWIST, TWIST_STAMPED
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.robot import Robot
 
-TWIST_STAMPED = "geometry_msgs/msg/TwistStamped"
-TWIST = "geometry_msgs/msg/Twist"
-JOINT_STATE = "sensor_msgs/msg/JointState"
-BATTERY = "sensor_msgs/msg/BatteryState"
-IMU = "sensor_msgs/msg/Imu"
-MULTI_ARRAY = "std_msgs/msg/Float64MultiArray"
-DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+Take = Callable[[Any, int], Arrival | str | None]
 
 
 @frozen
@@ -76,14 +78,58 @@ def model_inputs(
     def imu(message: Any, receive_ns: int) -> Arrival:
         return predictor.imu(stamp_of(message, receive_ns), yaw_rate_of(message))
 
-    encoders = encoder_taker(robot, predictor.encoders, wheels)
+    def power(reading: PowerReading) -> Arrival:
+        return predictor.measured(reading.wheel, reading.stamp_ns)
+
     inputs = [
         Input("cmd_vel", twist_type, guarded(command), (TWIST, TWIST_STAMPED)),
-        Input("joint_states", JOINT_STATE, guarded(encoders)),
+        *measured_inputs(robot, predictor.encoders, power, wheels),
     ]
     if predictor.settings.use_imu:
         inputs.append(Input("imu/data", IMU, guarded(imu)))
     return tuple(inputs)
+
+
+def measured_inputs(
+    robot: Robot,
+    encoders: Callable[[int, Triple, Triple], Arrival],
+    power: Callable[[PowerReading], Arrival],
+    wheels: WheelFinder | None = None,
+) -> tuple[Input, ...]:
+    """Inputs of a stage that takes encoders and power; `wheels` may be shared with another one."""
+    take: Take = encoder_taker(robot, encoders, wheels)
+    inputs = []
+    for source in (*motor_topics(robot), *total_topics(robot)):
+        if source.topic == ENCODER_TOPIC:
+            take = _with_power(take, source, power)
+        else:
+            taker = guarded(_power(source, power))
+            inputs.append(Input(source.topic, source.type_name, taker))
+    return (Input(ENCODER_TOPIC, JOINT_STATE, guarded(take)), *inputs)
+
+
+def _power(source: PowerTopic, power: Callable[[PowerReading], Arrival]) -> Take:
+    def take(message: Any, receive_ns: int) -> Arrival | None:
+        arrival = None
+        for reading in source.read(message, receive_ns):
+            arrival = power(reading)
+        return arrival
+
+    return take
+
+
+def _with_power(
+    encoders: Take, source: PowerTopic, power: Callable[[PowerReading], Arrival]
+) -> Take:
+    also = _power(source, power)
+
+    def take(message: Any, receive_ns: int) -> Arrival | str | None:
+        arrival = encoders(message, receive_ns)
+        if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
+            also(message, receive_ns)
+        return arrival
+
+    return take
 
 
 def encoder_taker(

@@ -4,15 +4,21 @@ from collections import deque
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import compress
+from typing import Protocol
 
 import numpy as np
-from attrs import frozen
+from attrs import field, frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.model.even_stamps import EvenStamps
+from tomr_power_model.drive.dejitter import Grid, grid_of, is_jitter
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
+_KEPT = 200  # samples whose stamps are looked at
+_LEAST = 50
+_EVERY = 25  # samples: how often
+_LONG = 200_000_000  # ns, of the fit beside a simulation
+_FIT = 5  # samples that it takes
 UNKNOWN: Triple = (float("nan"), float("nan"), float("nan"))
 
 
@@ -31,6 +37,56 @@ class WheelEstimate:
 
     speed: Array  # rad/s
     acceleration: Array  # rad/s^2
+    angle: Array = field(factory=lambda: np.full(3, np.nan))  # rad
+
+
+class Reference(Protocol):
+    """A simulation of the motion that encoders measure."""
+
+    def angles(self, times_ns: Sequence[int]) -> Array:
+        """Angles of the wheels at some times [rad], (k, 3)."""
+        ...
+
+    def mean_motion(self, tick_ns: int, period_ns: int) -> tuple[Array, Array]:
+        """Mean speed and acceleration in the window that ends at a tick, (3,) each."""
+        ...
+
+
+class RecentStamps:
+    """The stamps of the last moments, dejittered; driven by samples alone."""
+
+    def __init__(self) -> None:
+        self._samples: deque[tuple[int, Triple]] = deque(maxlen=_KEPT)
+        self._count = 0
+        self._jitter = False
+        self._grid: Grid | None = None
+        self._origin = 0  # of the grid [ns]
+
+    def add(self, stamp_ns: int, position: Triple) -> None:
+        """Take a sample newer than those before."""
+        self._samples.append((stamp_ns, position))
+        self._count += 1
+        if self._count % _EVERY == 0 and len(self._samples) >= _LEAST:
+            self._look()
+
+    def times(self, stamps_ns: list[int]) -> list[int]:
+        """When samples with such stamps were taken [ns]: the stamps, where they can be trusted."""
+        if self._grid is None:
+            return stamps_ns
+        seconds = [1e-9 * (stamp - self._origin) for stamp in stamps_ns]
+        times = [self._origin + round(1e9 * self._grid.nearest(stamp)) for stamp in seconds]
+        return times if len(set(times)) == len(times) else stamps_ns
+
+    def _look(self) -> None:
+        self._origin = self._samples[0][0]
+        stamps = 1e-9 * np.array([stamp - self._origin for stamp, _ in self._samples])
+        grid = grid_of(stamps)
+        if grid is not None:
+            positions = np.array([position for _, position in self._samples])
+            found = is_jitter(stamps, grid, positions)
+            # At rest nothing can be seen: what was known stays.
+            self._jitter = self._jitter if found is None else found
+        self._grid = grid if self._jitter else None
 
 
 class EncoderWindow:
@@ -46,12 +102,12 @@ class EncoderWindow:
         self._period = period_ns
         self._stale = stale_ns
         self._samples: deque[EncoderSample] = deque()
-        self._stamps = EvenStamps()
+        self._stamps = RecentStamps()
 
     def clear(self) -> None:
         """Forget all samples."""
         self._samples.clear()
-        self._stamps = EvenStamps()
+        self._stamps = RecentStamps()
 
     def add(self, sample: EncoderSample) -> None:
         """Take a sample newer than those before."""
@@ -69,22 +125,27 @@ class EncoderWindow:
             return _from_positions(times, positions)
         return self._mixed(samples, times, positions)
 
-    def angle(self, tick_ns: int) -> Array:
-        """Angles at the middle of the window that `at` fits [rad], (3,), NaN where not told."""
-        samples = self._until(tick_ns)
-        middle = tick_ns - self._period // 2
-        found = np.full(3, np.nan)
-        for wheel in range(3):
-            told = [s for s in samples if not np.isnan(s.position[wheel])]
-            if len(told) > 2:
-                times = self._times(told, middle)
-                turned = np.array([s.position[wheel] for s in told]) - told[0].position[wheel]
-                found[wheel] = told[0].position[wheel] + _weights(times, 2)[0] @ turned
-        return found
+    def beside(self, tick_ns: int, reference: Reference) -> WheelEstimate:
+        """As `at`, where a simulation of the same motion is known.
 
-    def _until(self, tick_ns: int) -> list[EncoderSample]:
+        What is measured less what is simulated changes slowly: it is fitted over a longer span,
+        which leaves less of the noise in the acceleration.
+        """
+        samples = self._until(tick_ns, max(self._span, _LONG))
+        positions = np.array([sample.position for sample in samples])
+        if len(samples) < _FIT or np.isnan(positions).any():
+            return self.at(tick_ns)
+        middle = tick_ns - self._period // 2
+        times = self._times(samples, middle)
+        ahead = positions - reference.angles([middle + time for time in times])
+        offset = _weights(times, 2) @ (ahead - ahead[0])
+        speed, acceleration = reference.mean_motion(tick_ns, self._period)
+        angle = reference.angles([middle])[0] + ahead[0] + offset[0]
+        return WheelEstimate(speed + offset[1], acceleration + 2.0 * offset[2], angle)
+
+    def _until(self, tick_ns: int, span: int | None = None) -> list[EncoderSample]:
         """Samples of the window, and the two newest where encoders are slower than it."""
-        oldest = tick_ns - self._span
+        oldest = tick_ns - (self._span if span is None else span)
         while len(self._samples) > 2 and self._samples[1].stamp_ns <= tick_ns - self._stale:
             self._samples.popleft()
         window: list[EncoderSample] = []
@@ -109,17 +170,18 @@ class EncoderWindow:
     ) -> WheelEstimate:
         """Wheel by wheel, from what each one has."""
         velocities = np.array([sample.velocity for sample in samples])
-        speed, acceleration = np.full(3, np.nan), np.full(3, np.nan)
+        speed, acceleration, angle = np.full((3, 3), np.nan)
         for wheel in range(3):
             seen = ~np.isnan(positions[:, wheel])
             timed = ~np.isnan(velocities[:, wheel])
             if np.count_nonzero(seen) > 2:
                 fit = _from_positions(_chosen(times, seen), positions[seen][:, [wheel]])
                 speed[wheel], acceleration[wheel] = fit.speed[0], fit.acceleration[0]
+                angle[wheel] = fit.angle[0]
             elif np.count_nonzero(timed) > 1:
                 line = _weights(_chosen(times, timed), 1) @ velocities[timed][:, [wheel]]
                 speed[wheel], acceleration[wheel] = line[0, 0], line[1, 0]
-        return WheelEstimate(speed, acceleration)
+        return WheelEstimate(speed, acceleration, angle)
 
 
 def _chosen(times: tuple[int, ...], which: NDArray[np.bool_]) -> tuple[int, ...]:
@@ -128,7 +190,7 @@ def _chosen(times: tuple[int, ...], which: NDArray[np.bool_]) -> tuple[int, ...]
 
 def _from_positions(times: tuple[int, ...], positions: Array) -> WheelEstimate:
     shape = _weights(times, 2) @ (positions - positions[0])
-    return WheelEstimate(shape[1], 2.0 * shape[2])
+    return WheelEstimate(shape[1], 2.0 * shape[2], positions[0] + shape[0])
 
 
 @lru_cache(maxsize=64)

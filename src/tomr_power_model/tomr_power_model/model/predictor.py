@@ -1,14 +1,19 @@
 """The model stage: commands and encoders in, one prediction per tick out."""
 
 import math
+from collections import deque
 from collections.abc import Sequence
-from typing import Self
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve
 from numpy.typing import NDArray
 
-from tomr_power_model.messages.readings import UNKNOWN_READING, SupplyReading
+from tomr_power_model.dynamics import layout as at
+from tomr_power_model.dynamics.body import Body
+from tomr_power_model.dynamics.vehicle import plant_numbers, vehicle_of
+from tomr_power_model.effects import EFFECTS
+from tomr_power_model.messages.readings import NAN, UNKNOWN_READING, SupplyReading
+from tomr_power_model.model.commanded import Commanded, CommandPath, CommandTiming, Seen
 from tomr_power_model.model.encoders import (
     UNKNOWN,
     EncoderSample,
@@ -16,14 +21,14 @@ from tomr_power_model.model.encoders import (
     Triple,
     WheelEstimate,
 )
-from tomr_power_model.model.expected import ExpectedMotion
-from tomr_power_model.model.power_models import POWER_MODELS
+from tomr_power_model.model.means import Means
+from tomr_power_model.model.monitors import Monitors
+from tomr_power_model.model.power_models import POWER_MODELS, MeasuredMotion, Windows
 from tomr_power_model.model.prediction import Prediction, Readings
+from tomr_power_model.model.resting import RestingDrivers
 from tomr_power_model.model.settings import ModelSettings
-from tomr_power_model.model.slow_states import Monitors, Surroundings, Windings
-from tomr_power_model.model.ticks import Arrival, TickClock
-from tomr_power_model.physics.model import DrivePower, PhysicalModel, PowerModel, WheelMotion
-from tomr_power_model.robot import Robot
+from tomr_power_model.model.ticks import Arrival, TickClock, of_tick, to_ns
+from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
 
@@ -31,6 +36,7 @@ COMMANDS = "cmd_vel"
 ENCODERS = "joint_states"
 IMU = "imu/data"
 
+_RESTS = 0.05  # rad/s: a slower wheel may stand still
 _UNKNOWN: Readings = (UNKNOWN_READING, UNKNOWN_READING, UNKNOWN_READING)
 
 
@@ -41,40 +47,43 @@ class PowerPredictor:
     """
 
     def __init__(self, robot: Robot, settings: ModelSettings | None = None) -> None:
-        self.settings = settings or ModelSettings()
+        self.settings = given = settings or ModelSettings()
         self._robot = robot
-        make = POWER_MODELS[self.settings.power_model].make
-        self._model = make(robot, self.settings.model_values)
-        # Which motion a command leads to is a matter of dynamics, whatever predicts the power.
-        self._dynamics = PhysicalModel.of(robot)
-        self._clock = TickClock(self.settings.ticks)
-        self._expected = ExpectedMotion(robot, self._dynamics, self.settings)
-        self._encoders = EncoderWindow(
-            self.settings.encoder_window, self.settings.ticks.period, self.settings.stale
-        )
-        self._gyro: tuple[int, float] | None = None
+        self._period_s = period_s = 1e-9 * given.ticks.period
+        make = POWER_MODELS[given.power_model].make
+        self._model = make(robot, given.model_values, period_s)
+        self._clock = TickClock(given.ticks)
+        timing = CommandTiming(given.ticks.period, given.command_timeout, given.stale)
+        self._path = CommandPath(robot, timing)
+        self._resting = RestingDrivers(robot.controller, WHEELS)
+        self._encoders = EncoderWindow(given.encoder_window, given.ticks.period, given.stale)
+        self._window = to_ns(robot.sensors.power_window)
         self._reads_motor = robot.measurement.quantity == "motor_current"
-        self._make_slow_states(self._model)
-        self._drop = sum(float(effect.voltage_drop()) for effect in self._dynamics.effects)
+        numbers = plant_numbers(vehicle_of(robot))
+        self._drop, self._cold = numbers.voltage_drop, numbers.initial_rise
+        self._sticks = any(EFFECTS[name].dry_torque is not None for name in robot.physics)
+        self._to_twist = Body.of(robot).to_twist.tolist()
+        # The paper's coefficients are fitted to what the monitors showed.
+        physical = given.power_model == "physical"
+        self._measured = Monitors.of(robot, period_s) if physical else None
+        self._clear()
 
-    def _make_slow_states(self, model: PowerModel) -> None:
-        """States of the effects that remember; None for each that this robot has not."""
-        period_s = 1e-9 * self.settings.ticks.period
-        self._surroundings = Surroundings.of(self._dynamics, period_s, self._expected.steps)
-        self._windings: Windings | None = None
-        self._commanded: Monitors | None = None
-        self._measured: Monitors | None = None
-        if isinstance(model, PhysicalModel):
-            # The paper's coefficients are fitted to what the monitors showed of warm windings.
-            self._windings = Windings.of(model, period_s)
-            self._commanded = Monitors.of(model.effects, period_s)
-            self._measured = Monitors.of(model.effects, period_s)
+    def _clear(self) -> None:
+        self._path.clear()
+        self._resting.clear()
+        self._encoders.clear()
+        self._gyro: tuple[int, float] | None = None
+        self._heading = 0.0  # at the start of the next tick, against the first [rad]
+        self._model.clear()
+        self._stamps: list[deque[tuple[int]]] = [deque() for _ in range(WHEELS + 1)]
+        if self._measured is not None:
+            self._measured.clear()
 
     def command(self, stamp_ns: int, twist: Triple) -> Arrival:
         """Take a commanded twist (v_x, v_y [m/s], omega_z [rad/s]) in base_link."""
         arrival = self._arrive(COMMANDS, stamp_ns, periodic=False)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
-            self._expected.command(stamp_ns, twist)
+            self._path.command(stamp_ns, twist)
         return arrival
 
     def encoders(self, stamp_ns: int, position: Triple, velocity: Triple) -> Arrival:
@@ -91,6 +100,13 @@ class PowerPredictor:
             self._gyro = (stamp_ns, yaw_rate)
         return arrival
 
+    def measured(self, wheel: int, stamp_ns: int) -> Arrival:
+        """Take note of when a wheel's power was measured, or, as one more wheel, the whole's."""
+        arrival = self._arrive(f"power {wheel}", stamp_ns)
+        if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
+            self._stamps[wheel].append((stamp_ns,))
+        return arrival
+
     def due(self) -> list[Prediction]:
         """Predictions for the ticks that the stamps have reached, in order."""
         return [self._predict(tick) for tick in self._clock.due()]
@@ -98,57 +114,93 @@ class PowerPredictor:
     def _arrive(self, stream: str, stamp_ns: int, periodic: bool = True) -> Arrival:
         arrival = self._clock.arrive(stream, stamp_ns, periodic)
         if arrival is Arrival.RESTARTED:
-            self._expected.clear()
-            self._encoders.clear()
-            self._gyro = None
-            for state in (self._surroundings, self._windings, self._commanded, self._measured):
-                if state is not None:
-                    state.clear()
+            self._clear()
         return arrival
 
     def _predict(self, tick: int) -> Prediction:
         estimate = self._encoders.at(tick)
-        yaw_rate = self._yaw_rate(tick)
-        motion, measured_motion = self._motions(tick, estimate, yaw_rate)
-        stacked = _stacked(motion, measured_motion, yaw_rate)
-        if self._windings is not None:
-            stacked = evolve(stacked, warm=self._windings.warm)
-        drives = self._model.power(stacked)
-        rows = len(measured_motion.speed)
-        if self._windings is not None:
-            squared = drives.current**2
-            expected = np.full(3, np.nan) if motion is None else squared[:-rows].mean(axis=0)
-            self._windings.heat(squared[-rows:].mean(axis=0), expected)
-        measured = _Means.last(drives) if rows == 1 else _Means.of(drives, slice(-rows, None))
-        from_encoders = self._readings(measured, self._measured)
-        if motion is None:
-            if self._commanded is not None:
-                self._commanded.shown(UNKNOWN)
+        speed, gyro = estimate.speed.tolist(), self._yaw_rate(tick)
+        before = self._moved(estimate, -0.5 * self._period_s)
+        commanded = self._path.over(tick, Seen(self._twist(speed), before, self._heading))
+        if commanded is not None:
+            estimate = self._encoders.beside(tick, self._path.motion)
+            speed = estimate.speed.tolist()
+        after = self._moved(estimate, 0.5 * self._period_s)
+        windows = self._windows(tick)
+        share = 0.5 + windows.offset_s / self._period_s
+        held = self._resting.voltages(self._path, after, speed, share)
+        rise = self._path.wheel(at.RISE) or self._cold
+        turned = self._period_s * self._turning(speed, gyro, commanded)
+        motion = MeasuredMotion(
+            speed,
+            estimate.acceleration.tolist(),
+            estimate.angle.tolist(),
+            gyro,
+            self._heading + 0.5 * turned,
+            rise,
+            held,
+            windows.offset_s,
+        )
+        self._heading += turned
+        measured = self._model.measured(motion)
+        from_encoders = self._readings(self._where_known(measured, motion), self._measured)
+        if commanded is None:
             return Prediction(tick, UNKNOWN, UNKNOWN, _UNKNOWN, UNKNOWN_READING, from_encoders)
-        commanded = _Means.of(drives, slice(None, -rows))
+        means = self._model.commanded(commanded, windows)
         return Prediction(
             stamp_ns=tick,
-            speed=_triple(motion.speed.mean(axis=0).tolist()),
-            torque=_triple(commanded.torque),
-            motors=self._readings(commanded, self._commanded),
-            total=self._total(commanded),
+            speed=_triple(commanded.speed),
+            torque=_triple(means.torque),
+            motors=self._readings(means),
+            total=self._total(means),
             from_encoders=from_encoders,
         )
 
-    def _motions(
-        self, tick: int, estimate: WheelEstimate, yaw_rate: float
-    ) -> tuple[WheelMotion | None, WheelMotion]:
-        """Motion expected from the command, if any, and measured."""
-        around = self._surroundings
-        warm = None if self._windings is None else self._windings.warm
-        if around is None:
-            motion = self._expected.over(tick, estimate.speed, warm=warm)
-            return motion, WheelMotion(estimate.speed[None, :], estimate.acceleration[None, :])
-        angle = self._encoders.angle(tick) if around.needs_angle else np.full(3, np.nan)
-        resisting = around.torque(estimate, angle, yaw_rate)
-        motion = self._expected.over(tick, estimate.speed, resisting, warm)
-        around.turn(motion)
-        return motion, around.motion(estimate, resisting)
+    @staticmethod
+    def _moved(estimate: WheelEstimate, seconds: float) -> list[float]:
+        """Angles of the wheels some time after the middle of the tick [rad]."""
+        speed = estimate.speed + 0.5 * estimate.acceleration * seconds
+        found: list[float] = (estimate.angle + seconds * speed).tolist()
+        return found
+
+    def _windows(self, tick: int) -> Windows:
+        """In which windows the power was measured that a tick compares."""
+        period, stale = self.settings.ticks.period, self.settings.stale
+        ends = [
+            [stamp for (stamp,) in of_tick(stamps, tick, period, stale)] for stamps in self._stamps
+        ]
+        return Windows(ends[:WHEELS], ends[WHEELS], self._window, tick, period)
+
+    def _where_known(self, means: Means, motion: MeasuredMotion) -> Means:
+        """NaN for a wheel at rest that may hold any torque up to its dry friction."""
+        if not self._sticks or not any(math.isnan(volts) for volts in motion.held):
+            return means
+        known = [
+            not math.isnan(volts) or abs(speed) > _RESTS
+            for volts, speed in zip(motion.held, motion.speed, strict=True)
+        ]
+
+        def kept(values: Sequence[float]) -> list[float]:
+            return [value if sure else NAN for value, sure in zip(values, known, strict=True)]
+
+        return evolve(
+            means,
+            current=kept(means.current),
+            at_motor=kept(means.at_motor),
+            power=kept(means.power),
+        )
+
+    def _twist(self, speed: Sequence[float]) -> Triple:
+        """Twist of the body from wheel speeds [rad/s]."""
+        rows = self._to_twist
+        return _triple([sum([k * w for k, w in zip(row, speed, strict=True)]) for row in rows])
+
+    def _turning(self, speed: Sequence[float], gyro: float, commanded: Commanded | None) -> float:
+        """Yaw rate [rad/s]: measured, else as the wheels turn, else as expected, else none."""
+        rates = [gyro, self._twist(speed)[2]]
+        if commanded is not None:
+            rates.append(self._twist(commanded.speed)[2])
+        return next((rate for rate in rates if not math.isnan(rate)), 0.0)
 
     def _yaw_rate(self, tick: int) -> float:
         """The gyro's yaw rate [rad/s], NaN where it is not used or stale."""
@@ -157,30 +209,32 @@ class PowerPredictor:
         stamp, rate = self._gyro
         return rate if tick - stamp < self.settings.stale else np.nan
 
-    def _bus_voltage(self, power: float) -> float:
-        """Supply voltage under a load [V], sagging to first order."""
+    def _bus_voltage(self, means: Means, power: float) -> float:
+        """Supply voltage under a load [V]; sagging to first order where it is not simulated."""
+        if means.voltage is not None:
+            return means.voltage
         nominal = self._robot.supply.nominal_voltage
-        return nominal - self._drop * power / nominal
+        return nominal if math.isnan(power) else nominal - self._drop * power / nominal
 
-    def _readings(self, means: "_Means", monitors: Monitors | None) -> Readings:
+    def _readings(self, means: Means, monitors: Monitors | None = None) -> Readings:
         if self._reads_motor:
             if monitors is not None:
                 means = self._as_shown(means, monitors)
             first, second, third = map(self._at_motor, means.at_motor, means.current)
         else:
-            voltage = self._bus_voltage(means.total)
+            voltage = self._bus_voltage(means, means.total)
             powers = means.power if monitors is None else monitors.shown(means.power)
             first, second, third = (
                 SupplyReading.rounded(voltage, power / voltage) for power in powers
             )
         return first, second, third
 
-    def _as_shown(self, means: "_Means", monitors: Monitors) -> "_Means":
+    def _as_shown(self, means: Means, monitors: Monitors) -> Means:
         """Motor currents as their monitors show them, which take them for those of the supply."""
         nominal = self._robot.supply.nominal_voltage
         shown = monitors.shown([nominal * current for current in means.current])
         current = [power / nominal for power in shown]
-        volts = [p / i if i else 0.0 for p, i in zip(means.at_motor, means.current, strict=True)]
+        volts = _voltages(means)
         at_motor = [v * i for v, i in zip(volts, current, strict=True)]
         return evolve(means, current=current, at_motor=at_motor)
 
@@ -190,71 +244,20 @@ class PowerPredictor:
             current = abs(current)
         return SupplyReading.rounded(power / current if current else 0.0, current)
 
-    def _total(self, means: "_Means") -> SupplyReading:
+    def _total(self, means: Means) -> SupplyReading:
         if self._reads_motor:
             voltage = self._robot.supply.nominal_voltage
-            return SupplyReading.rounded(voltage, _sum(means.at_motor) / voltage)
+            return SupplyReading.rounded(voltage, sum(means.at_motor) / voltage)
         auxiliary = self._robot.supply.auxiliary_power if means.other is None else means.other
         power = means.total + auxiliary
-        voltage = self._bus_voltage(power)
+        voltage = self._bus_voltage(means, power)
         return SupplyReading.rounded(voltage, power / voltage)
 
 
-@frozen
-class _Means:
-    """Means over some rows of DrivePower, one number per wheel; NaN where the motion is."""
-
-    torque: list[float]  # N m
-    current: list[float]  # A
-    at_motor: list[float]  # voltage * current [W]
-    power: list[float]  # W
-    other: float | None
-
-    @classmethod
-    def of(cls, drives: DrivePower, rows: slice) -> Self:
-        values = (drives.torque, drives.current, drives.voltage * drives.current, drives.power)
-        chosen = np.array(values)[:, rows]
-        means = np.add.reduce(chosen, axis=1) / chosen.shape[1]
-        other = None if drives.other is None else float(drives.other[rows].mean())
-        torque, current, at_motor, power = means.tolist()
-        return cls(torque, current, at_motor, power, other)
-
-    @classmethod
-    def last(cls, drives: DrivePower) -> Self:
-        current = drives.current[-1]
-        at_motor = drives.voltage[-1] * current
-        other = None if drives.other is None else float(drives.other[-1])
-        return cls(
-            drives.torque[-1].tolist(),
-            current.tolist(),
-            at_motor.tolist(),
-            drives.power[-1].tolist(),
-            other,
-        )
-
-    @property
-    def total(self) -> float:
-        return _sum(self.power)
-
-
-def _sum(values: list[float]) -> float:
-    """Plain sum: that of Python 3.12 rounds differently from 3.11's."""
-    return values[0] + values[1] + values[2]
-
-
-def _stacked(expected: WheelMotion | None, measured: WheelMotion, yaw_rate: float) -> WheelMotion:
-    """Expected motion and, as the last rows, the measured one: one pass through the model."""
-    speed, acceleration, resisting = measured.speed, measured.acceleration, measured.resisting
-    if expected is not None:
-        speed = np.concatenate([expected.speed, speed])
-        acceleration = np.concatenate([expected.acceleration, acceleration])
-        if resisting is not None and expected.resisting is not None:
-            resisting = np.concatenate([expected.resisting, resisting])
-    if math.isnan(yaw_rate):
-        return WheelMotion(speed, acceleration, None, resisting)
-    gyro = np.full(len(speed), np.nan)
-    gyro[-len(measured.speed) :] = yaw_rate
-    return WheelMotion(speed, acceleration, gyro, resisting)
+def _voltages(means: Means) -> list[float]:
+    """Mean terminal voltages where current flows, else 0 [V]."""
+    pairs = zip(means.at_motor, means.current, strict=True)
+    return [power / current if current else 0.0 for power, current in pairs]
 
 
 def _triple(values: Sequence[float] | Array) -> Triple:

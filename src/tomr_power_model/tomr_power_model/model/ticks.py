@@ -9,8 +9,10 @@ not depend on the order in which topics happen to arrive. It is given as soon as
 """
 
 import math
+from collections import deque
 from collections.abc import Collection, Sequence
 from enum import Enum
+from typing import TypeVar
 
 from attrs import frozen
 
@@ -30,6 +32,21 @@ class TickSettings:
     settle: int = to_ns(0.02)
     patience: int = to_ns(0.25)
     gap: int = to_ns(1.0)  # a longer silence or a jump starts the stage afresh
+
+
+Sample = TypeVar("Sample", bound=tuple[int, *tuple[float, ...]])  # stamp [ns] and values
+
+
+def of_tick(samples: deque[Sample], tick: int, period: int, stale: int) -> list[Sample]:
+    """The samples that a tick compares: those stamped in (tick - period, tick].
+
+    Nothing is filled in: a window without a sample takes the newest one that is not stale. Forgets
+    what no later tick asks for.
+    """
+    while len(samples) > 1 and samples[1][0] <= tick - period:
+        samples.popleft()
+    inside = [sample for sample in samples if tick - period < sample[0] <= tick]
+    return inside or [sample for sample in samples if tick - stale < sample[0] <= tick][-1:]
 
 
 class Arrival(Enum):

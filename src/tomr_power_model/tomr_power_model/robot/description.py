@@ -42,7 +42,7 @@ class Controller:
     integral: float  # V/rad
     acceleration_limit: float  # m/s^2, 0: none
     delay: float  # s
-    integrator: str = "backward"  # Euler: whether the sum of errors holds the present one
+    integrator: str  # backward: the sum holds the present error; forward: it does not yet
 
 
 @frozen
@@ -61,6 +61,7 @@ class Sensors:
     encoder_resolution: float  # rad at the wheel
     velocity_resolution: float  # rad/s at the wheel
     power_rate: float  # Hz
+    power_window: float  # s, averaged before the stamp
     voltage_resolution: float  # V
     current_resolution: float  # A
     voltage_noise: float  # V

@@ -41,7 +41,7 @@ ROBOT_PARAMETERS: tuple[ParameterSpec, ...] = (
     ),
     _S(
         "controller.integrator",
-        "whether the sum of errors holds the present one (backward Euler) or not (forward)",
+        "whether the drivers' sum holds the present error already: backward, or not yet: forward",
         kind="str",
         default="backward",
         choices=("backward", "forward"),
@@ -70,6 +70,14 @@ ROBOT_PARAMETERS: tuple[ParameterSpec, ...] = (
         minimum=0.0,
     ),
     _S("sensors.power_rate", "power topics", unit="Hz", default=50.0, above=0.0, maximum=1e4),
+    _S(
+        "sensors.power_window",
+        "average of the power sensors before their stamp",
+        unit="s",
+        default=0.005,
+        minimum=0.0,
+        maximum=1.0,
+    ),
     _S("sensors.voltage_resolution", "quantum", unit="V", default=1.25e-3, minimum=0.0),
     _S("sensors.current_resolution", "quantum", unit="A", default=1.25e-3, minimum=0.0),
     _S("sensors.voltage_noise", "standard deviation", unit="V", default=2e-3, minimum=0.0),

@@ -7,8 +7,8 @@ from attrs import frozen
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.errors import InputError
-from tomr_power_model.physics.model import WheelMotion
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_power_model.wang2024.angles import beta, mu
 from tomr_power_model.wang2024.coefficients import Coefficients

@@ -6,7 +6,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.physics.model import DrivePower, WheelMotion
+from tomr_power_model.dynamics.drives import DrivePower, WheelMotion
 from tomr_power_model.robot import Robot
 from tomr_power_model.wang2024.coefficients import Coefficients
 from tomr_power_model.wang2024.state import Chassis, state_of

@@ -3,13 +3,13 @@
 from typing import Self
 
 import numpy as np
-from attrs import Factory, field, frozen
+from attrs import Factory, evolve, field, frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.dynamics.body import Body
+from tomr_power_model.dynamics.drives import WheelMotion
+from tomr_power_model.dynamics.vehicle import plant_numbers, vehicle_of
 from tomr_power_model.geometry.kinematics import wheel_radii
-from tomr_power_model.physics.body import Body
-from tomr_power_model.physics.effects import effects_of
-from tomr_power_model.physics.model import WheelMotion
 from tomr_power_model.robot import GRAVITY, Robot
 from tomr_power_model.wang2024.angles import MassCenter, N_i, alpha
 
@@ -33,15 +33,18 @@ class Chassis:
     @classmethod
     def of(cls, robot: Robot) -> Self:
         """Of a description, with the payload and mass centre that its effects give it."""
-        for effect in effects_of(robot):
-            robot = effect.changed(robot)
-        center = MassCenter.of(robot)
+        numbers = plant_numbers(vehicle_of(robot))
+        x, y = numbers.mass_center
+        physics = {key: at for key, at in robot.physics.items() if not key.startswith("body.")}
+        center = (x, y, robot.mass_center[2])
+        robot = evolve(robot, mass=numbers.mass, mass_center=center, physics=physics)
+        mass_center = MassCenter.of(robot)
         return cls(
             body=Body.of(robot),
             r=wheel_radii(robot),
             positive=robot.wheel_offset,
-            center=center,
-            N_i=N_i(robot.mass, robot.robot_radius, center),
+            center=mass_center,
+            N_i=N_i(robot.mass, robot.robot_radius, mass_center),
         )
 
 
@@ -85,7 +88,7 @@ def state_of(chassis: Chassis, motion: WheelMotion) -> State:
         twist[seen, 2] = motion.yaw_rate[seen]
     rate = motion.acceleration @ body.to_twist.T
     v = np.hypot(twist[:, 0], twist[:, 1])
-    force = rate @ body.mass_matrix.T + body.turning_force(twist)
+    force = rate @ body.mass_matrix.T + body.coriolis(twist)
     # Acceleration in the world: of the mass alone, without yaw inertia or offset of its centre.
     pull = np.zeros_like(twist)
     pull[:, 0] = body.mass * (rate[:, 0] - twist[:, 2] * twist[:, 1])
@@ -100,7 +103,7 @@ def state_of(chassis: Chassis, motion: WheelMotion) -> State:
         dv=(twist[:, :2] * rate[:, :2]).sum(axis=1) / np.maximum(v, V_STILL),
         v_i=np.abs(rim),
         dv_i=np.tanh(rim / V_STILL) * r * motion.acceleration,
-        v_i_prime=np.abs(twist[:, :2] @ body.axles.T),
+        v_i_prime=np.abs(twist @ body.along.T),
         omega=np.abs(motion.speed),
         alpha=np.where(v > 0.0, alpha(heading), 0.0),
         F_wheel=np.abs(force @ body.from_force.T / r),

@@ -3,12 +3,11 @@
 from typing import Literal
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
 from tomr_power_model.robot import Robot
-from tomr_reality_gap.alignment.steady import steady
 
 Array = NDArray[np.float64]
 Kind = Literal["power", "current", "total", "voltage", "speed", "yaw"]
@@ -35,22 +34,10 @@ class Channel:
     quantum: float = 0.0  # of a value, where it is coarse
 
 
-def channels_of(
-    recorded: Recorded, robot: Robot, window: float, even: bool = False
-) -> tuple[Channel, ...]:
-    """All channels of a recording that hold anything.
-
-    Args:
-        recorded: the recording.
-        robot: its description.
-        window: over which the power sensors average before their stamp [s].
-        even: whether the stamps of power jitter around even ones.
-    """
+def channels_of(recorded: Drive, robot: Robot) -> tuple[Channel, ...]:
+    """All channels of a recording that hold anything."""
+    window = robot.sensors.power_window
     found = [*_powers(recorded, robot, window), *_speeds(recorded, robot)]
-    if even:
-        found = [
-            item if item.kind == "speed" else evolve(item, time=steady(item.time)) for item in found
-        ]
     if len(recorded.yaw_time) > 1:
         found.append(_blocks(recorded))
     return tuple(channel for channel in found if len(channel.time))
@@ -71,7 +58,7 @@ def _known(
     return Channel(name, kind, wheel, unit, time[rows], span, value[rows], quantum)
 
 
-def _powers(recorded: Recorded, robot: Robot, window: float) -> list[Channel]:
+def _powers(recorded: Drive, robot: Robot, window: float) -> list[Channel]:
     kind: Kind = "power"
     unit, quantum = "W", 0.0
     if robot.measurement.quantity == "motor_current":
@@ -98,7 +85,7 @@ def _powers(recorded: Recorded, robot: Robot, window: float) -> list[Channel]:
     return found
 
 
-def _blocks(recorded: Recorded) -> Channel:
+def _blocks(recorded: Drive) -> Channel:
     """The gyro's yaw rate, means over blocks of `_BLOCK`."""
     time, rate = recorded.yaw_time, recorded.yaw_rate
     every = max(1, round(_BLOCK / float(np.median(np.diff(time)))))
@@ -110,7 +97,7 @@ def _blocks(recorded: Recorded) -> Channel:
     return Channel("imu/data", "yaw", None, "rad/s", middle + 0.5 * usual, span, value)
 
 
-def _speeds(recorded: Recorded, robot: Robot) -> list[Channel]:
+def _speeds(recorded: Drive, robot: Robot) -> list[Channel]:
     """Mean wheel speeds between encoder samples, from angles; the sample's speed without them.
 
     A robot whose description tells the quantum of its speeds measures them by themselves: then it

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import Channel
-from tomr_reality_gap.alignment.forward import Forward, predict_all
+from tomr_reality_gap.alignment.simulation import RecordingSimulation, predict_all
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ _USUAL = 10.0  # 1/s, of an integral gain over the proportional one
 _GAIN = 50.0  # of log likelihood: what is called better
 
 
-def leaps_of(forwards: Sequence[Forward], robot: Robot) -> Mapping[str, float]:
+def leaps_of(simulations: Sequence[RecordingSimulation], robot: Robot) -> Mapping[str, float]:
     """Values of the controller, by key, with which wheels turn much more as they were seen to.
 
     Both are far off or right: a late command shows for as long as it is late, which no derivative
@@ -30,7 +30,7 @@ def leaps_of(forwards: Sequence[Forward], robot: Robot) -> Mapping[str, float]:
     """
     seen = [
         evolve(item, channels=tuple(_early(c) for c in item.channels if c.kind == "speed"))
-        for item in forwards
+        for item in simulations
     ]
     if not any(item.channels for item in seen):
         return {}
@@ -60,7 +60,7 @@ def leaps_of(forwards: Sequence[Forward], robot: Robot) -> Mapping[str, float]:
     return found
 
 
-def _answers(seen: Sequence[Forward], value: Array, simulated: Array) -> Array:
+def _answers(seen: Sequence[RecordingSimulation], value: Array, simulated: Array) -> Array:
     """Likelihood of when the wheels turn, which a delay changes: how fast is left to friction."""
     parts = rows_of([channel for item in seen for channel in item.channels])
     scaled = [_scaled(value[part], simulated[:, part]) for part in parts]

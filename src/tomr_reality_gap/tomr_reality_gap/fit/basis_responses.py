@@ -51,12 +51,12 @@ def basis_responses(
         orders: at which its power swings with wheel angles [1/rev].
         only: names of variables; None: all.
     """
-    motions = [motion_of(item, robot, item.run(robot)) for item in dataset.forwards]
+    motions = [motion_of(item, robot, item.run(robot)) for item in dataset.simulations]
     tried = tuple(
         family for family in families(motions, orders) if only is None or family.variable in only
     )
     size = _SIZE * torque
-    torques = [np.concatenate([item.torques(one) for item in tried]) * size for one in motions]
+    torques = [np.concatenate([size * item.torques(one) for item in tried]) for one in motions]
     response = dataset.respond(robot, torques) - dataset.predict([robot])[0]
     edges = np.cumsum([0, *(len(item.knots) for item in tried)])
     parts = tuple(response[first:last].T for first, last in pairwise(edges))

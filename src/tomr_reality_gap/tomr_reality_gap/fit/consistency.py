@@ -36,7 +36,7 @@ def check_same_robot(dataset: Dataset, last: Round) -> None:
         dataset: the recordings.
         last: the search's last round: the linear model around all that was found.
     """
-    long = [at for at, item in enumerate(dataset.forwards) if item.recorded.duration > _LONG]
+    long = [at for at, item in enumerate(dataset.simulations) if item.recorded.duration > _LONG]
     estimates = {number: _estimates(dataset, last, number) for number in long}
     for one, other in combinations(long, 2):
         for key, first in estimates[one].items():
@@ -44,7 +44,7 @@ def check_same_robot(dataset: Dataset, last: Round) -> None:
             apart = second.value - first.value
             sigma = float(np.hypot(first.deviation, second.deviation))
             if abs(apart) > max(_APART, _SURE * sigma):
-                names = [dataset.forwards[item].recorded.name for item in (one, other)]
+                names = [dataset.simulations[item].recorded.name for item in (one, other)]
                 raise InputError(
                     f"{names[0]} and {names[1]}: they ask for values of {key} that lie "
                     f"{100.0 * abs(apart):.0f} % apart: recordings of different robots, or of one "
@@ -55,14 +55,14 @@ def check_same_robot(dataset: Dataset, last: Round) -> None:
 def _estimates(dataset: Dataset, last: Round, number: int) -> dict[str, _Estimate]:
     """What one recording says by itself about the parameters that last."""
     jacobian, weight = last.jacobian, last.noise.weight
-    sizes = [sum(len(channel.time) for channel in item.channels) for item in dataset.forwards]
+    sizes = [sum(len(channel.time) for channel in item.channels) for item in dataset.simulations]
     first = sum(sizes[:number])
     rows = slice(first, first + sizes[number])
     kept = jacobian.kept
-    matrix = jacobian.matrix[rows, :kept] * weight[rows, None]
+    matrix = jacobian.matrix[rows, :kept].astype(np.float64)
     matrix[:, jacobian.nuisance] *= _BEYOND
-    residual = (dataset.value[rows] - jacobian.value[rows]) * weight[rows]
-    solution = solve(Gram.of(matrix, residual), range(kept))
+    residual = dataset.value[rows] - jacobian.value[rows]
+    solution = solve(Gram.of(matrix, residual, weight[rows]), range(kept))
     values = jacobian.model.described.values
     found = {}
     for row, parameter in enumerate(jacobian.model.nuisances):

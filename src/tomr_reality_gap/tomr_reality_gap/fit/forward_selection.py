@@ -11,7 +11,7 @@ with r the whitened residual, u all offsets in prior standard deviations, G thei
 
 from collections.abc import Sequence
 
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 
 from tomr_power_model.estimation.discrepancy import SIMULATOR
 from tomr_power_model.estimation.noise import Local, Noise, noise_of
@@ -36,6 +36,10 @@ class Round:
     jacobian: Jacobian
     noise: Noise
     tried: tuple[FittedModel, ...]  # refined additions, best first
+
+    def without_derivatives(self) -> "Round":
+        """The same without what takes most of the memory."""
+        return evolve(self, jacobian=evolve(self.jacobian, matrix=self.jacobian.matrix[:0].copy()))
 
 
 @frozen
@@ -63,8 +67,9 @@ def forward_selection(
     while True:
         open_ones = [item for item in candidates if item.name not in model.names]
         jacobian = linearise(
-            dataset, model, open_ones, tick, rounds[0].jacobian if rounds else None
+            dataset, model, open_ones, tick, rounds[-1].jacobian if rounds else None
         )
+        rounds = [item.without_derivatives() for item in rounds]
         noise = _noise(dataset, jacobian, local)
         start, screened = screen(dataset, jacobian, noise, open_ones)
         current, tried = _tried(dataset, start, screened, jacobian, noise, tick)

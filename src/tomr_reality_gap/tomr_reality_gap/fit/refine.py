@@ -44,21 +44,18 @@ def refine(
     dataset: Dataset, states: Sequence[State], jacobian: Jacobian, noise: Noise, tick: Tick
 ) -> list[FittedModel]:
     """Each model at its best offsets; nuisances keep the derivatives of `jacobian`."""
-    fixed = jacobian.matrix[:, : jacobian.sensors.stop] * noise.weight[:, None]
-    columns = jacobian.matrix[:, jacobian.sensors]
+    shared = _Shared.of(jacobian, noise)
 
     def evaluate(numbers: Sequence[int], units: Sequence[Array]) -> list[Linearisation]:
         moved = [
             state_at(states[number][0], at, jacobian)
             for number, at in zip(numbers, units, strict=True)
         ]
-        found = []
         points = _points(dataset, [model for model, _ in moved], tick)
-        for (value, own), (_, sensors) in zip(points, moved, strict=True):
-            residual = (dataset.value - value - columns @ sensors) * noise.weight
-            matrix = np.concatenate([fixed, own * noise.weight[:, None]], axis=1)
-            found.append(Linearisation(residual, matrix))
-        return found
+        return [
+            shared.linearised((dataset.value - value) * noise.weight, own, sensors)
+            for (value, own), (_, sensors) in zip(points, moved, strict=True)
+        ]
 
     found = []
     starts = [_start(model, sensors) for model, sensors in states]
@@ -72,6 +69,30 @@ def refine(
             FittedModel(at, best.log_evidence + prior, best.chi2, sensors, best.covariance, value)
         )
     return found
+
+
+@frozen
+class _Shared:
+    """Whitened columns that all models share: nuisances and sensor nuisances."""
+
+    columns: Array  # (n, q)
+    information: Array  # (q, q)
+    weight: Array  # (n,)
+    sensors: slice
+
+    @classmethod
+    def of(cls, jacobian: Jacobian, noise: Noise) -> "_Shared":
+        columns = jacobian.matrix[:, : jacobian.sensors.stop] * noise.weight[:, None]
+        return cls(columns, columns.T @ columns, noise.weight, jacobian.sensors)
+
+    def linearised(self, residual: Array, own: Array, sensors: Array) -> Linearisation:
+        """A model, from its whitened residual without sensor nuisances, and its own columns."""
+        residual = residual - self.columns[:, self.sensors] @ sensors
+        own = own * self.weight[:, None]
+        cross = self.columns.T @ own
+        information = np.block([[self.information, cross], [cross.T, own.T @ own]])
+        gradient = np.concatenate([self.columns.T @ residual, own.T @ residual])
+        return Linearisation(residual, information, gradient)
 
 
 def _start(model: Model, sensors: Array) -> Start:

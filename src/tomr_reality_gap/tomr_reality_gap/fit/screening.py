@@ -81,12 +81,11 @@ class _Linear:
 
     @classmethod
     def of(cls, jacobian: Jacobian, residual: Array, noise: Noise) -> "_Linear":
-        weighted = jacobian.matrix * noise.weight[:, None]
-        gram = Gram.of(weighted, residual * noise.weight)
+        gram = Gram.of(jacobian.matrix, residual, noise.weight)
         base, held = _pinned(jacobian.model, gram, jacobian.kept)
         if held:
-            residual = residual - jacobian.matrix[:, list(held)] @ np.array(list(held.values()))
-            gram = evolve(gram, vector=weighted.T @ (residual * noise.weight))
+            known = gram.matrix[:, list(held)] @ np.array(list(held.values()))
+            gram = evolve(gram, vector=gram.vector - known)
         return cls(jacobian, gram, base, held)
 
     def rows(self, candidate: Hypothesis) -> list[int]:

@@ -10,11 +10,11 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.estimation.linear_gaussian import Gram, solve
+from tomr_power_model.estimation.linear_gaussian import Gram, Matrix, solve
 from tomr_power_model.estimation.noise import Noise, rows_of
 from tomr_power_model.estimation.parameter import prior_stds
 from tomr_power_model.robot import Robot
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.basis_responses import BasisResponses, own_rows
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection
@@ -45,7 +45,11 @@ class SimulatorBaseline:
 
     @classmethod
     def of(
-        cls, simulations: Sequence[Forward], real: Dataset, noise: Noise, described: Robot
+        cls,
+        simulations: Sequence[RecordingSimulation],
+        real: Dataset,
+        noise: Noise,
+        described: Robot,
     ) -> "SimulatorBaseline | None":
         """None without simulations; noise is that of the real recordings."""
         if not simulations:
@@ -72,7 +76,7 @@ class SimulatorBaseline:
     def shows(self, unmodelled: Unmodelled, model: Model, basis: BasisResponses) -> bool:
         """Whether half of an effect without a name, or more, is in the simulation too."""
         robot, places = self.described, [family.variable for family in basis.families]
-        motions = [motion_of(item, robot, item.run(robot)) for item in self.dataset.forwards]
+        motions = [motion_of(item, robot, item.run(robot)) for item in self.dataset.simulations]
         family = basis.families[places.index(unmodelled.family.variable)]
         torques = [family.torques(motion) * basis.size for motion in motions]
         response = (self.dataset.respond(robot, torques) - self.dataset.predict([robot])[0]).T
@@ -92,8 +96,8 @@ class SimulatorBaseline:
         ]
         return float(both[0] @ both[1]) > _HALF * float(both[1] @ both[1])
 
-    def _fitted(self, columns: Array) -> Array:
-        gram = Gram.of(columns * self.weight[:, None], self.residual * self.weight)
+    def _fitted(self, columns: Matrix) -> Array:
+        gram = Gram.of(columns, self.residual, self.weight)
         return solve(gram, range(columns.shape[1])).mean
 
 

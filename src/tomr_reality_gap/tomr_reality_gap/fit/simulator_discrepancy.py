@@ -17,7 +17,7 @@ from tomr_power_model.estimation.linear_gaussian import Gram, solve
 from tomr_power_model.estimation.noise import Local, noise_of, rows_of
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.basis_responses import basis_responses
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.mismatch.probes import Family, Motion
@@ -41,7 +41,7 @@ class DiscrepancyTorques:
 
 
 def discrepancy_torques(
-    simulations: Sequence[Forward], robot: Robot, torque: float
+    simulations: Sequence[RecordingSimulation], robot: Robot, torque: float
 ) -> DiscrepancyTorques | None:
     """What simulations of a robot show beyond ours; None if that is next to nothing.
 
@@ -54,13 +54,13 @@ def discrepancy_torques(
         return None
     dataset = Dataset(tuple(simulations))
     basis = basis_responses(dataset, robot, torque, only=_VARIABLES)
-    values, time_derivative = dataset.with_time_derivative([robot])
-    residual, nothing = dataset.value - values[0], np.zeros((len(dataset.value), 1))
+    value, time_derivative, _ = dataset.with_time_derivative(robot, (), np.empty(0))
+    residual, nothing = dataset.value - value, np.zeros((len(dataset.value), 1))
     local = basis.local
-    weight = noise_of(dataset.channels, residual, nothing, values[0], time_derivative, local).weight
+    weight = noise_of(dataset.channels, residual, nothing, value, time_derivative, local).weight
     fitted = [
         solve(
-            Gram.of(item.matrix * weight[item.rows, None], residual[item.rows] * weight[item.rows]),
+            Gram.of(item.matrix, residual[item.rows], weight[item.rows]),
             range(item.matrix.shape[1]),
         )
         for item in local

@@ -8,7 +8,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.estimation.discrepancy import SIMULATOR
-from tomr_power_model.estimation.linear_gaussian import Gram, solve
+from tomr_power_model.estimation.linear_gaussian import Gram, Solution, solve
 from tomr_power_model.estimation.noise import Noise
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_reality_gap.explanation import Shape
@@ -35,6 +35,7 @@ class Remainder:
     residual: Array  # (n,)
     base: Array  # derivatives by all that the model has, (n, p)
     weight: Array  # (n,)
+    gram: Gram  # of the base and the residual
 
     @classmethod
     def of(
@@ -50,7 +51,20 @@ class Remainder:
         for part, wanted in zip(jacobian.own, needed or [True] * len(jacobian.own), strict=True):
             rows += range(part.start, part.stop) if wanted else ()
         residual = (dataset.value - value) * noise.weight
-        return cls(dataset, residual, jacobian.whitened(noise, rows), noise.weight)
+        base = jacobian.matrix[:, rows] * noise.weight[:, None]
+        return cls(dataset, residual, base, noise.weight, Gram.of(base, residual))
+
+    def solved(self, parts: Sequence[Array]) -> Solution:
+        """With further whitened columns, (n, k) each; next to nothing but zeros in each of them."""
+        more = np.concatenate([*parts, np.empty((len(self.residual), 0))], axis=1)
+        shown = np.flatnonzero(more.any(axis=1))
+        own, cross = more[shown].T @ more[shown], self.base[shown].T @ more[shown]
+        gram = Gram(
+            np.block([[self.gram.matrix, cross], [cross.T, own]]),
+            np.concatenate([self.gram.vector, more[shown].T @ self.residual[shown]]),
+            self.gram.square,
+        )
+        return solve(gram, range(len(gram.vector)))
 
 
 @frozen
@@ -86,26 +100,30 @@ def unmodelled_effects(
 
 
 def _fitted(rest: Remainder, basis: BasisResponses, family: Family, response: Array) -> Unmodelled:
-    base, residual, count = rest.base, rest.residual, response.shape[1]
+    count, first = response.shape[1], len(rest.gram.vector)
     parts = [_only(response * rest.weight[:, None], rows) for rows in basis.rows]
-    alone = solve(Gram.of(base, residual), range(base.shape[1])).evidence
-    gains = []
-    for part in parts:
-        both = np.concatenate([base, part], axis=1)
-        gains.append(solve(Gram.of(both, residual), range(both.shape[1])).evidence - alone)
+    alone = rest.solved(()).evidence
+    gains = [rest.solved((part,)).evidence - alone for part in parts]
     least = max(_WHEEL_SHARE * max(gains), _NEEDED)
     wheels = tuple(wheel for wheel in range(WHEELS) if gains[wheel] > least)
     wheels = wheels or (int(np.argmax(gains)),)
-    chosen = np.concatenate([parts[wheel] for wheel in wheels], axis=1)
-    both = np.concatenate([base, chosen], axis=1)
-    whole = solve(Gram.of(both, residual), range(both.shape[1]))
-    names, shapes, weights = rest.dataset.forwards[0].robot.wheel_names, [], []
+    chosen = [parts[wheel] for wheel in wheels]
+    whole = rest.solved(chosen)
+    covariances = whole.covariance
+    names, shapes, weights = rest.dataset.simulations[0].robot.wheel_names, [], []
     for place, wheel in enumerate(wheels):
-        rows = base.shape[1] + place * count + np.arange(count)
+        rows = first + place * count + np.arange(count)
         weights.append(basis.size * whole.mean[rows])
-        covariance = basis.size**2 * whole.covariance[np.ix_(rows, rows)]
+        covariance = basis.size**2 * covariances[np.ix_(rows, rows)]
         shapes.append(_shape(family, names[wheel], weights[-1], covariance))
-    return Unmodelled(family, whole.evidence - alone, wheels, chosen, tuple(shapes), tuple(weights))
+    return Unmodelled(
+        family,
+        whole.evidence - alone,
+        wheels,
+        np.concatenate(chosen, axis=1),
+        tuple(shapes),
+        tuple(weights),
+    )
 
 
 def _only(columns: Array, rows: NDArray[np.intp]) -> Array:
@@ -140,15 +158,17 @@ def still_needed(
     """
     both = np.concatenate([rest.base, unmodelled.columns], axis=1)
     everything = list(range(both.shape[1]))
-    whole = _likelihood(both, rest.residual, everything)
+    gram = Gram.of(both, rest.residual)
+    whole = _likelihood(gram, everything)
     least = max(_NEEDED, SIMULATOR.beside_unmodelled * unmodelled.evidence)
-    needed, robot = [], rest.dataset.forwards[0].robot
+    needed, robot = [], rest.dataset.simulations[0].robot
     for part, change, hypothesis in zip(
         jacobian.own, changes, jacobian.model.hypotheses, strict=True
     ):
         others = [row for row in everything if not part.start <= row < part.stop]
         lacking = rest.residual + change * rest.weight
-        gain = whole - _likelihood(both, lacking, others)
+        other = Gram(gram.matrix, both.T @ lacking, float(lacking @ lacking))
+        gain = whole - _likelihood(other, others)
         needed.append(gain > least and not _contradicts(unmodelled, hypothesis, robot))
     return needed
 
@@ -161,9 +181,8 @@ def _contradicts(unmodelled: Unmodelled, hypothesis: Hypothesis, robot: Robot) -
     return bool(wheels & set(hypothesis.where)) or "all_wheels" in hypothesis.where
 
 
-def _likelihood(columns: Array, residual: Array, chosen: Sequence[int]) -> float:
+def _likelihood(gram: Gram, chosen: Sequence[int]) -> float:
     """Log evidence of some columns, up to what all residuals of one weighting share."""
-    gram = Gram.of(columns, residual)
     return solve(gram, chosen).evidence - 0.5 * gram.square
 
 

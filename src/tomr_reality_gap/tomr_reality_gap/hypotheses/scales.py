@@ -5,10 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_power_model.dynamics import layout as at
+from tomr_power_model.dynamics.numbers import laid_out, timing_of
+from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.effects.scales import Scales
-from tomr_power_model.physics.model import PhysicalModel
-from tomr_power_model.response.many import step_of
-from tomr_power_model.robot import GRAVITY, Robot
+from tomr_power_model.robot import GRAVITY, WHEELS, Robot
 
 Array = NDArray[np.float64]
 
@@ -23,12 +24,18 @@ def traction_ratios_of(robot: Robot, speed: Array, period: float) -> tuple[float
         speed: of its wheels in each period [rad/s], (n, 3).
         period: s.
     """
-    body = PhysicalModel.of(robot).body
-    twist = speed @ body.to_twist.T
-    change = np.gradient(twist, period, axis=0)
-    force = change @ body.mass_matrix.T + body.turning_force(twist)
-    traction = np.abs(force @ body.from_force.T) / robot.wheel_radius
-    most = float(np.max(traction / body.normal))
+    p = laid_out(vehicle_of(robot))
+    wheels = p[at.HEADER : int(p[at.COUPLING])].reshape(WHEELS, -1)
+    to_twist = wheels[:, at.TO_TWIST : at.TO_TWIST + 3]
+    twist = speed @ to_twist
+    # In a turning frame a momentum changes by omega x m v besides.
+    vx, vy, wz = twist.T
+    x, y = vx - wz * p[at.CENTER_Y], vy + wz * p[at.CENTER_X]
+    turning = np.stack([-y, x, p[at.CENTER_X] * x + p[at.CENTER_Y] * y], axis=1)
+    force = np.gradient(twist, period, axis=0) @ p[at.INERTIA : at.INERTIA + 9].reshape(3, 3)
+    force += p[at.MASS] * wz[:, None] * turning
+    traction = np.abs(force @ to_twist.T) / robot.wheel_radius
+    most = float(np.max(traction / wheels[:, at.LOAD]))
     return tuple(part * most for part in _TRACTION_PARTS)
 
 
@@ -64,5 +71,5 @@ def scales_of(
         gear=motor.gear_ratio,
         voltage=robot.supply.nominal_voltage,
         duration=duration,
-        period=step_of(robot),
+        period=timing_of(robot.controller.rate).period,
     )

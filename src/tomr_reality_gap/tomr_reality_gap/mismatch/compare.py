@@ -1,14 +1,15 @@
 """Measured against simulated, before and after, and what that amounts to."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tomr_power_model.estimation.noise import rows_of
+from tomr_power_model.estimation.statistics import robust_scale
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
 from tomr_reality_gap.explanation import Comparison, Score
 from tomr_reality_gap.mismatch.probes import Motion, motion_of
 
@@ -16,40 +17,41 @@ Array = NDArray[np.float64]
 
 
 def simulated(
-    forward: Forward, before: Robot, after: Robot, besides: Callable[[Motion], Array] | None
-) -> tuple[Array, Mapping[str, Array]]:
-    """Values before and after, (2, n), and the motion of `Forward.run` after.
+    simulation: RecordingSimulation,
+    before: Robot,
+    after: Robot,
+    besides: Callable[[Motion], Array] | None,
+) -> tuple[Array, Run]:
+    """Values before and after, (2, n), and the motion of `RecordingSimulation.run` after.
 
     `besides` are torques at the wheels that no robot's description holds.
     """
-    run = forward.run(after)
-    values = forward.predict([before, after])
+    run = simulation.run(after)
+    values = simulation.predict([before, after])
     if besides is not None:
-        torque = besides(motion_of(forward, after, run))
-        values[1] = forward.respond(after, torque[None])[0]
+        torque = besides(motion_of(simulation, after, run))
+        values[1] = next(simulation.respond(after, torque[None]))
     return values, run
 
 
 def comparison(
-    forward: Forward, values: Array, run: Mapping[str, Array], is_held_out: bool
+    simulation: RecordingSimulation, values: Array, run: Run, is_held_out: bool
 ) -> Comparison:
-    """One recording, simulated before and after, (2, n); `run` is of `forward.run` after."""
-    rows = rows_of(forward.channels)
-    line = forward.timeline
-    residual = np.concatenate([channel.value for channel in forward.channels]) - values[1]
+    """One recording, simulated before and after, (2, n); `run` is of `simulation.run` after."""
+    rows = rows_of(simulation.channels)
+    residual = np.concatenate([channel.value for channel in simulation.channels]) - values[1]
     sigma = tuple(
-        np.full(part.stop - part.start, 1.4826 * float(np.median(np.abs(residual[part]))) + 1e-9)
-        for part in rows
+        np.full(part.stop - part.start, robust_scale(residual[part]) + 1e-9) for part in rows
     )
     return Comparison(
-        name=forward.recorded.name,
+        name=simulation.recorded.name,
         held_out=is_held_out,
-        channels=forward.channels,
+        channels=simulation.channels,
         before=tuple(values[0, part] for part in rows),
         after=tuple(values[1, part] for part in rows),
         sigma=sigma,
-        speed=run["speed"],
-        time=np.asarray(line.start + line.period * (np.arange(line.count) + 0.5)),
+        speed=run.speed,
+        time=simulation.timeline.middle,
     )
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tomr_power_model.estimation.noise import rows_of
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS, Channel
-from tomr_reality_gap.alignment.forward import Forward
+from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
 from tomr_reality_gap.explanation import Located, Map
 
 Array = NDArray[np.float64]
@@ -88,27 +88,27 @@ def _intervals(time: Array, energy: Array) -> tuple[tuple[float, float], ...]:
 
 
 def variables_at(
-    forward: Forward, run: Mapping[str, Array], channels: Sequence[Channel]
+    simulation: RecordingSimulation, run: Run, channels: Sequence[Channel]
 ) -> dict[str, Array]:
     """Variables of the motion at each sample of a recording."""
-    line = forward.timeline
+    line = simulation.timeline
     time = np.concatenate([channel.time - 0.5 * channel.span for channel in channels])
     index = np.clip(((time - line.start) / line.period).astype(np.intp), 0, line.count - 1)
     wheel = np.concatenate(
         [np.full(len(c.time), -1 if c.wheel is None else c.wheel) for c in channels]
     )
-    speed = run["speed"]
+    speed = run.speed
     own = np.where(wheel >= 0, speed[index, np.maximum(wheel, 0)], np.abs(speed[index]).max(axis=1))
     acceleration = np.gradient(speed, line.period, axis=0)
     hard = np.abs(acceleration[index]).max(axis=1)
-    heading = np.cumsum(run["yaw_rate"]) * line.period
+    heading = np.cumsum(run.yaw_rate) * line.period
     return {
         "|omega| [rad/s]": np.abs(own),
         "omega [rad/s]": np.where(wheel >= 0, own, np.nan),
         "|acceleration| [rad/s^2]": hard,
         "time [s]": time,
         "heading [rad]": np.mod(heading[index] + np.pi, 2 * np.pi) - np.pi,
-        "copper loss [W]": run["copper"][index].sum(axis=1),
+        "copper loss [W]": run.copper[index].sum(axis=1),
     }
 
 

@@ -3,13 +3,16 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tomr_power_model.calibration.recorded import Recorded
+from tomr_power_model.drive.record import Drive
+from tomr_power_model.estimation.statistics import robust_scale
 from tomr_reality_gap.alignment.channels import MOTOR_KINDS, Channel
 
 Array = NDArray[np.float64]
 
 _ORDERS = np.arange(0.5, 48.0, 0.01)
-_BLOCK = 250
+_TURNS = 100  # orders are whole parts of it
+_PER_TURN = 4096  # places of a ring: far finer than a ripple of the highest order
+_LEAST = 250  # samples
 _MOST = 2  # orders per wheel
 _ALONE = 0.1  # orders closer than this are one
 _SIGNIFICANT = 30.0  # power over the usual: chi2 of 2, so this is e^-15 by chance
@@ -17,7 +20,7 @@ _SLOW = 0.3  # s: what is slower than this is no ripple
 
 
 def ripple_orders(
-    recorded: Recorded, channels: tuple[Channel, ...], residuals: list[Array], speeds: list[Array]
+    recorded: Drive, channels: tuple[Channel, ...], residuals: list[Array], speeds: list[Array]
 ) -> tuple[float, ...]:
     """Orders [1/rev] at which a residual of power or current swings with the angle of its wheel.
 
@@ -29,7 +32,7 @@ def ripple_orders(
     """
     found: list[float] = []
     for channel, residual, speed in zip(channels, residuals, speeds, strict=True):
-        if channel.kind not in MOTOR_KINDS or channel.wheel is None or len(channel.time) < _BLOCK:
+        if channel.kind not in MOTOR_KINDS or channel.wheel is None or len(channel.time) < _LEAST:
             continue
         middle = channel.time - 0.5 * channel.span
         angle = np.interp(middle, recorded.encoder_time, recorded.position[:, channel.wheel])
@@ -59,10 +62,10 @@ def _fast(time: Array, values: Array) -> Array:
 
 def _spectrum(residual: Array, lever: Array, angle: Array) -> Array:
     """Power of residual ~ lever * sin(order * angle + phase), over all orders."""
-    scale = 1.4826 * float(np.median(np.abs(residual))) + 1e-12
+    scale = robust_scale(residual) + 1e-12
     weighted = np.clip(residual / scale, -4.0, 4.0) * lever
-    power = np.empty(len(_ORDERS))
-    for first in range(0, len(_ORDERS), _BLOCK):
-        turn = np.exp(1j * np.outer(_ORDERS[first : first + _BLOCK], angle))
-        power[first : first + _BLOCK] = np.abs(turn @ weighted) ** 2
+    # After _TURNS turns every order has come round: angles on a ring, and one Fourier transform.
+    place = np.floor(angle * (_PER_TURN / (2.0 * np.pi))).astype(np.int64) % (_TURNS * _PER_TURN)
+    ring = np.bincount(place, weights=weighted, minlength=_TURNS * _PER_TURN)
+    power = np.abs(np.fft.rfft(ring)[np.round(_ORDERS * _TURNS).astype(np.int64)]) ** 2
     return np.asarray(power / max(float(lever @ lever), 1e-12))

@@ -12,10 +12,10 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.drive.motion import turned_angle
 from tomr_power_model.geometry.kinematics import wheels_to_twist
 from tomr_power_model.robot import Robot
-from tomr_reality_gap.alignment.forward import Forward
-from tomr_reality_gap.alignment.stretches import turned_angle
+from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
 
 Array = NDArray[np.float64]
 
@@ -44,17 +44,19 @@ class Motion:
     y: Array
 
 
-def motion_of(forward: Forward, robot: Robot, run: Mapping[str, Array]) -> Motion:
-    """The motion that a robot makes in a recording; `run` is of `forward.run(robot)`."""
-    speed, line = run["speed"], forward.timeline
+def motion_of(simulation: RecordingSimulation, robot: Robot, run: Run) -> Motion:
+    """The motion that a robot makes in a recording; `run` is of `simulation.run(robot)`."""
+    speed, line = run.speed, simulation.timeline
     twist = speed @ wheels_to_twist(robot).T
-    heading = np.cumsum(run["yaw_rate"]) * line.period
+    heading = np.cumsum(run.yaw_rate) * line.period
     cos, sin = np.cos(heading), np.sin(heading)
-    time = line.start + line.period * (np.arange(line.count) + 0.5)
+    time = line.middle
     # As measured: simulated speeds would add up to another angle after a hundred turns.
     angle = np.stack(
         [
-            np.interp(time, forward.recorded.encoder_time, turned_angle(forward.recorded, wheel))
+            np.interp(
+                time, simulation.recorded.encoder_time, turned_angle(simulation.recorded, wheel)
+            )
             for wheel in range(speed.shape[1])
         ],
         axis=1,
@@ -63,8 +65,8 @@ def motion_of(forward: Forward, robot: Robot, run: Mapping[str, Array]) -> Motio
         speed=speed,
         sign=np.tanh(speed / _MOVING),
         angle=angle,
-        load=np.sqrt(run["copper"]),
-        time=np.asarray(time)[:, None],
+        load=np.sqrt(run.copper),
+        time=time[:, None],
         direction=np.arctan2(twist[:, 1], twist[:, 0])[:, None],
         heading=heading[:, None],
         x=(np.cumsum(cos * twist[:, 0] - sin * twist[:, 1]) * line.period)[:, None],

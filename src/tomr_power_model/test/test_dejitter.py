@@ -1,0 +1,160 @@
+"""Stamps that jitter although the samples do not, and stamps that are to be trusted."""
+
+import numpy as np
+import pytest
+
+from tomr_power_model.drive.dejitter import dejitter, even
+from tomr_power_model.model.encoders import EncoderSample, EncoderWindow, RecentStamps
+
+MS = 1_000_000
+BASE = 1_700_000_000_000 * MS
+NOTHING = (0.0, 0.0, 0.0)
+SPEED = np.array([6.0, -3.0, -3.0])  # rad/s, mean
+
+
+def _angles(seconds: np.ndarray) -> np.ndarray:
+    """Wheels that speed up and slow down, (n, 3) [rad]."""
+    return np.outer(seconds + 0.1 * np.sin(2.0 * seconds), SPEED)
+
+
+def _speeds(seconds: float) -> np.ndarray:
+    return SPEED * (1.0 + 0.2 * np.cos(2.0 * seconds))
+
+
+def _jitter(count: int) -> np.ndarray:
+    return np.round(np.random.default_rng(4).normal(0.0, 0.5 * MS, count)).astype(np.int64)
+
+
+def _window(stamps: np.ndarray, angles: np.ndarray) -> EncoderWindow:
+    window = EncoderWindow(70 * MS, 50 * MS, 200 * MS)
+    for stamp, angle in zip(stamps.tolist(), angles.tolist(), strict=True):
+        window.add(EncoderSample(BASE + stamp, tuple(angle), NOTHING))
+    return window
+
+
+def _error(stamps: np.ndarray, angles: np.ndarray, known: int = 300) -> float:
+    """Largest error of the speeds in the last half second, as a share, from so many samples."""
+    errors = []
+    for tick in range(2500, 3000, 50):
+        kept = np.flatnonzero(stamps <= tick * MS)[-known:]
+        found = _window(stamps[kept], angles[kept]).at(BASE + tick * MS).speed
+        errors.append(np.abs(found / _speeds(1e-3 * (tick - 25)) - 1.0).max())
+    return float(max(errors))
+
+
+def test_jitter_of_stamps_does_not_pass_for_motion() -> None:
+    """Half a millisecond at 100 Hz: 1 to 2 % of the speed, a few thousandths without."""
+    even = np.arange(300, dtype=np.int64) * 10 * MS
+    angles = _angles(1e-9 * even)
+    stamps = even + _jitter(300)
+    assert _error(stamps, angles) < 0.004
+    assert _error(stamps, angles, known=30) > 0.01  # too few to tell jitter
+
+
+def test_samples_that_are_really_uneven_keep_their_stamps() -> None:
+    stamps = np.arange(300, dtype=np.int64) * 10 * MS + _jitter(300)
+    noise = np.random.default_rng(5).normal(0.0, 5e-4, (300, 3))  # rad
+    angles = _angles(1e-9 * stamps) + noise
+    assert _error(stamps, angles) < 0.01
+    watched = RecentStamps()
+    for stamp, angle in zip(stamps.tolist(), angles.tolist(), strict=True):
+        watched.add(stamp, tuple(angle))
+    assert watched.times(stamps[-8:].tolist()) == stamps[-8:].tolist()
+
+
+@pytest.mark.parametrize("missing", [0, 7])
+def test_even_stamps_stay_bit_by_bit(missing: int) -> None:
+    stamps = np.arange(300, dtype=np.int64) * 10 * MS
+    if missing:
+        stamps = np.delete(stamps, np.arange(100, 300, missing))
+    watched = RecentStamps()
+    for stamp, angle in zip(stamps.tolist(), _angles(1e-9 * stamps).tolist(), strict=True):
+        watched.add(stamp, tuple(angle))
+    assert watched.times(stamps[-8:].tolist()) == stamps[-8:].tolist()
+
+
+def _watched() -> tuple[RecentStamps, np.ndarray]:
+    """What has seen 1.2 s of jittered stamps, and the last of them."""
+    even = np.arange(120, dtype=np.int64) * 10 * MS
+    stamps = even + _jitter(120)
+    watched = RecentStamps()
+    for stamp, angle in zip(stamps.tolist(), _angles(1e-9 * even).tolist(), strict=True):
+        watched.add(stamp, tuple(angle))
+    return watched, stamps[-8:]
+
+
+def test_times_lie_on_the_grid_and_what_is_missing_leaves_a_hole() -> None:
+    watched, stamps = _watched()
+    times = watched.times(np.delete(stamps, 3).tolist())
+    np.testing.assert_allclose(np.diff(times), [10 * MS] * 2 + [20 * MS] + [10 * MS] * 3, atol=5e3)
+    assert np.abs(np.delete(stamps, 3) - times).max() > 0.3 * MS
+
+
+def test_a_driver_that_starts_afresh_is_believed_at_once() -> None:
+    watched, _ = _watched()
+    stamps = [(1204 + 10 * number) * MS for number in range(8)]
+    assert watched.times(stamps) == stamps
+
+
+def test_at_rest_nothing_is_told_and_what_was_known_stays() -> None:
+    watched, stamps = _watched()
+    still = tuple(_angles(np.array([1.19]))[0].tolist())
+    for number, off in enumerate(_jitter(300).tolist()):
+        stamp = (1200 + 10 * number) * MS + off
+        watched.add(stamp, still)
+        stamps = np.append(stamps[1:], stamp)
+    times = watched.times(stamps.tolist())
+    np.testing.assert_allclose(np.diff(times), 10 * MS, atol=5e3)
+
+
+def test_jitter_is_taken_off_and_gaps_are_kept() -> None:
+    grid = np.delete(np.arange(500) * 0.01, np.arange(200, 230))
+    noisy = grid + np.random.default_rng(1).normal(0.0, 5e-4, len(grid))
+    assert np.abs(even(noisy) - grid).max() < 1e-4
+    assert np.diff(even(noisy)).max() == pytest.approx(0.31, abs=1e-3)
+
+
+def test_stamps_without_a_grid_are_left_alone() -> None:
+    time = np.sort(np.random.default_rng(2).uniform(0.0, 5.0, 300))
+    np.testing.assert_array_equal(even(time), time)
+
+
+@pytest.mark.parametrize("rate", [30.0, 100.0])
+def test_twenty_pieces_have_a_grid_each(rate: float) -> None:
+    """A driver that starts afresh after every gap starts anywhere in its period."""
+    random = np.random.default_rng(3)
+    pieces = [
+        5.0 * number + random.uniform(0.0, 1.0 / rate) + np.arange(round(4.0 * rate)) / rate
+        for number in range(20)
+    ]
+    taken = np.concatenate(pieces)
+    stamped = taken + random.normal(0.0, 5e-4, len(taken))
+    times, jitters = dejitter(stamped, _angles(taken))
+    assert jitters
+    assert np.abs(times - taken).max() < 3e-4
+    assert np.abs(np.diff(times) - np.diff(taken)).max() < 5e-4
+
+
+def test_a_stray_stamp_does_not_tilt_the_grid() -> None:
+    grid = np.append(np.arange(300) * 0.01, 3600.0)
+    noisy = grid + np.random.default_rng(6).normal(0.0, 5e-4, len(grid))
+    assert np.abs(even(noisy)[:-1] - grid[:-1]).max() < 1e-4
+
+
+def test_a_recording_and_a_live_stream_are_dejittered_alike() -> None:
+    taken = np.arange(200, dtype=np.int64) * 10 * MS
+    stamps = taken + _jitter(200)
+    watched = RecentStamps()
+    for stamp, angle in zip(stamps.tolist(), _angles(1e-9 * taken).tolist(), strict=True):
+        watched.add(stamp, tuple(angle))
+    times, jitters = dejitter(1e-9 * (stamps - stamps[0]), _angles(1e-9 * taken))
+    assert jitters
+    live = np.array(watched.times(stamps[-20:].tolist())) - stamps[0]
+    np.testing.assert_allclose(1e-9 * live, times[-20:], atol=2e-9)
+
+
+def test_at_rest_stamps_are_believed() -> None:
+    stamps = 0.01 * np.arange(300) + 1e-9 * _jitter(300)
+    times, jitters = dejitter(stamps, np.zeros((300, 3)))
+    assert not jitters
+    np.testing.assert_array_equal(times, stamps)

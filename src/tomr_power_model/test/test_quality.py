@@ -1,0 +1,157 @@
+"""Recordings that must not be taken for physics: refused in a line with place and remedy."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from tomr_power_model.calibration.following import lost_wheels
+from tomr_power_model.drive.excitation import check_excitation
+from tomr_power_model.drive.quality import Finding, not_following, refuse, sensor_faults
+from tomr_power_model.drive.record import Drive
+from tomr_power_model.errors import InputError
+from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.robot import shipped_robot
+
+MakeDrive = Callable[..., Drive]
+ROBOT = shipped_robot("reference")
+
+
+def faults(drive: Drive) -> list[Finding]:
+    return [*sensor_faults(drive, ROBOT), *lost_wheels(drive, ROBOT)]
+
+
+def during(time: np.ndarray, start: float = 10.0, end: float = 16.0) -> np.ndarray:
+    return (time >= start) & (time <= end)
+
+
+def lose_encoder(drive: Drive) -> Drive:
+    """Wheel 3 as its encoder tells it when it is cut off: still, while its driver gives all."""
+    position, velocity, power = drive.position.copy(), drive.velocity.copy(), drive.power.copy()
+    rows = during(drive.encoder_time)
+    position[rows, 2] = position[rows, 2][0]
+    velocity[rows, 2] = 0.0
+    power[during(drive.power_time), 2] = 18.0
+    return evolve(drive, position=position, velocity=velocity, power=power)
+
+
+def lose_drive(drive: Drive) -> Drive:
+    """Wheel 2 hardly turns."""
+    speed = drive.velocity.copy()
+    speed[during(drive.encoder_time), 1] *= 0.1
+    return evolve(drive, velocity=speed, position=0.01 * np.cumsum(speed, axis=0))
+
+
+def stick(drive: Drive) -> Drive:
+    reading = drive.reading.copy()
+    reading[during(drive.power_time), 0] = 0.25
+    return evolve(drive, reading=reading)
+
+
+def saturate(drive: Drive) -> Drive:
+    reading = drive.reading.copy()
+    reading[:, 1] = np.minimum(reading[:, 1], 0.2 * reading[:, 1].max())
+    return evolve(drive, reading=reading)
+
+
+def reverse(drive: Drive) -> Drive:
+    return evolve(drive, power=drive.power * np.array([1.0, 1.0, -1.0]))
+
+
+@pytest.mark.parametrize(
+    ("damage", "wheel", "seen", "remedy"),
+    [
+        (lose_encoder, 3, "encoder stands still while it draws 18.0 W", "--skip tour=9.0:17.0"),
+        (lose_drive, 2, "does not follow its command", "--skip tour="),
+        (stick, 1, "power sensor repeats 0.25", "--skip tour=9."),
+        (saturate, 2, "power sensor is saturated", "record it again"),
+        (reverse, 3, "it draws -", "must be negative while power is drawn"),
+    ],
+)
+def test_faults_are_refused_with_wheel_interval_and_remedy(
+    make_drive: MakeDrive,
+    damage: Callable[[Drive], Drive],
+    wheel: int,
+    seen: str,
+    remedy: str,
+) -> None:
+    healthy = make_drive(ROBOT, 1)
+    assert faults(healthy) == []
+    with pytest.raises(InputError) as caught:
+        refuse(faults(damage(healthy)))
+    text = str(caught.value)
+    assert text.startswith(f"tour: wheel_{wheel}_joint, ")
+    assert seen in text
+    assert remedy in text
+    assert "\n" not in text
+
+
+def test_a_bag_of_another_robot_is_refused(make_drive: MakeDrive) -> None:
+    turned = evolve(ROBOT, wheel_offset=ROBOT.wheel_offset + np.pi / 3)
+    with pytest.raises(
+        InputError, match=r"as a wheel at 60 degrees would, robot.yaml puts it at 0"
+    ):
+        refuse(faults(make_drive(turned, 1)))
+
+
+def test_too_little_motion_is_refused(make_drive: MakeDrive) -> None:
+    drive = make_drive(ROBOT, 1)
+    check_excitation([drive], ROBOT)
+    with pytest.raises(
+        InputError, match=r"the wheels turn for \d.\d s in all: drive at least 10 s"
+    ):
+        check_excitation([make_drive(ROBOT, 1, seconds=8.0)], ROBOT)
+    idle = drive.velocity * np.array([1.0, 0.0, 1.0])
+    with pytest.raises(InputError, match=r"wheel_2_joint turns for 0.0 s"):
+        check_excitation([evolve(drive, velocity=idle)], ROBOT)
+
+
+def coarse(drive: Drive, quantum: float, top: float) -> Drive:
+    """Mostly at full speed, which a coarse sensor sees as one and the same reading."""
+    speed = np.clip(3.0 * drive.velocity, -4.0, 4.0)
+    seen = np.stack(
+        [np.interp(drive.power_time, drive.encoder_time, own) for own in speed.T], axis=1
+    )
+    noise = np.random.default_rng(1).normal(0.0, 0.003, seen.shape)
+    reading = quantum * np.round((0.05 + 0.02 * np.abs(seen) + noise) / quantum)
+    return evolve(drive, velocity=speed, reading=np.minimum(reading, top))
+
+
+@pytest.mark.parametrize(("quantum", "top", "told"), [(0.05, np.inf, False), (0.01, 0.08, True)])
+def test_a_coarse_sensor_is_not_a_saturated_one(
+    make_drive: MakeDrive, quantum: float, top: float, told: bool
+) -> None:
+    """Its readings repeat at their peak, too, but would not pass it."""
+    drive = coarse(make_drive(ROBOT, 1), quantum, top)
+    _, counts = np.unique(drive.reading[:, 0], return_counts=True)
+    assert counts[-1] > 3 * counts[-2:].min()
+    assert any("saturated" in str(found) for found in faults(drive)) == told
+
+
+def uniform(drive: Drive, twist: tuple[float, float, float]) -> Drive:
+    """One motion after two seconds at rest."""
+    speed = np.where(drive.encoder_time[:, None] >= 2.0, twist_to_wheels(ROBOT) @ twist, 0.0)
+    return evolve(drive, velocity=speed)
+
+
+def test_one_speed_and_heading_tells_nothing(make_drive: MakeDrive) -> None:
+    drive = make_drive(ROBOT, 1)
+    creep, other = uniform(drive, (0.05, 0.02, 0.1)), uniform(drive, (0.3, 0.0, 0.1))
+    with pytest.raises(InputError, match=r"tour: the wheels turn at one speed .* 100 % of the"):
+        check_excitation([creep], ROBOT)
+    check_excitation([creep, other], ROBOT)
+
+
+def test_wheels_are_held_against_any_expectation(make_drive: MakeDrive) -> None:
+    """A fifth of a second late is a slow loop, for an explanation to say; backwards is a fault."""
+    drive = make_drive(ROBOT, 1)
+    time = drive.encoder_time[::5]
+    expected = drive.velocity[::5]
+    assert list(not_following(drive, ROBOT, time, expected)) == []
+    late = np.roll(expected, 4, axis=0)
+    assert list(not_following(drive, ROBOT, time, late)) == []
+    found = list(not_following(drive, ROBOT, time, expected * np.array([1.0, -1.0, 1.0])))
+    assert {item.where for item in found} == {"wheel_2_joint"}
+    unknown = np.full_like(expected, np.nan)
+    assert list(not_following(drive, ROBOT, time, unknown)) == []

@@ -1,0 +1,39 @@
+"""One recording of a robot as typed samples: where every tool that reads recordings starts."""
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@frozen
+class Drive:
+    """One recording; times in seconds since its first encoder sample, NaN where nothing is known.
+
+    Power is what the robot publishes: W for `measurement.quantity: power` and `supply_current`
+    (times the nominal voltage), A for `motor_current`. See `drive.sources` for missing voltages.
+    """
+
+    name: str
+    encoder_time: Array  # (n,)
+    position: Array  # rad, (n, 3)
+    velocity: Array  # rad/s, (n, 3)
+    power_time: Array  # (m,)
+    power: Array  # W or A drawn, (m, 3)
+    reading: Array  # as the sensor says it: A, or W where it gives no current, (m, 3)
+    total_time: Array  # (l,)
+    total: Array  # W drawn by the whole robot, (l,)
+    command_time: Array  # (c,)
+    command: Array  # m/s, m/s, rad/s in base_link, (c, 3)
+    voltage: Array  # of each driver's supply [V], NaN where not given, (m, 3)
+    total_voltage: Array  # V, (l,)
+    yaw_time: Array  # (g,)
+    yaw_rate: Array  # of the gyro [rad/s], (g,)
+    start_ns: int = 0  # stamp of time 0
+    notes: tuple[str, ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last encoder sample [s]."""
+        return float(self.encoder_time[-1] - self.encoder_time[0])

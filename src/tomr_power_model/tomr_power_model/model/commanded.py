@@ -1,0 +1,222 @@
+"""What the commands lead to: the drivers' closed loop, simulated tick by tick.
+
+The loop's periods are where commands come: a command acts from the period on that begins nearest to
+it, and the periods' phase follows the commands' stamps. A period belongs to the tick in which its
+middle lies, so that an answer rests on messages up to its tick alone.
+"""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_power_model.dynamics import layout as at
+from tomr_power_model.dynamics.simulation import Simulation, State
+from tomr_power_model.dynamics.vehicle import vehicle_of
+from tomr_power_model.model.ticks import to_ns
+from tomr_power_model.robot import Robot
+
+Array = NDArray[np.float64]
+Triple = tuple[float, float, float]
+
+_STOP: Triple = (0.0, 0.0, 0.0)
+_REMEMBERED = 600_000_000  # ns, of simulated motion
+_STEADY = 50  # commands over which the phase of the periods is averaged
+
+
+@frozen
+class CommandTiming:
+    """When commands count, all in nanoseconds."""
+
+    period: int  # of the ticks
+    timeout: int = 0  # a command this old counts as a stop; 0: it is held
+    patience: int = to_ns(0.5)  # for encoders to say how the first command finds the robot
+
+
+@frozen
+class Seen:
+    """What was measured at the start of a tick, NaN where it is not known."""
+
+    twist: Triple  # of the body [m/s, m/s, rad/s]
+    angle: Sequence[float]  # of the wheels, as joint_states count them [rad]
+    heading: float  # against the start [rad]
+
+
+@frozen
+class Commanded:
+    """The steps that belong to a tick; at least one, but for drivers slower than the ticks."""
+
+    speed: list[float]  # of the wheels, mean of the tick [rad/s]
+    torque: list[float]  # of the motors at the wheels, likewise [N m]
+    voltage: float  # of the supply, likewise [V]
+    starts: tuple[int, ...]  # of each step [ns]
+    length: int  # of a step [ns]
+    rows: tuple[list[float], ...]  # outputs of each step, see `layout`
+    edge: tuple[float, ...]  # wheel speeds before the first of them [rad/s]
+
+    def wheels(self, row: Sequence[float], field: int) -> Sequence[float]:
+        """A field of the wheels' outputs."""
+        return row[at.OUT_HEADER + field :: at.OUT_WHEEL]
+
+
+class SimulatedMotion:
+    """Angles and speeds of the wheels at the steps' ends, of the last moments."""
+
+    def __init__(self) -> None:
+        self._points: deque[tuple[int, list[float], list[float]]] = deque()
+
+    def add(self, time_ns: int, angles: list[float], speeds: list[float]) -> None:
+        """Take the end of a step: wheels [rad] and [rad/s]."""
+        self._points.append((time_ns, angles, speeds))
+        while self._points[0][0] < time_ns - _REMEMBERED:
+            self._points.popleft()
+
+    def angles(self, times_ns: Sequence[int]) -> Array:
+        """Angles at some times [rad], (k, n); beyond the ends as the speed there has it."""
+        return self._at(times_ns, 1)
+
+    def mean_motion(self, tick_ns: int, period_ns: int) -> tuple[Array, Array]:
+        """Mean speed and acceleration in the window that ends at a tick, (n,) each."""
+        window = (tick_ns - period_ns, tick_ns)
+        rate = 1e9 / period_ns
+        first, last = self._at(window, 1)
+        before, after = self._at(window, 2)
+        return rate * (last - first), rate * (after - before)
+
+    def _at(self, times_ns: Sequence[int], column: int) -> Array:
+        origin = self._points[0][0]
+        time = np.array([point[0] - origin for point in self._points])
+        values = np.array([point[column] for point in self._points])
+        wanted = np.array([at_ns - origin for at_ns in times_ns])
+        found = np.stack([np.interp(wanted, time, own) for own in values.T], axis=1)
+        if len(time) < 2:
+            return found
+        # Beyond the ends as the nearest step has it.
+        first, last = (
+            (values[k + 1] - values[k]) / max(time[k + 1] - time[k], 1) for k in (0, len(time) - 2)
+        )
+        found += np.minimum(wanted, 0)[:, None] * first
+        found += np.maximum(wanted - time[-1], 0)[:, None] * last
+        return np.asarray(found)
+
+
+class CommandPath:
+    """Runs the closed loop over the commands, each held until the next."""
+
+    def __init__(self, robot: Robot, timing: CommandTiming) -> None:
+        self._simulation = Simulation(vehicle_of(robot))
+        self._step = to_ns(self._simulation.period_s)
+        self._part = self._step // self._simulation.steps
+        self._timing = timing
+        self._delay = to_ns(robot.controller.delay)
+        self._pending: deque[tuple[int, Triple]] = deque()
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all commands: what the robot does is not known until the next."""
+        self._pending.clear()
+        self.state: State | None = None
+        self._inputs = self._simulation.inputs()
+        self._given = 0
+        self._next = 0  # when the next period begins [ns]
+        self._taken = 0  # commands
+        self.motion = SimulatedMotion()
+        resting = [0.0] * self._simulation.wheels
+        self._means = resting, resting, self._simulation.numbers[at.VOLTAGE]
+
+    def command(self, stamp_ns: int, twist: Triple) -> None:
+        """Take a command; one that comes too late for its stamp acts from the next period on."""
+        self._pending.append((stamp_ns + self._delay, twist))
+
+    def wheel(self, field: int) -> list[float]:
+        """A field of the wheels' state, see `layout`; empty before the first command."""
+        if self.state is None:
+            return []
+        first, last = at.STATE_HEADER + field, len(self.state)
+        return self.state[first : last : at.STATE_WHEEL]
+
+    def asked(self) -> list[float]:
+        """Wheel speeds that the drivers are asked for now [rad/s]."""
+        assert self.state is not None
+        p, (x, y, yaw) = self._simulation.numbers, self.state[at.SET : at.SET + 3]
+        records = range(at.HEADER, int(p[at.COUPLING]), int(p[at.STRIDE]))
+        rows = [p[first + at.ASK : first + at.ASK + 3] for first in records]
+        return [a * x + b * y + c * yaw for a, b, c in rows]
+
+    def over(self, tick_ns: int, seen: Seen) -> Commanded | None:
+        """Means over the window that ends at a tick, or None without a command.
+
+        The simulation starts with the motion that the first command finds, where encoders tell it
+        within a while, else at rest.
+        """
+        if self.state is None and not self._started(tick_ns, seen):
+            return None
+        assert self.state is not None
+        self._see(seen)
+        edge = tuple(self.wheel(at.SPEED))
+        starts: list[int] = []
+        rows: list[list[float]] = []
+        width = self._simulation.row
+        while self._next + self._step // 2 <= tick_ns:
+            self._take()
+            out = self._simulation.advance(self.state, self._inputs)
+            for k in range(self._simulation.steps):
+                starts.append(self._next + k * self._part)
+                rows.append(out[k * width : (k + 1) * width])
+            self._see(None)
+            self._next += self._step
+            self.motion.add(self._next, *self._standing())
+        if rows:
+            self._means = self._mean_of(rows)
+        speed, torque, voltage = self._means
+        return Commanded(speed, torque, voltage, tuple(starts), self._part, tuple(rows), edge)
+
+    def _started(self, tick_ns: int, seen: Seen) -> bool:
+        if not self._pending or self._pending[0][0] > tick_ns:
+            return False
+        known = seen.twist[0] == seen.twist[0]
+        first = self._pending[0][0]
+        if not known and tick_ns - first < self._timing.patience:
+            return False
+        self.state = self._simulation.start(seen.twist if known else _STOP, angle=math.nan)
+        self._inputs[at.COMMAND : at.COMMAND + 3] = self.state[at.SET : at.SET + 3]
+        self.motion.add(tick_ns - self._timing.period, *self._standing())
+        # The first period of this tick, in step with the command.
+        begin = tick_ns - self._timing.period
+        self._next = first + -(-(begin - first - self._step // 2) // self._step) * self._step
+        return True
+
+    def _standing(self) -> tuple[list[float], list[float]]:
+        return self.wheel(at.TURNED), self.wheel(at.SPEED)
+
+    def _see(self, seen: Seen | None) -> None:
+        """Put the simulation where the robot was seen, for one period; None: as it goes on."""
+        heading, angle = (None, None) if seen is None else (seen.heading, seen.angle)
+        self._inputs[at.SEEN_HEADING] = math.nan if heading is None else heading
+        for wheel in range(self._simulation.wheels):
+            place = at.INPUT_HEADER + wheel * at.INPUT_WHEEL + at.SEEN_ANGLE
+            self._inputs[place] = math.nan if angle is None else angle[wheel]
+
+    def _take(self) -> None:
+        """The command in force in the period that begins now."""
+        while self._pending and self._pending[0][0] <= self._next + self._step // 2:
+            self._given, twist = self._pending.popleft()
+            self._inputs[at.COMMAND : at.COMMAND + 3] = twist
+            self._taken = min(self._taken + 1, _STEADY)
+            off = (self._given - self._next + self._step // 2) % self._step - self._step // 2
+            self._next += off // self._taken
+        if self._timing.timeout and self._next > self._given + self._timing.timeout:
+            self._inputs[at.COMMAND : at.COMMAND + 3] = _STOP
+
+    def _mean_of(self, rows: Sequence[Sequence[float]]) -> tuple[list[float], list[float], float]:
+        """Mean wheel speeds and motor torques, and the supply's voltage."""
+        first = at.OUT_HEADER
+        means = [sum(column) / len(rows) for column in zip(*rows, strict=True)]
+        return (
+            means[first + at.OUT_SPEED :: at.OUT_WHEEL],
+            means[first + at.OUT_TORQUE :: at.OUT_WHEEL],
+            means[at.OUT_VOLTAGE],
+        )

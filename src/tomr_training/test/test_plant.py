@@ -1,0 +1,92 @@
+"""The robot in a training drive: sane physics, whatever befalls it, whatever robot it is."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from tomr_power_model.dynamics import layout as at
+from tomr_power_model.robot import shipped_robot
+from tomr_sim_bridge.missions.schema import PlannedFault
+from tomr_training.drives import Bump, Drive
+from tomr_training.planar.plant import run_believed, run_plant
+from tomr_training.planar.schedule import commanded
+from tomr_training.planar.sensors import Signals
+
+Straight = Callable[..., Drive]
+REFERENCE = shipped_robot("reference")
+
+
+def test_steady_driving_by_hand(straight: Straight) -> None:
+    """Wheel 1 sits at 0 degrees: driving ahead it is idle, the others turn at v sin(120) / r."""
+    motion = run_plant(straight())
+    wanted = 0.5 * np.sin(2.0 * np.pi / 3.0) / 0.05
+    np.testing.assert_allclose(motion.truth.speed[-2], [0.0, wanted, -wanted], atol=0.02)
+    torque = 0.06 + 0.004 * wanted  # N m of friction
+    current = torque / 0.7
+    power = (0.8 * current + 0.7 * wanted) * current + 1.2
+    np.testing.assert_allclose(motion.truth.power[-2], [1.2, power, power], rtol=0.02)
+
+
+def test_traction_bounds_acceleration(straight: Straight) -> None:
+    """On ice of friction mu no robot accelerates faster than mu g."""
+    ice = PlannedFault("floor_slippery", 0.5, None, {"severity": 1.0})
+    steps = run_plant(straight(faults=(ice,))).steps
+    assert np.abs(steps.gap[300:320, 1:]).max() > 0.1
+    ahead = (0.05 * steps.speed - steps.gap)[:, 1] / np.sin(2.0 * np.pi / 3.0)
+    assert np.diff(ahead[:400:20]).max() / 0.1 < 0.02 * 9.81 * 1.05
+
+
+def test_a_bump_is_over_soon_and_shows(straight: Straight) -> None:
+    bumped = run_plant(straight(bumps=(Bump(2.0, 0.1, (30.0, 0.0), 0.0),)))
+    change = np.abs(bumped.steps.power - run_plant(straight()).steps.power).max(axis=1)
+    assert change[400:430].max() > 2.0
+    assert change[:400].max() == 0.0
+    assert change[560:].max() < 0.5
+
+
+def test_faults_act_on_what_they_name(straight: Straight) -> None:
+    """An open bridge draws standby only; an encoder that loses counts makes its wheel too fast."""
+    lost = PlannedFault("control_signal_lost", 3.0, None, {"severity": 1.0, "wheel": 2})
+    assert run_plant(straight(faults=(lost,))).truth.power[-2, 1] == pytest.approx(1.2)
+    half = PlannedFault("encoder_lost", 3.0, None, {"severity": 0.5, "wheel": 2})
+    motion, healthy = run_plant(straight(faults=(half,))), run_plant(straight())
+    assert motion.truth.speed[-1, 1] < 0.9 * motion.steps.speed[-1, 1]
+    assert motion.steps.speed[-1, 1] > 1.2 * healthy.steps.speed[-1, 1]
+
+
+def test_a_payload_costs_power_while_speeding_up(straight: Straight) -> None:
+    light, heavy = run_plant(straight()), run_plant(straight(payload=5.0))
+    assert heavy.truth.power[20:26, 1].sum() > 1.1 * light.truth.power[20:26, 1].sum()
+
+
+@pytest.mark.parametrize("rate", [60.0, 1000.0])
+def test_any_rate_of_drivers_drives_alike(straight: Straight, rate: float) -> None:
+    """A tick need not be a whole number of their periods."""
+    other = evolve(REFERENCE, controller=evolve(REFERENCE.controller, rate=rate))
+    wanted, found = run_believed(straight()).truth, run_believed(straight(robot=other)).truth
+    assert len(found.power) == len(wanted.power)
+    np.testing.assert_allclose(found.power[-30:], wanted.power[-30:], rtol=0.01)
+
+
+def test_a_driver_hears_commands_late_by_its_delay(straight: Straight) -> None:
+    late = evolve(REFERENCE, controller=evolve(REFERENCE.controller, delay=0.1))
+    drives = straight(), straight(robot=late)
+    heard, later = (commanded(drive, drive.plant)[:, at.COMMAND] for drive in drives)
+    np.testing.assert_array_equal(later[20:], heard[:-20])
+
+
+def test_sensors_show_sag_and_scale(straight: Straight) -> None:
+    """Any effect of the vocabulary may be in the plant; those of sensors are in what they show."""
+    physics = {
+        **REFERENCE.physics,
+        "electrical.supply_sag": ({"resistance": 0.5},) * 3,
+        "sensor.power_scale": ({"scale": 1.1}, None, None),
+    }
+    plain, changed = straight(), straight(robot=evolve(REFERENCE, physics=physics))
+    before, after = (Signals.of(drive, run_plant(drive)) for drive in (plain, changed))
+    sag = (before.voltage - after.voltage).mean()
+    assert sag == pytest.approx(0.5 * after.drawn[:, 3].mean(), rel=0.05)
+    idle, scaled = ((seen.voltage * seen.drawn)[:, 0].mean() for seen in (before, after))
+    assert scaled / idle == pytest.approx(1.1, abs=0.02)

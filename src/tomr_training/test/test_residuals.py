@@ -1,0 +1,66 @@
+"""Residuals of a whole drive at once: the same as those of the streaming stages."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_fault_diag.residuals.stage import ResidualStage
+from tomr_power_model.model.predictor import PowerPredictor
+from tomr_sim_bridge.missions.schema import PlannedFault
+from tomr_training.drives import Drive
+from tomr_training.planar.plant import run_plant
+from tomr_training.planar.residuals import compare
+from tomr_training.planar.sensors import Signals
+
+BASE = 1_700_000_000 * 1_000_000_000
+
+
+def _stamp(seconds: float) -> int:
+    return BASE + round(seconds * 1e9)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_the_same_residuals_as_the_stages(chosen: Callable[..., Drive], seed: int) -> None:
+    fault = PlannedFault("encoder_lost", 3.0, 5.0, {"severity": 0.8, "wheel": 2})
+    drive = chosen(seed, phases=chosen(seed).mission.phases[:4], faults=(fault,))
+    signals = Signals.of(drive, run_plant(drive))
+    compared = compare(drive, signals)
+    residual, band = compared.residuals(BandSettings())
+    predictor, stage = PowerPredictor(drive.believed), ResidualStage(drive.believed)
+    events: list[tuple[int, int, tuple[object, ...]]] = []
+    for time, twist in drive.mission.plan(drive.believed).commands():
+        events.append((_stamp(time), 0, twist))
+    for k, time in enumerate(signals.encoder_time):
+        events.append((_stamp(time), 1, tuple(signals.position[k].tolist())))
+    for k, time in enumerate(signals.power_time):
+        readings = zip(signals.voltage[k].tolist(), signals.drawn[k].tolist(), strict=True)
+        events.append((_stamp(time), 2, tuple(readings)))
+    frames = []
+    unknown = (float("nan"),) * 3
+    for stamp, kind, values in sorted(events, key=lambda event: event[:2]):
+        if kind == 0:
+            predictor.command(stamp, values)  # type: ignore[arg-type]
+        elif kind == 1:
+            predictor.encoders(stamp, values, unknown)  # type: ignore[arg-type]
+            stage.encoders(stamp, values, unknown)  # type: ignore[arg-type]
+        else:
+            for wheel, (voltage, drawn) in enumerate(values[:3]):  # type: ignore[misc]
+                stage.motor(wheel, stamp, voltage, -drawn)
+            stage.supply(stamp, values[3][0], -values[3][1])  # type: ignore[index]
+        for prediction in predictor.due():
+            stage.prediction(prediction)
+        frames.extend(stage.due())
+    assert len(frames) > 80
+    streamed = np.array([[(r.residual, r.band) for r in frame.residuals] for frame in frames])
+    ticks = np.array([(frame.stamp_ns - BASE) // 50_000_000 for frame in frames]) - 1
+    # A wheel that is to stand still has a direction by rounding only.
+    still = np.abs(compared.modelled[ticks]) < 1e-6
+    found, wanted = residual[ticks], streamed[..., 0]
+    found[still], wanted[still] = np.abs(found[still]), np.abs(wanted[still])
+    measured = [*range(4, 10)]
+    np.testing.assert_allclose(found[:, measured], wanted[:, measured], atol=2e-4)
+    np.testing.assert_allclose(band[ticks][:, measured], streamed[:, measured, 1], atol=2e-4)
+    # The stages take the commanded motion through inverse dynamics.
+    np.testing.assert_allclose(found[:, :4], wanted[:, :4], atol=0.1)

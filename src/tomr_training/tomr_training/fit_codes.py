@@ -1,0 +1,122 @@
+"""Fit of the paper's network: Adam, lr 0.01, cross-entropy, batch 32, 100 epochs (Wang 2024, 4)."""
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+import torch
+from attrs import frozen
+from numpy.typing import NDArray
+from torch import nn
+
+from tomr_fault_diag.classifier.network import Network
+from tomr_fault_diag.classifier.states import STATES
+from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, RESIDUALS, SPEEDS, TOTAL
+from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_training.planar.generate import IGNORED, NORMAL, LabelledTicks
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.int8]
+
+# The named state of each true one: of a lost signal the wheel does not matter.
+_STATE_OF = np.array([0, 1, 2, 2, 2, 3, 4, 5], dtype=np.int8)
+
+
+@frozen
+class Recipe:
+    """The paper's hyperparameters, and how many ticks of silence to keep."""
+
+    hidden: int = 30
+    learning_rate: float = 0.01
+    batch: int = 32
+    epochs: int = 100
+    seed: int = 1
+    examples: int = 60_000
+    # Most ticks are healthy with all codes zero and teach nothing new: that many are kept.
+    silent: int = 10_000
+    # Share of examples repeated with an input group missing, for robots that lack a sensor.
+    blinded: float = 0.1
+
+
+_GROUPS = ([TOTAL], [*MOTORS, *ENCODERS], [*SPEEDS, *ENCODERS])
+
+
+@frozen
+class Examples:
+    """Ticks with a label: codes (n, 10) and true states (n,)."""
+
+    codes: Codes
+    labels: Codes
+
+
+def examples_of(drives: Iterable[LabelledTicks], bands: BandSettings) -> Examples:
+    """Ticks with a label; those of a fault only where some residual leaves its band."""
+    codes, labels = [], []
+    for drive in drives:
+        residual, band = drive.compared.residuals(bands)
+        code = (residual > band).astype(np.int8) - (-residual > band).astype(np.int8)
+        kept = drive.labels != IGNORED
+        kept &= (drive.labels == NORMAL) | code.any(axis=1)
+        codes.append(code[kept])
+        labels.append(_STATE_OF[drive.labels[kept]])
+    return Examples(np.concatenate(codes), np.concatenate(labels))
+
+
+def prepared(examples: Examples, recipe: Recipe) -> tuple[Array, NDArray[np.int64]]:
+    """Inputs (n, 10) and states (n,) to train on."""
+    random = np.random.default_rng(recipe.seed)
+    silent = np.flatnonzero(~examples.codes.any(axis=1))
+    speaking = np.flatnonzero(examples.codes.any(axis=1))
+    some = random.permutation(silent)[: recipe.silent]
+    chosen = random.permutation(np.concatenate([speaking, some]))[: recipe.examples]
+    codes = examples.codes[chosen].astype(np.float64)
+    labels = examples.labels[chosen].astype(np.int64)
+    some = random.permutation(len(chosen))[: int(recipe.blinded * len(chosen))]
+    blind = codes[some].copy()
+    for row in range(len(blind)):
+        blind[row, _GROUPS[row % len(_GROUPS)]] = 0.0
+    kept = blind.any(axis=1) | (labels[some] == 0)
+    return np.concatenate([codes, blind[kept]]), np.concatenate([labels, labels[some][kept]])
+
+
+def module_of(recipe: Recipe) -> nn.Sequential:
+    """The untrained network; softmax is part of the loss."""
+    return nn.Sequential(
+        nn.Linear(RESIDUALS, recipe.hidden), nn.ReLU(), nn.Linear(recipe.hidden, len(STATES))
+    )
+
+
+@frozen
+class Fitted:
+    """Trained weights, and what torch itself answers to some inputs."""
+
+    network: Network
+    check_inputs: Array  # (n, 10)
+    check_probabilities: Array  # (n, 6)
+
+
+def fit(examples: Examples, recipe: Recipe, progress: Callable[[float], None]) -> Fitted:
+    """Train; the same examples and recipe give the same weights."""
+    torch.manual_seed(recipe.seed)
+    torch.set_num_threads(1)  # faster for so small a network, and the sums keep their order
+    inputs, labels = prepared(examples, recipe)
+    x = torch.tensor(inputs, dtype=torch.float32)
+    y = torch.tensor(labels)
+    module = module_of(recipe)
+    optimiser = torch.optim.Adam(module.parameters(), lr=recipe.learning_rate)
+    loss = nn.CrossEntropyLoss()
+    for _ in range(recipe.epochs):
+        order = torch.randperm(len(x))
+        total = 0.0
+        for start in range(0, len(x), recipe.batch):
+            rows = order[start : start + recipe.batch]
+            optimiser.zero_grad()
+            cost = loss(module(x[rows]), y[rows])
+            cost.backward()
+            optimiser.step()
+            total += float(cost.detach()) * len(rows)
+        progress(total / len(x))
+    weights = [parameter.detach().numpy().astype(np.float64) for parameter in module.parameters()]
+    # In double precision, as the robot computes it: the trained weights are exact there.
+    check = torch.randint(-1, 2, (40, RESIDUALS), dtype=torch.float64)
+    answers = torch.softmax(module.double()(check), dim=1).detach().numpy()
+    return Fitted(Network(*weights), check.numpy(), answers)

@@ -1,0 +1,180 @@
+"""Fit of the window network: Adam, one cycle of the learning rate, cross-entropy."""
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+import torch
+from attrs import frozen
+from numpy.typing import NDArray
+from torch import nn
+
+from tomr_fault_diag.classifier.belief import HYPOTHESES
+from tomr_fault_diag.classifier.features import (
+    BLIND,
+    CHANNELS,
+    INPUTS,
+    WINDOW,
+    by_wheel,
+    channels,
+)
+from tomr_fault_diag.classifier.window_network import WindowNetwork
+from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_training.planar.generate import CONTROL, IGNORED, MOTOR, NORMAL, LabelledTicks
+
+Floats = NDArray[np.float32]
+
+_CHUNK = 8192
+
+
+@frozen
+class WindowRecipe:
+    """Size of the network and how it is trained."""
+
+    hidden: tuple[int, int] = (64, 32)
+    learning_rate: float = 6e-3
+    batch: int = 1024
+    epochs: int = 6
+    seed: int = 1
+    # Shares of the ticks that are kept: windows overlap, and most healthy ones teach nothing new.
+    healthy: float = 0.25
+    faulty: float = 0.6
+    blinded: float = 0.1  # share of the examples that lack a sensor
+
+
+@frozen
+class Examples:
+    """Drives as the network sees them, (n, WINDOW - 1 + ticks, 16), and what to learn of them."""
+
+    seen: Floats
+    drive: NDArray[np.int64]  # of each example, (m,)
+    tick: NDArray[np.int64]
+    label: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.label)
+
+    def windows(self, rows: NDArray[np.int64]) -> Floats:
+        """Windows of some examples, (rows, WINDOW, 16), the newest tick last."""
+        ticks = self.tick[rows, None] + np.arange(WINDOW)
+        return np.asarray(self.seen[self.drive[rows, None], ticks])
+
+
+def examples_of(drives: Iterable[LabelledTicks], recipe: WindowRecipe) -> Examples:
+    """Ticks with a label, as many as the recipe keeps."""
+    random = np.random.default_rng(recipe.seed)
+    parts = [(channels_of_drive(drive), drive.labels) for drive in drives]
+    longest = max(len(labels) for _, labels in parts)
+    seen = np.zeros((len(parts), WINDOW - 1 + longest, CHANNELS), dtype=np.float32)
+    labels = np.full((len(parts), longest), IGNORED, dtype=np.int8)
+    for place, (values, own) in enumerate(parts):
+        seen[place, WINDOW - 1 : WINDOW - 1 + len(own)] = values
+        labels[place, : len(own)] = own
+    kept = np.where(labels == NORMAL, recipe.healthy, recipe.faulty)
+    labels[random.random(labels.shape) >= kept] = IGNORED
+    row, tick = np.nonzero(labels != IGNORED)
+    return Examples(seen, row, tick, labels[row, tick].astype(np.int64))
+
+
+def channels_of_drive(drive: LabelledTicks) -> Floats:
+    """Channels of a drive, (ticks, 16)."""
+    residual, band = drive.compared.residuals(BandSettings())
+    return channels(residual, band, drive.compared.modelled).astype(np.float32)
+
+
+class WindowModule(nn.Module):
+    """The network of `classifier.window_network` in torch."""
+
+    def __init__(self, hidden: tuple[int, int]) -> None:
+        super().__init__()
+        first, second = hidden
+        self.layers = nn.Sequential(
+            nn.Linear(INPUTS, first),
+            nn.ReLU(),
+            nn.Linear(first, second),
+            nn.ReLU(),
+            nn.Linear(second, 4),
+        )
+
+    def forward(self, views: torch.Tensor) -> torch.Tensor:
+        """Logits (m, 8) of views (m, 3, INPUTS)."""
+        out = self.layers(views)
+        return torch.cat([out[..., :2].mean(dim=1), out[..., 2], out[..., 3]], dim=1)
+
+
+@frozen
+class FittedWindow:
+    """Trained weights, and what torch itself answers to some windows."""
+
+    network: WindowNetwork
+    check_windows: Floats  # (k, WINDOW, 16)
+    check_scores: NDArray[np.float64]  # (k, 8)
+
+
+def fit_window(
+    examples: Examples, recipe: WindowRecipe, progress: Callable[[float], None]
+) -> FittedWindow:
+    """Train; the same examples and recipe give the same weights."""
+    torch.manual_seed(recipe.seed)
+    torch.set_num_threads(1)  # so that sums keep their order
+    module = WindowModule(recipe.hidden)
+    optimiser = torch.optim.Adam(module.parameters(), lr=recipe.learning_rate)
+    per_epoch = -(-len(examples) // recipe.batch)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimiser, max_lr=recipe.learning_rate, total_steps=recipe.epochs * per_epoch
+    )
+    loss = nn.CrossEntropyLoss()
+    random = np.random.default_rng(recipe.seed)
+    views, labels = views_of(examples, recipe, random), torch.from_numpy(examples.label)
+    for _ in range(recipe.epochs):
+        order = torch.from_numpy(random.permutation(len(examples)))
+        total = 0.0
+        for start in range(0, len(order), recipe.batch):
+            rows = order[start : start + recipe.batch]
+            optimiser.zero_grad()
+            cost = loss(module(views[rows]), labels[rows])
+            cost.backward()
+            optimiser.step()
+            schedule.step()
+            total += float(cost.detach()) * len(rows)
+        progress(total / len(examples))
+    return _fitted(module, examples)
+
+
+def views_of(examples: Examples, recipe: WindowRecipe, random: np.random.Generator) -> torch.Tensor:
+    """All examples as the wheels see them, (m, 3, INPUTS): 1.5 kB each."""
+    views = torch.empty((len(examples), 3, INPUTS))
+    for start in range(0, len(examples), _CHUNK):
+        rows = np.arange(start, min(start + _CHUNK, len(examples)))
+        windows = blinded(examples.windows(rows), recipe.blinded, random)
+        views[start : start + _CHUNK] = torch.from_numpy(by_wheel(windows))
+    return views
+
+
+def blinded(windows: Floats, share: float, random: np.random.Generator) -> Floats:
+    """Some of the windows as a robot sees them that lacks a sensor."""
+    some = np.flatnonzero(random.random(len(windows)) < share)
+    kinds = random.integers(0, len(BLIND), len(some))
+    for kind, blind in enumerate(BLIND):
+        rows = some[kinds == kind]
+        windows[rows] = blind(windows[rows])
+    return windows
+
+
+def prior_of(labels: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Share of each hypothesis among the examples; the wheels are alike."""
+    share = np.bincount(labels, minlength=HYPOTHESES) / len(labels)
+    share[CONTROL : CONTROL + 3] = share[CONTROL : CONTROL + 3].mean()
+    share[MOTOR : MOTOR + 3] = share[MOTOR : MOTOR + 3].mean()
+    return share
+
+
+def _fitted(module: WindowModule, examples: Examples) -> FittedWindow:
+    weights = [p.detach().numpy().astype(np.float64) for p in module.parameters()]
+    rows = np.arange(0, len(examples), max(1, len(examples) // 20))[:20]
+    check = examples.windows(rows)
+    # In double precision, as the robot computes it: the trained weights are exact there.
+    with torch.no_grad():
+        scores = module.double()(torch.from_numpy(by_wheel(check.astype(np.float64))))
+    w1, b1, w2, b2, w3, b3 = weights
+    network = WindowNetwork(w1, b1, w2, b2, w3, b3, prior_of(examples.label))
+    return FittedWindow(network, check, scores.numpy())

@@ -1,0 +1,115 @@
+"""A robot in a training drive: the planar dynamics of the power model, disturbed and on a floor."""
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from tomr_power_model.dynamics import batch
+from tomr_power_model.dynamics.numbers import laid_out, timing_of
+from tomr_power_model.dynamics.simulation import Excitation, Readout, Steps, Variant, drive, shown
+from tomr_power_model.dynamics.vehicle import Vehicle, vehicle_of
+from tomr_power_model.robot import WHEELS, Robot
+from tomr_training.drives import Drive
+from tomr_training.labels import GroundTruth
+from tomr_training.planar.schedule import (
+    TICK,
+    commanded,
+    counted_shares,
+    disturbed,
+    tick_count,
+)
+
+Array = NDArray[np.float64]
+
+
+@frozen
+class Motion:
+    """What a robot did in a drive, in m steps of the simulation."""
+
+    variant: Variant
+    excitation: Excitation
+    steps: Steps
+    step: float  # s
+    ticks: int
+
+    @property
+    def reported(self) -> Array:
+        """Angles that ideal encoders report at the ends of the steps [rad], (m + 1, 3)."""
+        shares = counted_shares(self.excitation.inputs)
+        shares = np.repeat(shares, len(self.steps.speed) // len(shares), axis=0)
+        return integral(self.steps.speed * shares, self.step)
+
+    @property
+    def truth(self) -> GroundTruth:
+        """Power, reported speed and slip in each tick, (ticks, 3)."""
+        return GroundTruth(
+            power=self.tick_means(self.steps.power),
+            speed=self._tick_changes(self.reported) / TICK,
+            slip=self.tick_means(np.abs(self.steps.gap)),
+        )
+
+    def tick_means(self, values: Array) -> Array:
+        """Means in each tick of what has a mean for each step, (ticks, 3)."""
+        return self._tick_changes(integral(values, self.step)) / TICK
+
+    def _tick_changes(self, ends: Array) -> Array:
+        edges = np.arange(self.ticks + 1, dtype=np.float64) * TICK
+        return np.diff(at_times(ends, self.step, edges), axis=0)
+
+    def monitored(self, time: Array, span: float) -> tuple[Array, Array]:
+        """What power sensors average over the span before some times (k,).
+
+        Returns power of the drivers [W], (k, 3), and the supply's voltage [V], (k,).
+        """
+        count = len(time)
+        kinds = [(batch.POWER, wheel) for wheel in range(WHEELS)] + [(batch.SUPPLY_VOLTAGE, 0)]
+        rows = [(*kind, k * count, (k + 1) * count) for k, kind in enumerate(kinds)]
+        readout = Readout(
+            np.array(rows), np.tile(time, len(kinds)), np.full(count * len(kinds), span)
+        )
+        values = shown(self.variant, self.excitation, self.steps, readout)
+        values = values.reshape(len(kinds), count)
+        return values[:WHEELS].T, values[WHEELS]
+
+
+def run_plant(chosen: Drive) -> Motion:
+    """Drive the robot as it really is, with all that befalls it."""
+    return _run(_on_its_floor(chosen), disturbed(chosen, chosen.plant), chosen.plant, chosen)
+
+
+def run_believed(chosen: Drive) -> Motion:
+    """Drive the robot as it is described, with the commands and nothing else."""
+    robot = chosen.believed
+    return _run(vehicle_of(robot), commanded(chosen, robot), robot, chosen)
+
+
+def _on_its_floor(chosen: Drive) -> Vehicle:
+    mission, robot = chosen.mission, chosen.plant
+    friction = {"friction": mission.floor_friction}
+    physics = {**robot.physics, "contact.slip": (friction, friction, friction)}
+    loaded = evolve(robot, mass=robot.mass + mission.payload, physics=physics)
+    return evolve(vehicle_of(loaded), encoder_quantum=robot.sensors.encoder_resolution)
+
+
+def _run(vehicle: Vehicle, inputs: Array, robot: Robot, chosen: Drive) -> Motion:
+    nothing = np.zeros(3)
+    excitation = Excitation(0.0, inputs, nothing, nothing, 0.0, np.zeros(WHEELS))
+    variant = Variant(laid_out(vehicle))
+    steps = drive(variant, excitation)
+    step = timing_of(robot.controller.rate).step
+    return Motion(variant, excitation, steps, step, tick_count(chosen))
+
+
+def integral(means: Array, step: float) -> Array:
+    """Integral of what has a mean for each step, at the ends of the steps, (m + 1, ...)."""
+    found = np.zeros((len(means) + 1, *means.shape[1:]))
+    np.cumsum(means * step, axis=0, out=found[1:])
+    return found
+
+
+def at_times(ends: Array, step: float, time: Array) -> Array:
+    """Values at the ends of the steps (m + 1, c), read at times (k,), linear between."""
+    place = time / step
+    low = np.clip(place.astype(np.int64), 0, len(ends) - 2)
+    share = (place - low)[:, None]
+    return np.asarray(ends[low] + share * (ends[low + 1] - ends[low]))

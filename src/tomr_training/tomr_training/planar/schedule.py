@@ -1,0 +1,82 @@
+"""What befalls a drive, driver period by driver period: commands, faults, bumps."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomr_power_model.dynamics import layout as at
+from tomr_power_model.dynamics.numbers import no_input, timing_of
+from tomr_power_model.robot import WHEELS, Robot
+from tomr_sim_bridge.faults.floor_slippery import SLIPPERIEST
+from tomr_training.drives import Drive
+
+Array = NDArray[np.float64]
+
+TICK = 0.05  # s
+
+
+def tick_count(drive: Drive) -> int:
+    """Whole ticks of a drive."""
+    return math.floor(drive.length / TICK)
+
+
+def commanded(drive: Drive, robot: Robot) -> Array:
+    """Inputs of a robot that only hears the commands, (periods, input_size)."""
+    period = timing_of(robot.controller.rate).period
+    count = math.ceil(tick_count(drive) * TICK / period - 1e-6)
+    inputs = np.tile(no_input(WHEELS), (count, 1))
+    times, twists = drive.commands
+    starts = np.ceil((times + robot.controller.delay) / period - 1e-6).astype(np.int64)
+    lengths = np.diff(np.clip(np.append(starts, count), 0, count))
+    held = np.repeat(twists, lengths, axis=0)
+    inputs[count - len(held) :, at.COMMAND : at.COMMAND + 3] = held
+    return inputs
+
+
+def disturbed(drive: Drive, robot: Robot) -> Array:
+    """Inputs of a robot that faults and bumps befall as well, (periods, input_size)."""
+    inputs = commanded(drive, robot)
+    period = timing_of(robot.controller.rate).period
+
+    def rows(start: float, end: float) -> slice:
+        return slice(_period_at(start, period), _period_at(end, period))
+
+    for bump in drive.bumps:
+        push = slice(at.PUSH, at.PUSH + 3)
+        inputs[rows(bump.start, bump.start + bump.duration), push] += [*bump.force, bump.moment]
+    for fault in drive.mission.faults:
+        severity = float(str(fault.settings["severity"]))
+        when = rows(fault.start, drive.length if fault.end is None else fault.end)
+        if fault.fault_id == "floor_slippery":
+            fall = min(SLIPPERIEST / drive.mission.floor_friction, 1.0) ** severity
+            inputs[when, _column(at.FLOOR)] *= fall
+            continue
+        what = at.CONNECTED if fault.fault_id == "control_signal_lost" else at.COUNTS
+        wheel = int(str(fault.settings["wheel"])) - 1
+        inputs[when, _column(what)[wheel]] *= 1.0 - severity
+    return inputs
+
+
+def counted_shares(inputs: Array) -> Array:
+    """Share of the encoders' counts that is reported in each period, (periods, 3)."""
+    return np.asarray(inputs[:, _column(at.COUNTS)])
+
+
+def faulty_ticks(drive: Drive) -> NDArray[np.bool_]:
+    """Whether the fault is in force, (ticks,)."""
+    faulty = np.zeros(tick_count(drive), dtype=bool)
+    for fault in drive.mission.faults:
+        end = drive.length if fault.end is None else fault.end
+        faulty[math.floor(fault.start / TICK) : math.ceil(end / TICK)] = True
+    return faulty
+
+
+def _column(field: int) -> list[int]:
+    """Where the wheels' inputs of a kind stand."""
+    return [at.INPUT_HEADER + wheel * at.INPUT_WHEEL + field for wheel in range(WHEELS)]
+
+
+def _period_at(time: float, period: float) -> int:
+    """First period that does not begin before a time [s]."""
+    return math.ceil(time / period - 1e-6)

@@ -1,0 +1,205 @@
+"""`tomr_train`: train a classifier on simulated drives and store it with its provenance."""
+
+import argparse
+import json
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from attrs import asdict, evolve, frozen
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from tomr_fault_diag.classifier.belief import six_of
+from tomr_fault_diag.classifier.states import STATES
+from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
+from tomr_power_model.cli import EXIT_OK, run_main
+from tomr_power_model.errors import InputError
+
+_EPILOG = """\
+examples:
+  tomr_train --out window.npz
+  tomr_train --out codes.npz --classifier wang2024 --bands paper
+  tomr_diagnose BAG --set weights=window.npz
+
+Drives come from the planar dynamics of the power model and are drawn from the seeds FIRST,
+FIRST+1, ...; validation takes the seeds that follow and never trains. The same seeds give the same
+file, bit by bit, on the same machine. Needs torch: pip install -r requirements-train.txt."""
+
+_BANDS = {"calibrated": BandSettings(), "paper": PAPER_BANDS}
+Counts = NDArray[np.int64]
+Progress = Callable[[float], None]
+
+
+@frozen
+class Trained:
+    """What is stored: arrays, where they come from, and the confusion on unseen drives."""
+
+    arrays: dict[str, NDArray[np.float64]]
+    provenance: dict[str, object]
+    confusion: Counts  # (6, 6), rows true, per tick and without memory
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="tomr_train",
+        description="Train a classifier on thousands of simulated drives.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--out", type=Path, required=True, help="weights to write (.npz)")
+    parser.add_argument(
+        "--classifier",
+        choices=tuple(_KINDS),
+        default="window",
+        help="kind of the network (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--bands",
+        choices=tuple(_BANDS),
+        default="calibrated",
+        help="of wang2024: bands that make the codes (default: %(default)s)",
+    )
+    parser.add_argument("--drives", type=int, default=3600, help="to train on (default 3600)")
+    parser.add_argument("--validation", type=int, default=200, help="to validate on (default 200)")
+    parser.add_argument("--first-seed", type=int, default=10_000_000, help="of the drives")
+    parser.add_argument("--epochs", type=int, help="default: that of the recipe")
+    return parser
+
+
+def _train(arguments: Sequence[str] | None) -> int:
+    options = _parser().parse_args(arguments)
+    if options.drives < 1 or options.validation < 1:
+        raise InputError("--drives and --validation: give at least 1")
+    try:
+        import torch
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"{error.name} is missing: pip install -r requirements-train.txt"
+        ) from None
+    trained = _KINDS[options.classifier](options)
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    arrays: dict[str, Any] = {name: a.astype(np.float32) for name, a in trained.arrays.items()}
+    np.savez(options.out, **arrays)
+    between = options.first_seed + options.drives
+    confusion = trained.confusion
+    text = {
+        "classifier": options.classifier,
+        **trained.provenance,
+        "drives": {
+            "simulator": "planar dynamics of tomr_power_model",
+            "training_seeds": [options.first_seed, between - 1],
+            "validation_seeds": [between, between + options.validation - 1],
+        },
+        "torch": torch.__version__,
+        "states": [state.name for state in STATES],
+        "validation": {
+            "accuracy": float(np.trace(confusion) / confusion.sum()),
+            "confusion_rows_true": confusion.tolist(),
+        },
+    }
+    document = json.dumps(text, indent=2) + "\n"
+    options.out.with_suffix(".json").write_text(document, encoding="utf-8")
+    _print(confusion)
+    return EXIT_OK
+
+
+def _seeds(options: argparse.Namespace) -> tuple[range, range]:
+    between = options.first_seed + options.drives
+    return range(options.first_seed, between), range(between, between + options.validation)
+
+
+def _window(options: argparse.Namespace) -> Trained:
+    from tomr_training.fit_window import WindowRecipe, examples_of, fit_window
+    from tomr_training.planar.generate import generate
+
+    recipe = WindowRecipe()
+    recipe = evolve(recipe, epochs=options.epochs or recipe.epochs)
+    train, unseen = (generate(seeds, f"{len(seeds)} drives") for seeds in _seeds(options))
+    examples = examples_of(train, recipe)
+    with _epochs(recipe.epochs) as progress:
+        fitted = fit_window(examples, recipe, progress)
+    check = examples_of(unseen, evolve(recipe, healthy=1.0, faulty=1.0))
+    confusion = np.zeros((len(STATES), len(STATES)), dtype=np.int64)
+    for start in range(0, len(check), 10_000):
+        rows = np.arange(start, min(start + 10_000, len(check)))
+        scores = fitted.network.scores_of(check.windows(rows).astype(np.float64))
+        named = six_of(np.exp(scores - scores.max(axis=1, keepdims=True))).argmax(axis=1)
+        true = six_of(np.eye(scores.shape[1])[check.label[rows]]).argmax(axis=1)
+        np.add.at(confusion, (true, named), 1)
+    provenance: dict[str, object] = {
+        "recipe": asdict(recipe),
+        "training_ticks": len(examples),
+        "torch_check": {
+            "windows": np.round(fitted.check_windows.astype(float), 4).tolist(),
+            "scores": fitted.check_scores.tolist(),
+        },
+    }
+    return Trained(asdict(fitted.network), provenance, confusion)
+
+
+def _codes(options: argparse.Namespace) -> Trained:
+    from tomr_training.fit_codes import Recipe, examples_of, fit
+    from tomr_training.planar.generate import generate
+
+    bands = _BANDS[options.bands]
+    recipe = Recipe()
+    recipe = evolve(recipe, epochs=options.epochs or recipe.epochs)
+    train, unseen = (generate(seeds, f"{len(seeds)} drives") for seeds in _seeds(options))
+    examples, check = examples_of(train, bands), examples_of(unseen, bands)
+    with _epochs(recipe.epochs) as progress:
+        fitted = fit(examples, recipe, progress)
+    named = fitted.network.probabilities(check.codes.astype(np.float64)).argmax(axis=1)
+    confusion = np.zeros((len(STATES), len(STATES)), dtype=np.int64)
+    np.add.at(confusion, (check.labels.astype(np.int64), named), 1)
+    provenance: dict[str, object] = {
+        "network": "10-30-6, ReLU, softmax (Wang 2024, section 4)",
+        "recipe": asdict(recipe),
+        "bands": {"kind": options.bands, **asdict(bands)},
+        "training_ticks": len(examples.labels),
+        "torch_check": {
+            "inputs": fitted.check_inputs.astype(int).tolist(),
+            "probabilities": fitted.check_probabilities.astype(float).tolist(),
+        },
+    }
+    return Trained(asdict(fitted.network), provenance, confusion)
+
+
+_KINDS: dict[str, Callable[[argparse.Namespace], Trained]] = {
+    "window": _window,
+    "wang2024": _codes,
+}
+
+
+class _epochs:
+    """A progress bar over epochs that shows the loss."""
+
+    def __init__(self, count: int) -> None:
+        self._bar = tqdm(total=count, desc="epochs")
+
+    def __enter__(self) -> Progress:
+        def progress(loss: float) -> None:
+            self._bar.set_postfix(loss=f"{loss:.4f}")
+            self._bar.update()
+
+        return progress
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.close()
+
+
+def _print(confusion: Counts) -> None:
+    print(
+        f"{'true state':24}" + "".join(f"{n:>9}" for n in range(1, len(STATES) + 1)) + "   recall"
+    )
+    for number, (state, row) in enumerate(zip(STATES, confusion, strict=True)):
+        recall = row[number] / row.sum() if row.sum() else math.nan
+        print(f"{state.name:24}" + "".join(f"{count:9d}" for count in row) + f"   {recall:.3f}")
+    print(f"accuracy per tick, without memory: {np.trace(confusion) / confusion.sum():.4f}")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of `tomr_train`."""
+    return run_main(_train, arguments)
