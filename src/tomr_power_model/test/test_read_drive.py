@@ -20,7 +20,7 @@ from tomr_power_model.robot import read_description, shipped_robot
 MakeDrive = Callable[..., Drive]
 WriteBag = Callable[..., Path]
 ROBOT = shipped_robot("reference")
-CHOICE = Choice(keys=("robot.mass", "physics.friction.coulomb.torque"), alike=("all",))
+CHOICE = Choice(keys=("robot.mass", "physics.friction.coulomb.torque"), shared=("all",))
 
 
 def fitted(drive: Drive) -> tuple[float, float, Result]:
