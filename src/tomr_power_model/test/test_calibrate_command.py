@@ -32,7 +32,7 @@ def test_power_unlike_the_rest_is_refused_after_the_fit(make_drive: MakeDrive) -
     power[during(drive.power_time), 0] += 4.0
     samples = align([evolve(drive, power=power)], ROBOT, Timing())
     with pytest.raises(InputError, match=r"wheel_1_joint, (9.9|10.\d) s to 1[56].\d s: it draws"):
-        calibrate(read_description("reference"), "test", samples, (), Choice())
+        calibrate(read_description("reference"), "test", samples, (), choice=Choice())
 
 
 class _Links(HTMLParser):

@@ -40,7 +40,11 @@ FRICTION = (
 def calibrated(recorded: list[Drive], choice: Choice, held_out: tuple[Drive, ...] = ()) -> Result:
     """A calibration of the reference robot on recordings."""
     return calibrate(
-        VALUES, "test", align(recorded, ROBOT, TIMING), align(held_out, ROBOT, TIMING), choice
+        VALUES,
+        "test",
+        align(recorded, ROBOT, TIMING),
+        align(held_out, ROBOT, TIMING),
+        choice=choice,
     )
 
 
@@ -147,7 +151,7 @@ def test_motor_currents_without_sign_and_total_power_alone(make_drive: MakeDrive
     choice = Choice(keys=("physics.friction.coulomb.torque",), shared=("all",))
     heavier = {**VALUES, "physics.friction.coulomb.torque": 0.09}
     total = align([evolve(drive, power=empty)], ROBOT, TIMING)
-    found = calibrate(heavier, "test", total, (), choice)
+    found = calibrate(heavier, "test", total, (), choice=choice)
     assert found.fitted.numbers[0] == pytest.approx(0.06, rel=0.05)
 
     unsigned = {"measurement.quantity": "motor_current", "measurement.signed": False}
@@ -157,7 +161,9 @@ def test_motor_currents_without_sign_and_total_power_alone(make_drive: MakeDrive
     current = empty.copy()
     current[rows] = np.abs(InverseDynamics.of(ROBOT).power(motion.motion).current)
     currents = evolve(drive, power=current, total=drive.total[:0], total_time=drive.total_time[:0])
-    found = calibrate({**heavier, **unsigned}, "test", align([currents], robot, TIMING), (), choice)
+    found = calibrate(
+        {**heavier, **unsigned}, "test", align([currents], robot, TIMING), (), choice=choice
+    )
     assert found.fitted.numbers[0] == pytest.approx(0.06, rel=0.02)
     with pytest.raises(InputError, match="measures motor currents"):
         choose(

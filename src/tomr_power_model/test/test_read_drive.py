@@ -26,7 +26,7 @@ CHOICE = Choice(keys=("robot.mass", "physics.friction.coulomb.torque"), shared=(
 def fitted(drive: Drive) -> tuple[float, float, Result]:
     """Mass, friction and all else of a calibration on a recording."""
     samples = align([cleaned(drive, ROBOT)], ROBOT, Timing(window=1e-9))
-    result = calibrate(read_description("reference"), "test", samples, (), CHOICE)
+    result = calibrate(read_description("reference"), "test", samples, (), choice=CHOICE)
     friction = result.robot.effect("friction.coulomb")
     assert friction is not None
     return result.robot.mass, friction["torque"], result

@@ -149,7 +149,13 @@ def _calibrate(arguments: Sequence[str] | None) -> int:
     samples, unseen = align(fitted, robot, timing), align(held_out, robot, timing)
     with _bar("fitting", None, "evaluation") as tick:
         result = calibrate(
-            values, options.robot, samples, unseen, choice, not options.squares, tick
+            values,
+            options.robot,
+            samples,
+            unseen,
+            choice=choice,
+            robust=not options.squares,
+            tick=tick,
         )
     _print(result, [note for item in drives for note in item.notes])
     if options.out is not None:
@@ -168,7 +174,7 @@ def _drives(options: argparse.Namespace, robot: Robot) -> tuple[Drive, ...]:
     bags = [*options.bags, *options.holdout]
     skips = skips_of(options.skip, bags)
     with _bar("reading", len(bags), "bag") as tick:
-        drives = read_all(bags, robot, options.namespace, skips, tick)
+        drives = read_all(bags, robot, options.namespace, skips, tick=tick)
     check_duration(drives[: len(options.bags)])
     check_excitation(drives[: len(options.bags)], robot)
     findings: list[Finding] = []
@@ -211,9 +217,9 @@ def _fitted_text(source: str, values: Values, result: Result) -> str:
         values,
         result.parameters,
         [float(number) for number in result.fitted.numbers],
-        [float(half) for half in result.half_widths],
-        header,
-        provenance,
+        half_widths=[float(half) for half in result.half_widths],
+        header=header,
+        provenance=provenance,
     )
 
 

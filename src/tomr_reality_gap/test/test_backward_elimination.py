@@ -52,7 +52,7 @@ def second(monkeypatch: pytest.MonkeyPatch) -> object:
     """`second(best, rounds)`: what is left; rounds as (so far, tried together)."""
 
     def refine(
-        dataset: object, states: Sequence[tuple[Model, object]], *rest: object
+        dataset: object, states: Sequence[tuple[Model, object]], *rest: object, tick: object
     ) -> list[FittedModel]:
         return [_fitted(model) for model, _ in states]
 

@@ -40,7 +40,7 @@ def searched(
     )
     base, wheels = _base(made.robot), made.robot.wheel_names
     run = made.run(base.robot)
-    scales = scales_of(made.robot, run.speed, run.power, run.copper, 30.0)
+    scales = scales_of(made.robot, run.speed, run.power, run.copper, duration=30.0)
     ratios = traction_ratios_of(made.robot, run.speed, made.timeline.period)
     scales = evolve(scales, traction_ratios=ratios)
     parameters = nuisances(base, wheels, 0.02)
@@ -169,7 +169,7 @@ def test_delays_of_power_sensors_are_tried_far_from_none(
     simulation: RecordingSimulation,  # noqa: F811
 ) -> None:
     base, run = _base(simulation.robot), simulation.run(simulation.robot)
-    scales = scales_of(simulation.robot, run.speed, run.power, run.copper, 30.0)
+    scales = scales_of(simulation.robot, run.speed, run.power, run.copper, duration=30.0)
     alternatives = {
         item.parameters[0].discrete_offset
         for item in catalogue(base, simulation.robot.wheel_names, scales, 0.02)

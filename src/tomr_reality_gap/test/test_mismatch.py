@@ -38,7 +38,7 @@ def test_the_regime_and_the_intervals_are_where_the_change_is() -> None:
         1.0 * shows,
         np.full(len(speed), 10.0),
         0.8,
-        {"|omega| [rad/s]": speed, "load [W]": np.cos(POWER_TIME)},
+        variables={"|omega| [rad/s]": speed, "load [W]": np.cos(POWER_TIME)},
     )
     assert "|omega|" in found.regime
     assert found.intervals

@@ -33,4 +33,12 @@ def described(analysis: AnalysisResult, model: Model) -> str:
     findings = ", ".join(item.name for item in model.hypotheses)
     header = [f"{analysis.source}, with what reality showed besides:", findings]
     recordings = ", ".join(item.recorded.name for item in analysis.dataset.simulations)
-    return fitted_text(analysis.source, values, (), (), (), header, {"recordings": recordings})
+    return fitted_text(
+        analysis.source,
+        values,
+        (),
+        (),
+        half_widths=(),
+        header=header,
+        provenance={"recordings": recordings},
+    )

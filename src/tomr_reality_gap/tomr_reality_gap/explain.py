@@ -7,7 +7,7 @@ from attrs import evolve
 from numpy.typing import NDArray
 
 from tomr_power_model.estimation.noise import rows_of
-from tomr_reality_gap.alignment.response import leaps_of
+from tomr_reality_gap.alignment.response import controller_alternatives
 from tomr_reality_gap.alignment.simulation import Run
 from tomr_reality_gap.analysis import AnalysisResult
 from tomr_reality_gap.explanation import Explanation
@@ -50,14 +50,14 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
         wheels,
         ready.scales,
         request.tolerance,
-        orders,
-        leaps_of(ready.real, ready.robot),
-        {channel.kind for channel in dataset.channels}.isdisjoint(("power", "total")),
+        orders=orders,
+        alternatives=controller_alternatives(ready.real, ready.robot),
+        currents_only={channel.kind for channel in dataset.channels}.isdisjoint(("power", "total")),
     )
     tick = _Counter(progress, 3 * len(candidates) * len(ready.real))
     basis = basis_responses(dataset, base.robot, ready.scales.torque, orders)
     start = Model(base, parameters, (0.0,) * len(parameters))
-    found = forward_selection(dataset, start, candidates, basis, tick)
+    found = forward_selection(dataset, start, candidates, basis, tick=tick)
     check_same_robot(dataset, found.rounds[-1])
     found = backward_elimination(dataset, found, tick)
     baseline = SimulatorBaseline.of(ready.simulations, dataset, found.noise, base.robot)

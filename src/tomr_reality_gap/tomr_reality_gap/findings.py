@@ -58,7 +58,7 @@ class Findings:
             effect="unknown",
             where=names(effect.wheels, analysis.robot),
             parameters={},
-            located=located(channels, change / weight, weight, share, self.variables),
+            located=located(channels, change / weight, weight, share, variables=self.variables),
             holdout=self.score,
             rivals=(),
             confidence=0.9,
@@ -82,7 +82,7 @@ class Findings:
             effect=hypothesis.effect,
             where=hypothesis.where,
             parameters=self._parameters(number),
-            located=located(channels, change, weight, share, self.variables),
+            located=located(channels, change, weight, share, variables=self.variables),
             holdout=self.score,
             rivals=tuple(
                 Rival(other.effect, other.where, min(odd, 0.0), drive_for(_key_of(other)))

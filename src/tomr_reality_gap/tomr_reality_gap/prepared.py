@@ -197,7 +197,12 @@ def _scales(
     channels = [channel for item in simulations for channel in item.channels]
     currents = [channel.value for channel in channels if channel.kind == "current"]
     scales = scales_of(
-        robot, joined["speed"], joined["power"], joined["copper"], duration, currents
+        robot,
+        joined["speed"],
+        joined["power"],
+        joined["copper"],
+        duration=duration,
+        currents=currents,
     )
     ratios = [
         traction_ratios_of(robot, run.speed, item.timeline.period)

@@ -66,7 +66,7 @@ def explanation_of(
         findings=tuple(findings),
         unexplained_share=unexplained(_residuals(analysis, explained))[0] if findings else 0.0,
         comparisons=comparisons,
-        maps=maps_of(dataset.channels, before, rest, found.noise.sigma, variables),
+        maps=maps_of(dataset.channels, before, rest, found.noise.sigma, variables=variables),
         alignment=_alignment(analysis),
         detection_limits=detection_limits(analysis) if not findings else (),
         whiteness=_whiteness(analysis),

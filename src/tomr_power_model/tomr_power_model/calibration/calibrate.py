@@ -66,6 +66,7 @@ def read_all(
     robot: Robot,
     namespace: str | None,
     skips: Skips,
+    *,
     tick: Callable[[], None] = lambda: None,
 ) -> tuple[Drive, ...]:
     """Read recordings and cut out what is to be skipped. Raises InputError."""
@@ -96,6 +97,7 @@ def calibrate(
     place: str,
     samples: Sequence[Samples],
     held_out: Sequence[Samples],
+    *,
     choice: Choice,
     robust: bool = True,
     tick: Callable[[], None] = lambda: None,

@@ -76,7 +76,7 @@ def fit(problem: Problem, robust: bool = True, tick: Callable[[], None] = lambda
     scale, weight = _weights(problem, residual)
     slope = problem.jacobian(numbers, _STEP * std, tick) * std
     uncertainty = block_jackknife(
-        problem.samples, residual / scale, slope / scale[:, None], weight, robust
+        problem.samples, residual / scale, slope / scale[:, None], weight, robust=robust
     )
     return Fit(numbers, uncertainty, scale, converged)
 

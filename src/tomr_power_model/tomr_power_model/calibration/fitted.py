@@ -36,6 +36,7 @@ def fitted_text(
     values: Values,
     parameters: Sequence[Parameter],
     numbers: Sequence[float] | Array,
+    *,
     half_widths: Sequence[float] | Array,
     header: Sequence[str],
     provenance: Mapping[str, object],

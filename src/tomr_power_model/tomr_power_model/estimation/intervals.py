@@ -53,7 +53,7 @@ class Uncertainty:
 
 
 def block_jackknife(
-    recordings: Sequence[Sampled], standard: Array, slope: Array, weight: Array, robust: bool
+    recordings: Sequence[Sampled], standard: Array, slope: Array, weight: Array, *, robust: bool
 ) -> Uncertainty:
     """Uncertainty at the optimum.
 

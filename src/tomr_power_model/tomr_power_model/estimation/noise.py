@@ -72,6 +72,7 @@ def noise_of(
     residual: Array,
     columns: Matrix,
     value: Array,
+    *,
     time_derivative: Array,
     local: Sequence[Local] = (),
 ) -> Noise:

@@ -24,7 +24,7 @@ def backward_elimination(
     while len(best.model.hypotheses) > 1:
         count = len(best.model.hypotheses)
         fewer = [(best.model.without(number), best.sensors) for number in range(count)]
-        shorter = refine(dataset, fewer, jacobian, noise, tick)
+        shorter = refine(dataset, fewer, jacobian, noise, tick=tick)
         gains = [best.evidence - item.evidence for item in shorter]
         weakest = int(np.argmin(gains))
         if gains[weakest] > finding_cost(
@@ -49,7 +49,7 @@ def _alternatives(
     jacobian, noise = found.rounds[-1].jacobian, found.noise
     trials = [_stand_ins(found, best.model, at) for at in range(len(best.model.hypotheses))]
     states = [(model, best.sensors) for group in trials for model in group]
-    fitted = iter(refine(dataset, states, jacobian, noise, tick))
+    fitted = iter(refine(dataset, states, jacobian, noise, tick=tick))
     return [(best, *(next(fitted) for _ in group)) for group in trials]
 
 

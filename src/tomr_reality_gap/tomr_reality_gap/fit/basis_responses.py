@@ -40,6 +40,7 @@ def basis_responses(
     robot: Robot,
     torque: float,
     orders: Sequence[float] = (),
+    *,
     only: Collection[str] | None = None,
 ) -> BasisResponses:
     """Simulate families of torques on a robot.

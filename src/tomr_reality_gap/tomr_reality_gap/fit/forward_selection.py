@@ -58,6 +58,7 @@ def forward_selection(
     model: Model,
     candidates: Sequence[Hypothesis],
     basis: BasisResponses,
+    *,
     tick: Tick = lambda done: None,
 ) -> Selection:
     """Add hypotheses while they bring evidence; what has no name is not mistaken for noise."""
@@ -67,7 +68,7 @@ def forward_selection(
     while True:
         open_ones = [item for item in candidates if item.name not in model.names]
         jacobian = linearise(
-            dataset, model, open_ones, tick, rounds[-1].jacobian if rounds else None
+            dataset, model, open_ones, tick, before=rounds[-1].jacobian if rounds else None
         )
         rounds = [item.without_derivatives() for item in rounds]
         noise = _noise(dataset, jacobian, local)
@@ -96,7 +97,7 @@ def _tried(
 ) -> tuple[FittedModel, list[FittedModel]]:
     """Refine the model, and additions, alone and with the wrong parameters that they would need."""
     trials = [start, *(trial for item in screened for trial in item.starts)]
-    current, *fitted = refine(dataset, trials, jacobian, noise, tick)
+    current, *fitted = refine(dataset, trials, jacobian, noise, tick=tick)
     first = len(start[0].hypotheses)
     return current, [item for item in fitted if _is_large_enough(item, first)]
 
@@ -126,6 +127,6 @@ def _noise(dataset: Dataset, jacobian: Jacobian, local: Sequence[Local]) -> Nois
         dataset.value - jacobian.value,
         jacobian.matrix,
         jacobian.value,
-        jacobian.time_derivative,
-        local,
+        time_derivative=jacobian.time_derivative,
+        local=local,
     )

@@ -40,6 +40,7 @@ def linearise(
     model: Model,
     candidates: Sequence[Hypothesis],
     tick: Tick = lambda done: None,
+    *,
     before: Jacobian | None = None,
 ) -> Jacobian:
     """Derivatives at a model, by its parameters and those of candidates.

@@ -41,7 +41,7 @@ class FittedModel:
 
 
 def refine(
-    dataset: Dataset, states: Sequence[State], jacobian: Jacobian, noise: Noise, tick: Tick
+    dataset: Dataset, states: Sequence[State], jacobian: Jacobian, noise: Noise, *, tick: Tick
 ) -> list[FittedModel]:
     """Each model at its best offsets; nuisances keep the derivatives of `jacobian`."""
     shared = _Shared.of(jacobian, noise)

@@ -123,7 +123,7 @@ def beyond_baseline(
         worst = int(np.argmax(shares))
         last = found.rounds[-1]
         states = [(model.without(worst), found.best.sensors)]
-        best = refine(dataset, states, last.jacobian, found.noise, tick)[0]
+        best = refine(dataset, states, last.jacobian, found.noise, tick=tick)[0]
         groups = found.alternatives
         kept = groups if best.model.hypotheses else ()
         found = evolve(found, best=best, alternatives=(*kept[:worst], *kept[worst + 1 :]))

@@ -57,7 +57,9 @@ def discrepancy_torques(
     value, time_derivative, _ = dataset.with_time_derivative(robot, (), np.empty(0))
     residual, nothing = dataset.value - value, np.zeros((len(dataset.value), 1))
     local = basis.local
-    weight = noise_of(dataset.channels, residual, nothing, value, time_derivative, local).weight
+    weight = noise_of(
+        dataset.channels, residual, nothing, value, time_derivative=time_derivative, local=local
+    ).weight
     fitted = [
         solve(
             Gram.of(item.matrix, residual[item.rows], weight[item.rows]),

@@ -97,6 +97,7 @@ def catalogue(
     wheels: Sequence[str],
     scales: Scales,
     tolerance: float,
+    *,
     orders: Sequence[float] = (),
     alternatives: Mapping[str, float] = MappingProxyType({}),
     currents_only: bool = False,

@@ -44,6 +44,7 @@ def scales_of(
     speed: Array,
     power: Array,
     copper: Array,
+    *,
     duration: float,
     currents: Sequence[Array] = (),
 ) -> Scales:

@@ -24,6 +24,7 @@ def located(
     change: Array,
     weight: Array,
     share: float,
+    *,
     variables: Mapping[str, Array],
 ) -> Located:
     """Where a change of the simulated values shows.
@@ -117,6 +118,7 @@ def maps_of(
     before: Array,
     after: Array,
     sigma: Array,
+    *,
     variables: Mapping[str, Array],
 ) -> tuple[Map, ...]:
     """Mean squares of whitened residuals over each variable, before and after."""
