@@ -242,16 +242,24 @@ def _faults(
     return (PlannedFault(kind, start, end, settings),)
 
 
-def bumps(robot: Robot, random: np.random.Generator, count: int, until: float) -> tuple[Bump, ...]:
-    """So many bumps that start before a time [s]."""
+def bumps(
+    robot: Robot,
+    random: np.random.Generator,
+    count: int,
+    until: float,
+    *,
+    hardest: float = 2.5,
+    longest: float = 0.12,
+) -> tuple[Bump, ...]:
+    """So many bumps that start before a time [s], up to so hard [N/kg] and long [s]."""
     found = []
     for _ in range(count):
-        force = robot.mass * float(random.uniform(0.5, 2.5))
+        force = robot.mass * float(random.uniform(0.5, hardest))
         direction = float(random.uniform(-math.pi, math.pi))
         found.append(
             Bump(
                 start=float(random.uniform(0.0, until)),
-                duration=float(random.uniform(0.03, 0.12)),
+                duration=float(random.uniform(0.03, longest)),
                 force=(force * math.cos(direction), force * math.sin(direction)),
                 moment=float(random.uniform(-0.5, 0.5) * force * robot.robot_radius),
             )

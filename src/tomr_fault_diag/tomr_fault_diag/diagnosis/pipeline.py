@@ -17,6 +17,7 @@ from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_fault_diag.residuals.messages import residual_message
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
+from tomr_power_model.dynamics.binding import has_numba
 from tomr_power_model.messages.inputs import Complaints, Input, model_inputs
 from tomr_power_model.messages.intake import WheelFinder
 from tomr_power_model.messages.outgoing import Outgoing
@@ -48,7 +49,7 @@ class Pipeline:
         self.robot = robot
         self.settings = settings
         self.complaints = Complaints()
-        self._predictor = PowerPredictor(robot, settings.model)
+        self._predictor = PowerPredictor(robot, settings.model, is_compiled=has_numba())
         self._residuals = ResidualStage(robot, settings.residuals)
         self._classifier = FaultClassifier(make_judge(settings.classifier))
         wheels = WheelFinder(robot.wheel_names)

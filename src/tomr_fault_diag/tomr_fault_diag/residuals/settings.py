@@ -17,12 +17,12 @@ def _live(name: str, description: str, default: float, unit: str = "") -> Parame
 RESIDUAL_PARAMETERS: tuple[ParameterSpec, ...] = (
     *TICK_PARAMETERS,
     ParameterSpec("encoder_window", "span of the fit to the encoders", "float", 0.07, "s", 0.01, 1),
-    _live("band.relative", "of the modelled power or current of a motor", 0.65),
-    _live("band.power", "least band of a motor's power", 1.2, "W"),
+    _live("band.relative", "of the modelled power or current of a motor", 0.6),
+    _live("band.power", "least band of a motor's power", 1.1, "W"),
     _live("band.current", "least band of a motor's current", 0.15, "A"),
-    _live("band.transient", "part of the model's change over the last ticks", 0.5),
+    _live("band.transient", "part of the model's change over the last ticks", 0.32),
     _live("band.total_factor", "least band of the total, in those of a motor", 1.0),
-    _live("band.total_relative", "of the modelled total", 0.13),
+    _live("band.total_relative", "of the modelled total", 0.12),
     _live("band.speed", "least band of a wheel speed", 0.1, "rad/s"),
     _live("band.speed_relative", "of the expected wheel speed", 0.01),
     _live("band.speed_transient", "part of the expected speed's change over the last ticks", 0.1),
@@ -38,12 +38,12 @@ class BandSettings:
     a real driver is not known as well.
     """
 
-    relative: float = 0.65
-    power: float = 1.2  # W
+    relative: float = 0.6
+    power: float = 1.1  # W
     current: float = 0.15  # A
-    transient: float = 0.5
+    transient: float = 0.32
     total_factor: float = 1.0
-    total_relative: float = 0.13
+    total_relative: float = 0.12
     speed: float = 0.1  # rad/s
     speed_relative: float = 0.01
     speed_transient: float = 0.1

@@ -7,6 +7,7 @@ dynamics, and an effect is one file.
 """
 
 import hashlib
+import importlib.util
 import inspect
 import os
 import pickletools
@@ -130,6 +131,11 @@ def plain(effect_ids: tuple[str, ...]) -> Any:
 def _plain(present: tuple[str, ...], vocabulary: tuple[str, ...]) -> Any:
     """Where a law finds its parameters depends on the vocabulary as well."""
     return _bound(present, _as_it_is, _as_it_is)
+
+
+def has_numba() -> bool:
+    """Whether there is something to compile with."""
+    return importlib.util.find_spec("numba") is not None
 
 
 def compiled() -> Any:

@@ -60,6 +60,7 @@ from tomr_power_model.effects.base import Wheel
 
 # Wheel speed below which dry friction fades instead of jumping with the encoder's noise [rad/s].
 STICKING_SPEED = 0.1
+OBEYED = 1.3  # of dry friction: a voltage that asks a resting wheel for more has no effect
 MESHING_SWEEPS = 8  # at most, of friction that grows with the torque that the gear carries
 SETTLED = 1e-6  # N m
 
@@ -129,7 +130,10 @@ def drive_power(p: Numbers, m: Numbers, out: Mutable, n: int) -> None:
             dry, free = max(dry_torque(p, w, wheel), 0.0), carried + moving_torque(p, w, wheel)
             rests = 0.0
             if held == held:
-                rests = (1.0 - abs(moves)) * min(max(k / hot * held - free, -dry), dry)
+                hold = k / hot * held - free
+                # A driver that asks for more than friction holds is not obeyed: nothing is known.
+                if abs(hold) < OBEYED * dry:
+                    rests = (1.0 - abs(moves)) * min(max(hold, -dry), dry)
             torque = free + dry * moves + rests
             if abs(torque - before) < SETTLED:
                 break

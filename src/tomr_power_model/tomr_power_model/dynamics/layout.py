@@ -114,8 +114,9 @@ STATE_HEADER = 13
     GAP,  # sliding in the rolling direction [m/s]
     FORCE,  # traction while sliding [N]
     FIRST,  # speed at the start of a part of a step
-) = range(23)
-STATE_WHEEL = 23
+    ASKED,  # speed that the driver is asked for [rad/s]
+) = range(24)
+STATE_WHEEL = 24
 
 # Inputs of one driver period: u[FIELD].
 COMMAND = 0  # twist asked for, held over the period
@@ -147,8 +148,10 @@ OUT_HEADER = 2
     OUT_COPPER,  # i^2 R [W]
     OUT_TORQUE,  # of the motor at the wheel [N m]
     OUT_GAP,  # sliding of the contact in the rolling direction [m/s]
-) = range(7)
-OUT_WHEEL = 7
+    OUT_ASKED,  # speed that the driver is asked for [rad/s]
+    OUT_SUM,  # of its errors [rad]
+) = range(9)
+OUT_WHEEL = 9
 
 # Motion of the wheels, of which inverse dynamics tells the power: m[FIELD].
 MOTION_YAW = 0  # of a gyro [rad/s]; NaN: as the wheels say

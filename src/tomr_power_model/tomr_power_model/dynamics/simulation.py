@@ -17,24 +17,27 @@ from tomr_power_model.dynamics.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
-State = list[float]
+State = Any  # a list of floats, or an array where it is compiled
 
 _REST: Triple = (0.0, 0.0, 0.0)
 
 
 class Simulation:
-    """One vehicle, period by period, in plain Python: it starts at once and needs no compiler.
+    """One vehicle, period by period.
 
-    The state goes in and is changed in place; `layout` says where each number stands.
+    In plain Python it starts at once and needs no compiler; compiled it gives the same numbers a
+    hundred times as fast. The state goes in and is changed in place; `layout` says where each
+    number stands.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: Vehicle, *, is_compiled: bool = False) -> None:
         self.wheels = vehicle.count
-        self.numbers: list[float] = laid_out(vehicle).tolist()
+        self._made: Callable[[list[float]], State] = np.array if is_compiled else list
+        self.numbers = self._made(laid_out(vehicle).tolist())
         self.steps = int(self.numbers[at.SUBSTEPS])
-        self.period_s = self.numbers[at.PERIOD]
+        self.period_s = float(self.numbers[at.PERIOD])
         self.row = at.output_size(self.wheels)
-        self._step = plain(tuple(vehicle.physics))
+        self._step = compiled() if is_compiled else plain(tuple(vehicle.physics))
 
     def start(
         self,
@@ -55,20 +58,31 @@ class Simulation:
         state[at.TWIST : at.TWIST + 3], state[at.RATE : at.RATE + 3] = twist, rate
         state[at.HEADING] = heading
         state[at.STATE_HEADER + at.ANGLE :: at.STATE_WHEEL] = [angle] * self.wheels
-        motion = [0.0] * (at.MOTION_HEADER + self.wheels * at.MOTION_WHEEL)
-        power = [0.0] * (self.wheels * at.POWER_WHEEL)
+        state = self._made(state)
+        motion = self._made([0.0] * (at.MOTION_HEADER + self.wheels * at.MOTION_WHEEL))
+        power = self._made([0.0] * (self.wheels * at.POWER_WHEEL))
         self._step.begin(self.numbers, state, motion, power, self.wheels)
         return state
 
-    def inputs(self) -> list[float]:
+    def inputs(self) -> State:
         """Inputs of a period in which nothing is asked for, to be changed."""
-        return list(no_input(self.wheels))
+        return self._made(list(no_input(self.wheels)))
 
-    def advance(self, state: State, inputs: Sequence[float]) -> list[float]:
+    def advance(self, state: State, inputs: State) -> list[float]:
         """One driver period; returns the outputs of its steps, one after another."""
-        out = [0.0] * (self.steps * self.row)
+        out = self._made([0.0] * (self.steps * self.row))
         self._step.advance(self.numbers, state, inputs, out, self.wheels)
-        return out
+        return as_list(out)
+
+    def of_wheels(self, state: State, field: int) -> list[float]:
+        """A field of all wheels."""
+        return as_list(state[at.STATE_HEADER + field :: at.STATE_WHEEL])
+
+
+def as_list(values: State) -> list[float]:
+    """Numbers of a state or of outputs as a list."""
+    found: list[float] = values if isinstance(values, list) else values.tolist()
+    return found
 
 
 @frozen
@@ -116,6 +130,8 @@ class Steps:
     copper: Array  # i^2 R [W], (m, n)
     torque: Array  # of each motor at the wheel [N m], (m, n)
     gap: Array  # sliding of the contacts in the rolling direction [m/s], (m, n)
+    asked: Array  # wheel speeds that the drivers are asked for [rad/s], (m, n)
+    sums: Array  # of the drivers' errors [rad], (m, n)
 
     @classmethod
     def of(cls, out: Array, wheels: int) -> "Steps":
@@ -133,6 +149,8 @@ class Steps:
             copper=own[..., at.OUT_COPPER],
             torque=own[..., at.OUT_TORQUE],
             gap=own[..., at.OUT_GAP],
+            asked=own[..., at.OUT_ASKED],
+            sums=own[..., at.OUT_SUM],
         )
 
 

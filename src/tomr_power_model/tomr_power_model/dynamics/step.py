@@ -34,6 +34,7 @@ from tomr_power_model.dynamics.layout import (
     ALONG,
     ANGLE,
     ASK,
+    ASKED,
     AUXILIARY,
     BACKWARD,
     COMMAND,
@@ -67,12 +68,14 @@ from tomr_power_model.dynamics.layout import (
     MEASURED,
     NEXT,
     NOMINAL_RADIUS,
+    OUT_ASKED,
     OUT_COPPER,
     OUT_CURRENT,
     OUT_GAP,
     OUT_HEADER,
     OUT_POWER,
     OUT_SPEED,
+    OUT_SUM,
     OUT_TILT,
     OUT_TORQUE,
     OUT_VOLTAGE,
@@ -194,6 +197,7 @@ def control(p: Numbers, s: Mutable, u: Numbers, n: int) -> None:
     for i in range(n):
         w, z = HEADER + i * stride, STATE_HEADER + i * STATE_WHEEL
         asked = p[w + ASK] * vx + p[w + ASK + 1] * vy + p[w + ASK + 2] * wz
+        s[z + ASKED] = asked
         error = asked - s[z + MEASURED]
         total = s[z + INTEGRAL] + error * p[PERIOD]
         summed = total if p[BACKWARD] > 0.0 else s[z + INTEGRAL]
@@ -321,6 +325,8 @@ def report(p: Numbers, s: Mutable, u: Numbers, out: Mutable, row: int, n: int) -
         out[o + OUT_COPPER] = copper
         out[o + OUT_TORQUE] = k * current
         out[o + OUT_GAP] = s[z + GAP]
+        out[o + OUT_ASKED] = s[z + ASKED]
+        out[o + OUT_SUM] = s[z + INTEGRAL]
         s[z + TRANSMITTED] = k * current - p[w + ROTOR] * (s[z + NEXT] - s[z + SPEED]) / duration
         s[z + SPEED] = s[z + NEXT]
         s[z + ANGLE] += mean * duration

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 _STOP: Triple = (0.0, 0.0, 0.0)
-_REMEMBERED = 600_000_000  # ns, of simulated motion
+_REMEMBERED = 400_000_000  # ns, of simulated motion
 _STEADY = 50  # commands over which the phase of the periods is averaged
 
 
@@ -66,48 +66,45 @@ class SimulatedMotion:
     """Angles and speeds of the wheels at the steps' ends, of the last moments."""
 
     def __init__(self) -> None:
-        self._points: deque[tuple[int, list[float], list[float]]] = deque()
+        self._points: deque[tuple[float, ...]] = deque()  # time since the origin [ns], rad, rad/s
+        self._origin = 0
 
     def add(self, time_ns: int, angles: list[float], speeds: list[float]) -> None:
         """Take the end of a step: wheels [rad] and [rad/s]."""
-        self._points.append((time_ns, angles, speeds))
-        while self._points[0][0] < time_ns - _REMEMBERED:
-            self._points.popleft()
+        points = self._points
+        if not points:
+            self._origin = time_ns
+        points.append((float(time_ns - self._origin), *angles, *speeds))
+        while points[0][0] < points[-1][0] - _REMEMBERED:
+            points.popleft()
 
-    def angles(self, times_ns: Sequence[int]) -> Array:
-        """Angles at some times [rad], (k, n); beyond the ends as the speed there has it."""
-        return self._at(times_ns, 1)
-
-    def mean_motion(self, tick_ns: int, period_ns: int) -> tuple[Array, Array]:
-        """Mean speed and acceleration in the window that ends at a tick, (n,) each."""
-        window = (tick_ns - period_ns, tick_ns)
+    def beside(
+        self, times_ns: Sequence[int], tick_ns: int, period_ns: int
+    ) -> tuple[Array, Array, Array, Array]:
+        """Angles at some times [rad], (k, n), and at the middle of the window that ends at a tick;
+        mean speed and acceleration in that window, (n,) each. Beyond the ends as the nearest step
+        has it.
+        """
+        rows = np.array(self._points)
+        time, wheels = rows[:, 0], rows.shape[1] // 2
+        window = (tick_ns - period_ns, tick_ns - period_ns // 2, tick_ns)
+        wanted = np.array([*times_ns, *window], dtype=np.float64) - self._origin
+        place = np.clip(np.searchsorted(time, wanted) - 1, 0, max(len(time) - 2, 0))
+        after = np.minimum(place + 1, len(time) - 1)
+        length = np.maximum(time[after] - time[place], 1.0)
+        share = ((wanted - time[place]) / length)[:, None]
+        found = rows[place, 1:] + share * (rows[after, 1:] - rows[place, 1:])
+        first, middle, last = found[-3:]
         rate = 1e9 / period_ns
-        first, last = self._at(window, 1)
-        before, after = self._at(window, 2)
-        return rate * (last - first), rate * (after - before)
-
-    def _at(self, times_ns: Sequence[int], column: int) -> Array:
-        origin = self._points[0][0]
-        time = np.array([point[0] - origin for point in self._points])
-        values = np.array([point[column] for point in self._points])
-        wanted = np.array([at_ns - origin for at_ns in times_ns])
-        found = np.stack([np.interp(wanted, time, own) for own in values.T], axis=1)
-        if len(time) < 2:
-            return found
-        # Beyond the ends as the nearest step has it.
-        first, last = (
-            (values[k + 1] - values[k]) / max(time[k + 1] - time[k], 1) for k in (0, len(time) - 2)
-        )
-        found += np.minimum(wanted, 0)[:, None] * first
-        found += np.maximum(wanted - time[-1], 0)[:, None] * last
-        return np.asarray(found)
+        speed, change = rate * (last - first)[:wheels], rate * (last - first)[wheels:]
+        return found[:-3, :wheels], middle[:wheels], speed, change
 
 
 class CommandPath:
     """Runs the closed loop over the commands, each held until the next."""
 
-    def __init__(self, robot: Robot, timing: CommandTiming) -> None:
-        self._simulation = Simulation(vehicle_of(robot))
+    def __init__(self, robot: Robot, timing: CommandTiming, *, is_compiled: bool = False) -> None:
+        self._simulation = Simulation(vehicle_of(robot), is_compiled=is_compiled)
         self._step = to_ns(self._simulation.period_s)
         self._part = self._step // self._simulation.steps
         self._timing = timing
@@ -125,7 +122,7 @@ class CommandPath:
         self._taken = 0  # commands
         self.motion = SimulatedMotion()
         resting = [0.0] * self._simulation.wheels
-        self._means = resting, resting, self._simulation.numbers[at.VOLTAGE]
+        self._means = resting, resting, float(self._simulation.numbers[at.VOLTAGE])
 
     def command(self, stamp_ns: int, twist: Triple) -> None:
         """Take a command; one that comes too late for its stamp acts from the next period on."""
@@ -135,16 +132,7 @@ class CommandPath:
         """A field of the wheels' state, see `layout`; empty before the first command."""
         if self.state is None:
             return []
-        first, last = at.STATE_HEADER + field, len(self.state)
-        return self.state[first : last : at.STATE_WHEEL]
-
-    def asked(self) -> list[float]:
-        """Wheel speeds that the drivers are asked for now [rad/s]."""
-        assert self.state is not None
-        p, (x, y, yaw) = self._simulation.numbers, self.state[at.SET : at.SET + 3]
-        records = range(at.HEADER, int(p[at.COUPLING]), int(p[at.STRIDE]))
-        rows = [p[first + at.ASK : first + at.ASK + 3] for first in records]
-        return [a * x + b * y + c * yaw for a, b, c in rows]
+        return self._simulation.of_wheels(self.state, field)
 
     def over(self, tick_ns: int, seen: Seen) -> Commanded | None:
         """Means over the window that ends at a tick, or None without a command.

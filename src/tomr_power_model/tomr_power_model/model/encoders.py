@@ -17,7 +17,7 @@ Triple = tuple[float, float, float]
 _KEPT = 200  # samples whose stamps are looked at
 _LEAST = 50
 _EVERY = 25  # samples: how often
-_LONG = 200_000_000  # ns, of the fit beside a simulation
+LONG_S = 0.2  # of the fit beside a simulation
 _FIT = 5  # samples that it takes
 UNKNOWN: Triple = (float("nan"), float("nan"), float("nan"))
 
@@ -40,15 +40,18 @@ class WheelEstimate:
     angle: Array = field(factory=lambda: np.full(3, np.nan))  # rad
 
 
+UNKNOWN_MOTION = WheelEstimate(np.full(3, np.nan), np.full(3, np.nan))
+
+
 class Reference(Protocol):
     """A simulation of the motion that encoders measure."""
 
-    def angles(self, times_ns: Sequence[int]) -> Array:
-        """Angles of the wheels at some times [rad], (k, 3)."""
-        ...
-
-    def mean_motion(self, tick_ns: int, period_ns: int) -> tuple[Array, Array]:
-        """Mean speed and acceleration in the window that ends at a tick, (3,) each."""
+    def beside(
+        self, times_ns: Sequence[int], tick_ns: int, period_ns: int
+    ) -> tuple[Array, Array, Array, Array]:
+        """Angles at some times [rad], (k, 3), and at the middle of the window that ends at a tick;
+        mean speed and acceleration in that window, (3,) each.
+        """
         ...
 
 
@@ -131,17 +134,20 @@ class EncoderWindow:
         What is measured less what is simulated changes slowly: it is fitted over a longer span,
         which leaves less of the noise in the acceleration.
         """
-        samples = self._until(tick_ns, max(self._span, _LONG))
+        samples = self._until(tick_ns, max(self._span, round(1e9 * LONG_S)))
         positions = np.array([sample.position for sample in samples])
         if len(samples) < _FIT or np.isnan(positions).any():
             return self.at(tick_ns)
         middle = tick_ns - self._period // 2
         times = self._times(samples, middle)
-        ahead = positions - reference.angles([middle + time for time in times])
+        simulated, angle, speed, acceleration = reference.beside(
+            [middle + time for time in times], tick_ns, self._period
+        )
+        ahead = positions - simulated
         offset = _weights(times, 2) @ (ahead - ahead[0])
-        speed, acceleration = reference.mean_motion(tick_ns, self._period)
-        angle = reference.angles([middle])[0] + ahead[0] + offset[0]
-        return WheelEstimate(speed + offset[1], acceleration + 2.0 * offset[2], angle)
+        return WheelEstimate(
+            speed + offset[1], acceleration + 2.0 * offset[2], angle + ahead[0] + offset[0]
+        )
 
     def _until(self, tick_ns: int, span: int | None = None) -> list[EncoderSample]:
         """Samples of the window, and the two newest where encoders are slower than it."""

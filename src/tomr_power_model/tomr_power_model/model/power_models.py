@@ -2,15 +2,16 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from attrs import frozen
 
 from tomr_power_model.dynamics import layout as at
-from tomr_power_model.dynamics.binding import plain
+from tomr_power_model.dynamics.binding import compiled, plain
 from tomr_power_model.dynamics.drives import PowerModel, WheelMotion
 from tomr_power_model.dynamics.numbers import laid_out
+from tomr_power_model.dynamics.simulation import as_list
 from tomr_power_model.dynamics.vehicle import plant_numbers, vehicle_of
 from tomr_power_model.model.commanded import Commanded
 from tomr_power_model.model.means import Means
@@ -22,6 +23,7 @@ from tomr_power_model.wang2024 import WANG2024_PARAMETERS, Coefficients, Wang202
 _PARTS = 10  # of a tick, where torque ripples with the wheels' angles
 _KEPT = 600_000_000  # ns, of simulated steps: longer than a sample may be old
 # Columns of the simulated steps, of the first wheel.
+_UNKNOWN = [math.nan] * WHEELS
 _POWER, _CURRENT, _AT_MOTOR, _TOTAL = 0, WHEELS, 2 * WHEELS, 3 * WHEELS
 
 
@@ -85,7 +87,7 @@ class TickPower(Protocol):
         ...
 
 
-Maker = Callable[[Robot, Mapping[str, object], float], TickPower]
+Maker = Callable[[Robot, Mapping[str, object], float, bool], TickPower]
 
 
 @frozen
@@ -100,7 +102,8 @@ POWER_MODELS: dict[str, Kind] = {}
 
 
 def power_model(name: str, *parameters: ParameterSpec) -> Callable[[Maker], Maker]:
-    """Register a maker of a power model; it gets the robot, checked parameters and a tick [s]."""
+    """Register a maker of a power model; it gets the robot, checked parameters, a tick [s]
+    and whether to compile."""
 
     def register(make: Maker) -> Maker:
         POWER_MODELS[name] = Kind(make, parameters)
@@ -117,9 +120,10 @@ def own_parameters() -> tuple[ParameterSpec, ...]:
 class Physical:
     """Our dynamics: the simulation's own power, and inverse dynamics of the encoders."""
 
-    def __init__(self, robot: Robot, period_s: float) -> None:
-        self._numbers: list[float] = laid_out(vehicle_of(robot)).tolist()
-        self._step = plain(tuple(robot.physics))
+    def __init__(self, robot: Robot, period_s: float, is_compiled: bool) -> None:
+        made: Callable[[list[float]], Any] = np.array if is_compiled else list
+        self._made, self._numbers = made, made(laid_out(vehicle_of(robot)).tolist())
+        self._step = compiled() if is_compiled else plain(tuple(robot.physics))
         parts = _PARTS if "drivetrain.torque_ripple" in robot.physics else 1
         self._instants = [period_s * ((k + 0.5) / parts - 0.5) for k in range(parts)]
         self._constant = [motor.wheel_constant for motor in robot.motors]
@@ -140,10 +144,13 @@ class Physical:
         """As simulated, and as the monitors show it, in the windows in which they measure."""
         for start, row in zip(motion.starts, motion.rows, strict=True):
             self._trace.add(start, motion.length, self._columns(motion, row))
-        read = self._read
-        current = [read(_CURRENT, wheel, windows) for wheel in range(WHEELS)]
-        power = [read(_POWER, wheel, windows) for wheel in range(WHEELS)]
-        at_motor = [read(_AT_MOTOR, wheel, windows) for wheel in range(WHEELS)]
+        ends, length = windows.of_total()
+        total = _mean([self._trace.mean(_TOTAL, end, length) for end in ends])
+
+        def read(column: int) -> list[float]:
+            return [self._read(column, wheel, windows) for wheel in range(WHEELS)]
+
+        current = at_motor = power = _UNKNOWN
         shown = [monitor.shown for monitor in self._monitors]
         if self._reads_motor:  # monitors take the current for that of the supply
             seen = [
@@ -155,9 +162,7 @@ class Physical:
             ]
             current = seen
         else:
-            power = [show(p) for show, p in zip(shown, power, strict=True)]
-        ends, length = windows.of_total()
-        total = _mean([self._trace.mean(_TOTAL, end, length) for end in ends])
+            power = [show(p) for show, p in zip(shown, read(_POWER), strict=True)]
         return Means(motion.torque, current, at_motor, power, None, motion.voltage, total)
 
     def _read(self, column: int, wheel: int, windows: Windows) -> float:
@@ -203,8 +208,9 @@ class Physical:
             angle = motion.angle[wheel] + instant * (speed + 0.5 * change * instant)
             rise, held = motion.rise[wheel], motion.held[wheel]
             row += [speed + change * instant, change, angle, 0.0, rise, held]
-        out = [0.0] * (WHEELS * at.POWER_WHEEL)
-        self._step.drive_power(self._numbers, row, out, WHEELS)
+        found = self._made([0.0] * (WHEELS * at.POWER_WHEEL))
+        self._step.drive_power(self._numbers, self._made(row), found, WHEELS)
+        out = as_list(found)
         return [out[first : first + 4] for first in range(0, len(out), at.POWER_WHEEL)]
 
 
@@ -236,13 +242,17 @@ class FromMotion:
 
 
 @power_model("physical")
-def physical(robot: Robot, values: Mapping[str, object], period_s: float) -> TickPower:
+def physical(
+    robot: Robot, values: Mapping[str, object], period_s: float, is_compiled: bool
+) -> TickPower:
     """The dynamics with the effects of robot.yaml."""
-    return Physical(robot, period_s)
+    return Physical(robot, period_s, is_compiled)
 
 
 @power_model("wang2024", *WANG2024_PARAMETERS)
-def wang2024(robot: Robot, values: Mapping[str, object], period_s: float) -> TickPower:
+def wang2024(
+    robot: Robot, values: Mapping[str, object], period_s: float, is_compiled: bool
+) -> TickPower:
     """The paper's energy model, with coefficients fitted to a healthy drive."""
     model = Wang2024Model.of(robot, Coefficients.of(values))
     step = laid_out(vehicle_of(robot))[at.STEP]

@@ -16,6 +16,7 @@ from tomr_power_model.messages.readings import NAN, UNKNOWN_READING, SupplyReadi
 from tomr_power_model.model.commanded import Commanded, CommandPath, CommandTiming, Seen
 from tomr_power_model.model.encoders import (
     UNKNOWN,
+    UNKNOWN_MOTION,
     EncoderSample,
     EncoderWindow,
     Triple,
@@ -43,24 +44,28 @@ _UNKNOWN: Readings = (UNKNOWN_READING, UNKNOWN_READING, UNKNOWN_READING)
 class PowerPredictor:
     """Streaming core of the power model; driven by stamps, the same online and offline.
 
-    Feed messages as they come, then take the predictions that are `due`.
+    Feed messages as they come, then take the predictions that are `due`. Compiled dynamics give
+    the same numbers: worth their start where recordings are read.
     """
 
-    def __init__(self, robot: Robot, settings: ModelSettings | None = None) -> None:
+    def __init__(
+        self, robot: Robot, settings: ModelSettings | None = None, *, is_compiled: bool = False
+    ) -> None:
         self.settings = given = settings or ModelSettings()
         self._robot = robot
         self._period_s = period_s = 1e-9 * given.ticks.period
         make = POWER_MODELS[given.power_model].make
-        self._model = make(robot, given.model_values, period_s)
+        self._model = make(robot, given.model_values, period_s, is_compiled)
         self._clock = TickClock(given.ticks)
         timing = CommandTiming(given.ticks.period, given.command_timeout, given.stale)
-        self._path = CommandPath(robot, timing)
+        self._path = CommandPath(robot, timing, is_compiled=is_compiled)
         self._resting = RestingDrivers(robot.controller, WHEELS)
         self._encoders = EncoderWindow(given.encoder_window, given.ticks.period, given.stale)
         self._window = to_ns(robot.sensors.power_window)
         self._reads_motor = robot.measurement.quantity == "motor_current"
         numbers = plant_numbers(vehicle_of(robot))
         self._drop, self._cold = numbers.voltage_drop, numbers.initial_rise
+        self._ripples = "drivetrain.torque_ripple" in robot.physics
         self._sticks = any(EFFECTS[name].dry_torque is not None for name in robot.physics)
         self._to_twist = Body.of(robot).to_twist.tolist()
         # The paper's coefficients are fitted to what the monitors showed.
@@ -118,7 +123,9 @@ class PowerPredictor:
         return arrival
 
     def _predict(self, tick: int) -> Prediction:
-        estimate = self._encoders.at(tick)
+        # What the simulation needs to begin, or to be put where a ripple acts.
+        starts = self._path.state is None or self._ripples
+        estimate = self._encoders.at(tick) if starts else UNKNOWN_MOTION
         speed, gyro = estimate.speed.tolist(), self._yaw_rate(tick)
         before = self._moved(estimate, -0.5 * self._period_s)
         commanded = self._path.over(tick, Seen(self._twist(speed), before, self._heading))

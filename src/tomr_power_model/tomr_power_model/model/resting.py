@@ -16,8 +16,8 @@ from tomr_power_model.model.commanded import CommandPath
 from tomr_power_model.robot import Controller
 
 _UNKNOWN = float("nan")
-_MOVING = 1.0  # rad/s
-_FADES = 0.01  # share of the difference in a tick in motion
+MOVING = 1.0  # rad/s
+FADES = 0.01  # share of the difference in a tick in motion
 
 
 class RestingDrivers:
@@ -48,14 +48,14 @@ class RestingDrivers:
         if path.state is None:
             return [_UNKNOWN] * self._wheels
         found = []
-        asked, sums = path.asked(), path.wheel(at.INTEGRAL)
+        asked, sums = path.wheel(at.ASKED), path.wheel(at.INTEGRAL)
         turned = path.wheel(at.TURNED)
         for wheel in range(self._wheels):
             ahead = turned[wheel] - angle[wheel]
             if ahead == ahead and self._offset[wheel] != self._offset[wheel]:
                 self._offset[wheel] = -ahead
-            if abs(speed[wheel]) > _MOVING:
-                self._offset[wheel] -= _FADES * (ahead + self._offset[wheel])
+            if abs(speed[wheel]) > MOVING:
+                self._offset[wheel] -= FADES * (ahead + self._offset[wheel])
             known = ahead + self._offset[wheel]
             total = sums[wheel] + (known if known == known else 0.0)
             error = asked[wheel] - speed[wheel]

@@ -22,6 +22,8 @@ from tomr_training.planar.sensors import Signals
 NORMAL, SLIP, CONTROL, MOTOR = 0, 1, 2, 5
 IGNORED = -1  # aftermath of a fault, a healthy robot that slips
 
+_HARDEST, _LONGEST = 3.0, 0.22  # N/kg and s, of a shove
+_FRICTION = (0.5, 6.0)  # of the reference's
 _SETTLED = 10  # ticks without a difference after which a robot is as good as healthy
 _CHUNK = 20  # drives that a process takes at a time
 
@@ -55,15 +57,24 @@ def _reference() -> Robot:
 
 
 def training_drive(reference: Robot, seed: int, kind: str | None = "any") -> Drive:
-    """A random drive, every other one bumped before it starts: shoved, not faulty.
+    """A random drive, and what makes robots that are healthy look otherwise.
 
-    Every other robot has drivers that are tuned a little off as well: a real driver's loop is
-    never known as well as a simulated one's.
+    Every other one is bumped before it starts, most are shoved: that is no fault. Every other
+    robot has drivers that are tuned a little off as well: a real driver's loop is never known as
+    well as a simulated one's. Friction is of any make, from a half to six times the reference's.
     """
     drive = random_drive(reference, seed, kind)
     random = np.random.default_rng([seed, 2])
     early = bumps(drive.believed, random, int(random.integers(0, 2)), 1.0)
-    drive = evolve(drive, bumps=(*drive.bumps, *early))
+    shoves = bumps(
+        drive.believed,
+        random,
+        int(random.integers(0, 4)),
+        drive.length,
+        hardest=_HARDEST,
+        longest=_LONGEST,
+    )
+    drive = _of_any_make(evolve(drive, bumps=(*drive.bumps, *early, *shoves)), random)
     if seed % 2:
         return drive
     given = drive.plant.controller
@@ -78,6 +89,21 @@ def training_drive(reference: Robot, seed: int, kind: str | None = "any") -> Dri
         acceleration_limit=off(given.acceleration_limit),
     )
     return evolve(drive, plant=evolve(drive.plant, controller=tuned))
+
+
+def _of_any_make(drive: Drive, random: np.random.Generator) -> Drive:
+    """The drive with another dry friction, as really is and as described."""
+    factor = float(np.exp(random.uniform(*np.log(_FRICTION))))
+
+    def changed(robot: Robot) -> Robot:
+        wheels = robot.physics["friction.coulomb"]
+        first, second, third = (
+            None if own is None else {"torque": factor * own["torque"]} for own in wheels
+        )
+        coulomb = {"friction.coulomb": (first, second, third)}
+        return evolve(robot, physics={**robot.physics, **coulomb})
+
+    return evolve(drive, plant=changed(drive.plant), believed=changed(drive.believed))
 
 
 def simulate(drive: Drive) -> LabelledTicks:
