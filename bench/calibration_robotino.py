@@ -44,11 +44,11 @@ _CENTER = ("--fit", "robot.mass_center.x", "--fit", "robot.mass_center.y")
 MODELS: dict[str, tuple[str, ...] | None] = {
     "bench friction": None,
     "Coulomb": _COULOMB,
-    "Coulomb, roller drag": (*_COULOMB, *_CENTER, "--alike", f"{_DRAG}.coefficient"),
+    "Coulomb, roller drag": (*_COULOMB, *_CENTER, "--shared", f"{_DRAG}.coefficient"),
     "Coulomb, roller drag, slip": (
         *_COULOMB,
         *_CENTER,
-        *("--alike", f"{_DRAG}.coefficient", "--alike", f"{_DRAG}.slip"),
+        *("--shared", f"{_DRAG}.coefficient", "--shared", f"{_DRAG}.slip"),
     ),
 }
 

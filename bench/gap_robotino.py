@@ -116,7 +116,9 @@ def described(bench: Bench, integral: float, delay: float) -> str:
     values["controller.integral"] = integral
     values["controller.delay"] = float(f"{delay:.3g}")
     header = [f"{SOURCE}, friction, gain and delay fitted to {_IDENTIFIED}"]
-    return fitted_text(SOURCE, values, (), (), (), header, {"bags": [_IDENTIFIED]})
+    return fitted_text(
+        SOURCE, values, (), (), half_widths=(), header=header, provenance={"bags": [_IDENTIFIED]}
+    )
 
 
 def drives(folder: Path, surface: str, first: float, speed: float) -> tuple[Path, ...]:

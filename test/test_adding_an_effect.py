@@ -27,11 +27,11 @@ from tomr_power_model.effects import EFFECTS, Effect, EffectParameter, Hypothesi
 from tomr_power_model.effects.missions import SPEEDS
 from tomr_power_model.effects.scales import Scales
 from tomr_power_model.errors import InputError
+from tomr_power_model.estimation.parameter import per_wheel
 from tomr_power_model.nodes.robot_parameters import declare_robot
 from tomr_power_model.robot import GRAVITY, Robot, load_robot, robot_from_parameters, shipped_robot
 from tomr_power_model.robot.files import read_description
 from tomr_reality_gap.hypotheses.catalogue import catalogue
-from tomr_reality_gap.hypotheses.knobs import turned
 from tomr_reality_gap.report.words import effect_words
 
 EFFECT = "contact.rolling_growth"
@@ -117,14 +117,15 @@ def test_inverse_dynamics_see_it(robot: Robot, dynamics: str) -> None:
 
 
 def test_calibration_fits_it_by_default(values: dict[str, object]) -> None:
-    free = [item for item in choose(values, WHEELS, Choice(), "robot.yaml") if EFFECT in item.key]
-    assert [item.key for item in free] == [f"physics.{EFFECT}.{w}.coefficient" for w in WHEELS]
+    chosen = choose(values, WHEELS, Choice(), "robot.yaml")
+    free = [item for item in chosen if EFFECT in item.keys[0]]
+    assert [item.keys[0] for item in free] == [f"physics.{EFFECT}.{w}.coefficient" for w in WHEELS]
     assert {(item.unit, item.lower, item.upper) for item in free} == {("s^2/rad^2", 0.0, 0.1)}
     assert drive_for(KEY) == RollingGrowth.shown_by
 
 
 def test_the_gap_tool_offers_it_as_a_hypothesis() -> None:
-    base = turned(read_description("reference"), WHEELS, "robot.yaml")
+    base = per_wheel(read_description("reference"), WHEELS, "robot.yaml")
     scales = Scales(
         torque=0.1,
         speed=5.0,
@@ -142,11 +143,11 @@ def test_the_gap_tool_offers_it_as_a_hypothesis() -> None:
     )
     found = [item for item in catalogue(base, WHEELS, scales, 0.02) if item.effect == EFFECT]
     assert [item.where for item in found] == [("all_wheels",), *((wheel,) for wheel in WHEELS)]
-    (knob,) = found[0].knobs
-    assert (knob.unit, knob.lower, knob.upper) == ("s^2/rad^2", 0.0, 0.1)
-    assert base.given(found[1].start).by(found[1].knobs, [1e-3]).robot.effect(EFFECT, 0) == {
-        "coefficient": 1e-3
-    }
+    (size,) = found[0].parameters
+    assert (size.unit, size.lower, size.upper) == ("s^2/rad^2", 0.0, 0.1)
+    assert base.given(found[1].start).offset(found[1].parameters, [1e-3]).robot.effect(
+        EFFECT, 0
+    ) == {"coefficient": 1e-3}
     assert effect_words(EFFECT) == "Rolling resistance grows with speed"
 
 

@@ -19,17 +19,17 @@ from concealed.claims import Truth, truth_of
 from others import cli, tables
 from others.compare import excluded, row_of, score_refit, score_sparse
 from others.library import columns_of, series_of, shape_of
-from others.refit import Fit, Refit, fitted, half_widths, knobs_of
+from others.refit import Fit, Refit, fitted, half_widths, parameters_of
 from others.sparse import Equation, Sparse
 
 from tomr_power_model.cli import run_main
 from tomr_power_model.drive.record import Drive
+from tomr_power_model.estimation.noise import rows_of
+from tomr_power_model.estimation.parameter import ParameterisedRobot, per_wheel
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import read_description, robot_from_parameters
 from tomr_reality_gap.alignment.channels import channels_of
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
-from tomr_reality_gap.fit.noise import rows_of
-from tomr_reality_gap.hypotheses.knobs import Turned, turned
 
 WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
 SECONDS = 10.0
@@ -37,13 +37,13 @@ NOISE = {"power": 0.05, "total": 0.1, "voltage": 3e-3, "speed": 0.01, "yaw": 2e-
 
 
 @pytest.fixture(scope="module")
-def base() -> Turned:
+def base() -> ParameterisedRobot:
     values = dict(read_description("reference"))
-    return turned(values, robot_from_parameters(values, "reference").wheel_names, "reference")
+    return per_wheel(values, robot_from_parameters(values, "reference").wheel_names, "reference")
 
 
 @pytest.fixture(scope="module")
-def forward(base: Turned) -> RecordingSimulation:
+def forward(base: ParameterisedRobot) -> RecordingSimulation:
     """A drive in all directions, its channels not measured yet."""
     robot = base.robot
     command_time = np.arange(0.0, SECONDS, 0.05)
@@ -75,7 +75,7 @@ def forward(base: Turned) -> RecordingSimulation:
     return RecordingSimulation.of(recorded, robot, channels_of(recorded, robot))
 
 
-def measuring(forward: RecordingSimulation, real: Turned) -> RecordingSimulation:
+def measuring(forward: RecordingSimulation, real: ParameterisedRobot) -> RecordingSimulation:
     """What the drive would have shown, had the robot been another one."""
     random = np.random.default_rng(0)
     value = forward.predict([real.robot])[0]
@@ -86,26 +86,26 @@ def measuring(forward: RecordingSimulation, real: Turned) -> RecordingSimulation
     return evolve(forward, channels=tuple(channels))
 
 
-def test_everything_but_settings_and_geometry_is_refitted(base: Turned) -> None:
-    knobs = {knob.name: knob for knob in knobs_of(base, WHEELS)}
-    assert {"robot.mass", "robot.inertia_z", "supply.auxiliary_power"} <= set(knobs)
-    assert len(knobs["motor.rotor_inertia"].keys) == 3
+def test_everything_but_settings_and_geometry_is_refitted(base: ParameterisedRobot) -> None:
+    parameters = {parameter.name: parameter for parameter in parameters_of(base, WHEELS)}
+    assert {"robot.mass", "robot.inertia_z", "supply.auxiliary_power"} <= set(parameters)
+    assert len(parameters["motor.rotor_inertia"].keys) == 3
     for general in ("motor.resistance", "motor.torque_constant"):
         group, leaf = general.split(".")
-        assert all(f"{group}.{wheel}.{leaf}" in knobs for wheel in WHEELS)
-    assert {key for key in base.values if key.startswith("physics.")} <= set(knobs)
+        assert all(f"{group}.{wheel}.{leaf}" in parameters for wheel in WHEELS)
+    assert {key for key in base.values if key.startswith("physics.")} <= set(parameters)
     held = ("controller.", "robot.wheel_", "robot.robot_radius", "supply.nominal")
-    assert not any(name.startswith(held) for name in knobs)
+    assert not any(name.startswith(held) for name in parameters)
 
 
 def test_a_refit_finds_parameters_that_are_wrong(
-    base: Turned, forward: RecordingSimulation
+    base: ParameterisedRobot, forward: RecordingSimulation
 ) -> None:
     names = ("robot.mass", "motor.wheel_2_joint.resistance", "motor.wheel_3_joint.resistance")
-    knobs = [knob for knob in knobs_of(base, WHEELS) if knob.name in names]
+    parameters = [item for item in parameters_of(base, WHEELS) if item.name in names]
     off = {"robot.mass": 1.1, "motor.wheel_2_joint.resistance": 1.3}
-    turns = [knob.spread * (off.get(knob.name, 1.0) - 1.0) for knob in knobs]
-    fits = fitted(measuring(forward, base.by(knobs, turns)), base, knobs)
+    turns = [parameter.prior_std * (off.get(parameter.name, 1.0) - 1.0) for parameter in parameters]
+    fits = fitted(measuring(forward, base.offset(parameters, turns)), base, parameters)
     for fit in fits:
         actual = fit.nominal * off.get(fit.key, 1.0)
         assert fit.value == pytest.approx(actual, abs=2.5 * fit.half_width)
@@ -114,11 +114,13 @@ def test_a_refit_finds_parameters_that_are_wrong(
 
 
 def test_a_refit_stops_at_twice_the_described_value(
-    base: Turned, forward: RecordingSimulation
+    base: ParameterisedRobot, forward: RecordingSimulation
 ) -> None:
-    knobs = [knob for knob in knobs_of(base, WHEELS) if knob.name == "robot.mass"]
-    heavy = base.by(knobs, [1.4 * knobs[0].spread])
-    (fit,) = fitted(measuring(forward, heavy), base, knobs)
+    parameters = [
+        parameter for parameter in parameters_of(base, WHEELS) if parameter.name == "robot.mass"
+    ]
+    heavy = base.offset(parameters, [1.4 * parameters[0].prior_std])
+    (fit,) = fitted(measuring(forward, heavy), base, parameters)
     assert fit.at_bound
     assert fit.value == pytest.approx(2.0 * fit.nominal, rel=1e-3)
 
@@ -146,7 +148,7 @@ def test_intervals_are_those_of_least_squares() -> None:
     ],
 )
 def test_an_effect_has_the_terms_that_the_library_says(
-    effect: str, values: Mapping[str, float], base: Turned, forward: RecordingSimulation
+    effect: str, values: Mapping[str, float], base: ParameterisedRobot, forward: RecordingSimulation
 ) -> None:
     """Its own terms tell most of the power that it adds, and more with those that come along."""
     given = {f"physics.{effect}.{name}": value for name, value in values.items()}

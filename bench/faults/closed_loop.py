@@ -10,8 +10,8 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.drive.cut import names_of
+from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.robot import WHEELS
-from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.prepared import prepared
 from tomr_reality_gap.request import Request
 

@@ -6,11 +6,11 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.estimation.noise import rows_of
+from tomr_power_model.estimation.parameter import ParameterisedRobot
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
-from tomr_reality_gap.fit.noise import rows_of
-from tomr_reality_gap.hypotheses.knobs import Turned
 from tomr_reality_gap.prepared import prepared
 from tomr_reality_gap.request import Request
 
@@ -22,7 +22,7 @@ class Case:
     """What a user has: a description, a recording to fit and one of another drive."""
 
     identity: str
-    base: Turned
+    base: ParameterisedRobot
     robot: Robot
     real: RecordingSimulation
     held: RecordingSimulation

@@ -19,10 +19,16 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from others.case import Case, nrmse, residuals
+from tomr_power_model.estimation.noise import rows_of
+from tomr_power_model.estimation.parameter import (
+    Parameter,
+    ParameterisedRobot,
+    bounds_of,
+    unit_of,
+    wheel_key,
+)
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
-from tomr_reality_gap.fit.noise import rows_of
-from tomr_reality_gap.hypotheses.knobs import Knob, Turned, bounds_of, unit_of, wheel_key
 
 Array = NDArray[np.float64]
 
@@ -58,7 +64,7 @@ class Refit:
     after: float
 
 
-def knobs_of(base: Turned, wheels: Sequence[str]) -> tuple[Knob, ...]:
+def parameters_of(base: ParameterisedRobot, wheels: Sequence[str]) -> tuple[Parameter, ...]:
     """What is refitted: motors and physics of each wheel, the body, the auxiliary power.
 
     Held is what is known or would have no interval: geometry; the drivers' gains, which with
@@ -74,35 +80,39 @@ def knobs_of(base: Turned, wheels: Sequence[str]) -> tuple[Knob, ...]:
         if isinstance(value, int | float) and value > 0.0:
             low, high = bounds_of(keys[0])
             low, high = max(_LEAST * value, low) - value, min(_MOST * value, high) - value
-            found.append(Knob(name, keys, unit_of(keys[0]), value, _STEP * value, low, high))
+            unit, step = unit_of(keys[0]), _STEP * value
+            found.append(Parameter(name, keys, unit, value, step=step, lower=low, upper=high))
     return tuple(found)
 
 
 def refit(case: Case) -> Refit:
     """Refit a case on its recording and score it on its holdout."""
-    knobs = knobs_of(case.base, case.robot.wheel_names)
-    fits = fitted(case.real, case.base, knobs)
+    parameters = parameters_of(case.base, case.robot.wheel_names)
+    fits = fitted(case.real, case.base, parameters)
     changes = [fit.value - fit.nominal for fit in fits]
-    robots = [case.base.robot, case.base.by(knobs, changes).robot]
+    robots = [case.base.robot, case.base.offset(parameters, changes).robot]
     values = case.held.predict(robots)
     before, after = (nrmse(case.held.channels, residuals(case.held, item)) for item in values)
     return Refit(fits, before, after)
 
 
-def fitted(simulation: RecordingSimulation, base: Turned, knobs: Sequence[Knob]) -> tuple[Fit, ...]:
+def fitted(
+    simulation: RecordingSimulation, base: ParameterisedRobot, parameters: Sequence[Parameter]
+) -> tuple[Fit, ...]:
     """Parameters that bring the simulation closest to a recording; its delay is fitted besides."""
     measured = np.concatenate([item.value for item in simulation.channels])
-    scale = np.array([knob.spread for knob in knobs])
+    scale = np.array([parameter.prior_std for parameter in parameters])
     bounds = [
-        np.append(1.0 + [getattr(knob, side) for knob in knobs] / scale, delay)
+        np.append(1.0 + [getattr(parameter, side) for parameter in parameters] / scale, delay)
         for side, delay in (("lower", -_LATEST), ("upper", _LATEST))
     ]
-    point = np.append(np.ones(len(knobs)), 0.0)  # shares of the described values, and the delay
+    # Shares of the described values, and the delay.
+    point = np.append(np.ones(len(parameters)), 0.0)
     weight = np.ones_like(measured)
 
     def residual(points: Array) -> Array:
         robots = [
-            _later(base.by(knobs, (column[:-1] - 1.0) * scale).robot, column[-1] * _UNIT)
+            _later(base.offset(parameters, (column[:-1] - 1.0) * scale).robot, column[-1] * _UNIT)
             for column in points.T
         ]
         return np.asarray(((simulation.predict(robots) - measured) * weight).T)
@@ -119,8 +129,17 @@ def fitted(simulation: RecordingSimulation, base: Turned, knobs: Sequence[Knob])
     near = _AT_BOUND * (bounds[1] - bounds[0])
     stuck = (point - bounds[0] < near) | (bounds[1] - point < near)
     return tuple(
-        Fit(knob.name, knob.spread, knob.spread * x, float(width), knob.unit, bool(at))
-        for knob, x, width, at in zip(knobs, point[:-1].tolist(), widths, stuck[:-1], strict=True)
+        Fit(
+            parameter.name,
+            parameter.prior_std,
+            parameter.prior_std * x,
+            float(width),
+            parameter.unit,
+            bool(at),
+        )
+        for parameter, x, width, at in zip(
+            parameters, point[:-1].tolist(), widths, stuck[:-1], strict=True
+        )
     )
 
 

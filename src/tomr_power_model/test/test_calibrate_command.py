@@ -32,7 +32,7 @@ def test_power_unlike_the_rest_is_refused_after_the_fit(make_drive: MakeDrive) -
     power[during(drive.power_time), 0] += 4.0
     samples = align([evolve(drive, power=power)], ROBOT, Timing())
     with pytest.raises(InputError, match=r"wheel_1_joint, (9.9|10.\d) s to 1[56].\d s: it draws"):
-        calibrate(read_description("reference"), "test", samples, (), Choice())
+        calibrate(read_description("reference"), "test", samples, (), choice=Choice())
 
 
 class _Links(HTMLParser):
@@ -93,7 +93,7 @@ def test_a_fitted_file_of_another_robot_is_refused(
 ) -> None:
     bag = write_bag(make_drive(ROBOT, 1, seconds=25.0), tmp_path / "tour")
     out = tmp_path / "fitted.yaml"
-    assert main([str(bag), "--robot", "reference", "--out", str(out), "--alike", "all"]) == 0
+    assert main([str(bag), "--robot", "reference", "--out", str(out), "--shared", "all"]) == 0
     tree = yaml.safe_load(out.read_text())
     tree["/**"]["ros__parameters"]["robot"]["wheel_radius"] = 0.06
     out.write_text(yaml.safe_dump(tree))
@@ -105,7 +105,7 @@ def test_a_fitted_file_of_another_robot_is_refused(
 def test_a_recorded_fault_is_one_line_and_skipping_it_helps(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    command = [str(FAULTY_BAG), "--robot", "reference", "--alike", "all"]
+    command = [str(FAULTY_BAG), "--robot", "reference", "--shared", "all"]
     assert main(command) == 2
     told = capsys.readouterr().err
     assert told.startswith(

@@ -1,4 +1,4 @@
-"""Calibration on drives whose truth is known: values, intervals, what cannot be told."""
+"""Calibration on drives whose truth is known: values, intervals, what is not determined."""
 
 from collections.abc import Callable
 
@@ -9,13 +9,14 @@ from scipy.ndimage import maximum_filter1d
 
 from tomr_power_model.calibration.calibrate import Result, Timing, align, calibrate
 from tomr_power_model.calibration.fit import fit
-from tomr_power_model.calibration.parameters import Choice, choose, with_values
+from tomr_power_model.calibration.parameters import Choice, choose
 from tomr_power_model.calibration.problem import Problem, modelled_power
 from tomr_power_model.calibration.samples import Samples, samples_of
 from tomr_power_model.drive.motion import wheel_motion
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.dynamics.drives import InverseDynamics, WheelMotion
 from tomr_power_model.errors import InputError
+from tomr_power_model.estimation.parameter import ParameterisedRobot, prior_stds
 from tomr_power_model.robot import (
     GRAVITY,
     Robot,
@@ -39,14 +40,18 @@ FRICTION = (
 def calibrated(recorded: list[Drive], choice: Choice, held_out: tuple[Drive, ...] = ()) -> Result:
     """A calibration of the reference robot on recordings."""
     return calibrate(
-        VALUES, "test", align(recorded, ROBOT, TIMING), align(held_out, ROBOT, TIMING), choice
+        VALUES,
+        "test",
+        align(recorded, ROBOT, TIMING),
+        align(held_out, ROBOT, TIMING),
+        choice=choice,
     )
 
 
 def fitted_values(result: Result) -> dict[str, tuple[float, float]]:
     """Value and half of the 95 % interval by key."""
-    rows = zip(result.free, result.fitted.numbers, result.half_widths, strict=True)
-    return {item.key: (number, half) for item, number, half in rows}
+    rows = zip(result.parameters, result.fitted.numbers, result.half_widths, strict=True)
+    return {item.keys[0]: (number, half) for item, number, half in rows}
 
 
 def test_values_are_recovered_within_their_intervals(
@@ -101,17 +106,21 @@ def correlated_samples(seed: int, phi: float, truth: Robot) -> Samples:
 
 
 def test_intervals_hold_for_correlated_noise() -> None:
-    choice = Choice(keys=(*FRICTION, "robot.mass"), alike=("all",))
-    free = tuple(choose(VALUES, ROBOT.wheel_names, choice, "test"))
+    choice = Choice(keys=(*FRICTION, "robot.mass"), shared=("all",))
+    parameters = tuple(choose(VALUES, ROBOT.wheel_names, choice, "test"))
+    described = ParameterisedRobot(VALUES, "test")
     inside = []
     for seed in range(40):
         random = np.random.default_rng(seed + 500)
-        truth = [item.believed * (1.0 + 0.05 * random.standard_normal()) for item in free]
-        robot = robot_from_parameters(with_values(VALUES, free, truth), "test")
+        truth = {
+            item.name: item.prior_mean * (1.0 + 0.05 * random.standard_normal())
+            for item in parameters
+        }
+        robot = described.given(truth).robot
         samples = correlated_samples(seed, 0.9, robot)
-        found = fit(Problem(VALUES, free, (samples,), "test"))
-        width = found.spread.factor * found.spread.deviation * [item.spread for item in free]
-        inside.append(np.abs(found.numbers - truth) < width)
+        found = fit(Problem(described, parameters, (samples,)))
+        width = found.uncertainty.factor * found.uncertainty.deviation * prior_stds(parameters)
+        inside.append(np.abs(found.numbers - list(truth.values())) < width)
     # 160 intervals; counted as independent they would cover 91.6 % to 98.4 % in 19 of 20 runs.
     assert 0.90 < np.mean(inside) < 0.995
 
@@ -120,7 +129,7 @@ def test_what_the_drives_do_not_tell_is_said(make_drive: MakeDrive) -> None:
     result = calibrated([make_drive(ROBOT, 1)], Choice())
     told = "\n".join(result.warnings)
     # Supply power depends on R and k through R / k^2 alone.
-    assert "motor.resistance and motor.torque_constant are told only together" in told
+    assert "motor.resistance and motor.torque_constant are determined only together" in told
     assert "motor.torque_constant of every wheel: not determined" in told
     assert "robot.inertia_z:" not in told
     steady = make_drive(ROBOT, 1)
@@ -139,10 +148,10 @@ def test_what_the_drives_do_not_tell_is_said(make_drive: MakeDrive) -> None:
 def test_motor_currents_without_sign_and_total_power_alone(make_drive: MakeDrive) -> None:
     drive = make_drive(ROBOT, 2, noise=0.0)
     empty = np.full_like(drive.power, np.nan)
-    choice = Choice(keys=("physics.friction.coulomb.torque",), alike=("all",))
+    choice = Choice(keys=("physics.friction.coulomb.torque",), shared=("all",))
     heavier = {**VALUES, "physics.friction.coulomb.torque": 0.09}
     total = align([evolve(drive, power=empty)], ROBOT, TIMING)
-    found = calibrate(heavier, "test", total, (), choice)
+    found = calibrate(heavier, "test", total, (), choice=choice)
     assert found.fitted.numbers[0] == pytest.approx(0.06, rel=0.05)
 
     unsigned = {"measurement.quantity": "motor_current", "measurement.signed": False}
@@ -152,7 +161,9 @@ def test_motor_currents_without_sign_and_total_power_alone(make_drive: MakeDrive
     current = empty.copy()
     current[rows] = np.abs(InverseDynamics.of(ROBOT).power(motion.motion).current)
     currents = evolve(drive, power=current, total=drive.total[:0], total_time=drive.total_time[:0])
-    found = calibrate({**heavier, **unsigned}, "test", align([currents], robot, TIMING), (), choice)
+    found = calibrate(
+        {**heavier, **unsigned}, "test", align([currents], robot, TIMING), (), choice=choice
+    )
     assert found.fitted.numbers[0] == pytest.approx(0.06, rel=0.02)
     with pytest.raises(InputError, match="measures motor currents"):
         choose(
@@ -213,3 +224,10 @@ def test_roller_drag_turns_with_the_slip_by_hand() -> None:
     np.testing.assert_allclose(
         torque, force * 0.05 / np.sqrt(3.0) * np.array([[0, 1, -1]]), atol=1e-9
     )
+
+
+def test_a_tolerance_is_half_of_a_range_in_which_all_is_equally_likely() -> None:
+    choice = Choice(keys=("robot.mass",), tolerances={"robot.mass": 0.03})
+    (mass,) = choose(VALUES, ROBOT.wheel_names, choice, "test")
+    assert mass.prior_mean == ROBOT.mass
+    assert mass.prior_std == pytest.approx(0.03 * ROBOT.mass / 3.0**0.5)

@@ -20,13 +20,13 @@ from tomr_power_model.robot import read_description, shipped_robot
 MakeDrive = Callable[..., Drive]
 WriteBag = Callable[..., Path]
 ROBOT = shipped_robot("reference")
-CHOICE = Choice(keys=("robot.mass", "physics.friction.coulomb.torque"), alike=("all",))
+CHOICE = Choice(keys=("robot.mass", "physics.friction.coulomb.torque"), shared=("all",))
 
 
 def fitted(drive: Drive) -> tuple[float, float, Result]:
     """Mass, friction and all else of a calibration on a recording."""
     samples = align([cleaned(drive, ROBOT)], ROBOT, Timing(window=1e-9))
-    result = calibrate(read_description("reference"), "test", samples, (), CHOICE)
+    result = calibrate(read_description("reference"), "test", samples, (), choice=CHOICE)
     friction = result.robot.effect("friction.coulomb")
     assert friction is not None
     return result.robot.mass, friction["torque"], result

@@ -13,7 +13,7 @@ from tqdm import tqdm
 from tomr_power_model.calibration.calibrate import Result, Timing, align, calibrate, read_all
 from tomr_power_model.calibration.fitted import fitted_text
 from tomr_power_model.calibration.following import lost_wheels
-from tomr_power_model.calibration.parameters import Choice, Values
+from tomr_power_model.calibration.parameters import Choice
 from tomr_power_model.calibration.scoring import COLUMNS
 from tomr_power_model.calibration.tables import rows, tables
 from tomr_power_model.cli import EXIT_OK, run_main
@@ -23,6 +23,7 @@ from tomr_power_model.drive.excitation import check_excitation
 from tomr_power_model.drive.quality import Finding, refuse, sensor_faults
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
+from tomr_power_model.estimation.parameter import Values
 from tomr_power_model.robot import (
     Robot,
     load_robot,
@@ -39,14 +40,14 @@ examples:
   tomr_calibrate tour1 tour2 --robot my_robot.yaml --out fitted.yaml --holdout tour3
   tomr_calibrate day/* --robot my_robot.yaml --out fitted.yaml --report report.html
   tomr_calibrate tour --robot my_robot.yaml --out fitted.yaml --fit robot.mass \\
-      --alike physics.contact.roller_drag.coefficient --tolerance robot.mass=0.02
+      --shared physics.contact.roller_drag.coefficient --tolerance robot.mass=0.02
   tomr_calibrate tour --robot my_robot.yaml --out fitted.yaml --skip tour=8.0:14.5
 
 Drive about three minutes on the floor that counts: starts and stops, several headings and speeds,
 spins, and ten seconds of standing. Without --fit, mass, inertia, resistance, torque constant,
 auxiliary power and the values of all effects in the description are fitted, those of wheels and
-motors one by one (--alike all: together). A value is believed by its --tolerance, a relative
-standard deviation, and moves from there as far as the recordings say.
+motors one by one (--shared all: together). --tolerance says how far a stated value may be off, as
+a share of it and to either side, as in tomr_gap: its prior's standard deviation is REL / sqrt(3).
 
 An accuracy is 1 - sum|P - P_model| / sum|P| over every sample of whole drives.
 
@@ -68,13 +69,19 @@ def _parser() -> argparse.ArgumentParser:
     add("--report", type=Path, metavar="HTML", help="write a page with tables and pictures")
     add("--fit", action="append", default=[], metavar="KEY", help="fit this value; repeatable")
     add(
-        "--alike",
+        "--shared",
         action="append",
         default=[],
         metavar="KEY",
         help="fit this as one value for all wheels instead of one each; repeatable, `all`: every",
     )
-    add("--tolerance", action="append", default=[], metavar="KEY=REL", help="belief in a value")
+    add(
+        "--tolerance",
+        action="append",
+        default=[],
+        metavar="KEY=REL",
+        help="how far this value may be off",
+    )
     add("--skip", action="append", default=[], metavar="BAG=FROM:TO", help="leave out [s]")
     add("--namespace", help="of the robot's topics, if a bag holds several")
     add(
@@ -133,7 +140,7 @@ def _calibrate(arguments: Sequence[str] | None) -> int:
     values = read_description(options.robot)
     choice = Choice(
         keys=tuple(options.fit),
-        alike=tuple(options.alike),
+        shared=tuple(options.shared),
         tolerances=_numbers(options.tolerance, "--tolerance"),
     )
     timing = _timing(options)
@@ -142,7 +149,13 @@ def _calibrate(arguments: Sequence[str] | None) -> int:
     samples, unseen = align(fitted, robot, timing), align(held_out, robot, timing)
     with _bar("fitting", None, "evaluation") as tick:
         result = calibrate(
-            values, options.robot, samples, unseen, choice, not options.squares, tick
+            values,
+            options.robot,
+            samples,
+            unseen,
+            choice=choice,
+            robust=not options.squares,
+            tick=tick,
         )
     _print(result, [note for item in drives for note in item.notes])
     if options.out is not None:
@@ -161,7 +174,7 @@ def _drives(options: argparse.Namespace, robot: Robot) -> tuple[Drive, ...]:
     bags = [*options.bags, *options.holdout]
     skips = skips_of(options.skip, bags)
     with _bar("reading", len(bags), "bag") as tick:
-        drives = read_all(bags, robot, options.namespace, skips, tick)
+        drives = read_all(bags, robot, options.namespace, skips, tick=tick)
     check_duration(drives[: len(options.bags)])
     check_excitation(drives[: len(options.bags)], robot)
     findings: list[Finding] = []
@@ -202,11 +215,11 @@ def _fitted_text(source: str, values: Values, result: Result) -> str:
     return fitted_text(
         source,
         values,
-        result.free,
+        result.parameters,
         [float(number) for number in result.fitted.numbers],
-        [float(half) for half in result.half_widths],
-        header,
-        provenance,
+        half_widths=[float(half) for half in result.half_widths],
+        header=header,
+        provenance=provenance,
     )
 
 
@@ -231,7 +244,7 @@ def _print(result: Result, notes: Sequence[str]) -> None:
     values = _table("value", "fitted", "95 %", "unit", "before", "left")
     for row in rows(result):
         style = "yellow" if row.open else None
-        cells = (row.key, row.fitted, row.half, row.unit, row.believed, row.left)
+        cells = (row.key, row.fitted, row.half, row.unit, row.prior, row.left)
         values.add_row(*cells, style=style)
     console.print(values)
     console.print("left: of the uncertainty before\n")

@@ -81,7 +81,7 @@ def mismatch() -> Explanation:
             Map("wheel speed [rad/s]", edges, tuple(WHEELS), worse, level),
         ),
         alignment={"wheel_2/power": "2.1 ms after the encoders"},
-        smallest=(("friction.viscous", "wheel_1_joint", "0.0004 N m s/rad"),),
+        detection_limits=(("friction.viscous", "wheel_1_joint", "0.0004 N m s/rad"),),
         whiteness={"wheel_2/power": (0.81, 0.02)},
         score=Score(0.21, 0.04, 0.88, 0.96),
         explained="/**:\n  ros__parameters: {}\n",

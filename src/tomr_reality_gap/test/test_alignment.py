@@ -8,11 +8,11 @@ from attrs import evolve
 
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.dynamics.simulation import worker_count
+from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import Channel, channels_of
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
-from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.prepared import integrator_of
 
 

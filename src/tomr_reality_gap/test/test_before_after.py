@@ -66,9 +66,11 @@ def test_regime_is_the_narrowest_range_that_holds_the_energy() -> None:
     """Ten samples of one second; four of them change, at speeds from 1 to 1.6 rad/s."""
     speed = np.array([0.0, 0.2, 1.0, 1.2, 1.4, 1.6, 3.0, 4.0, 5.0, 6.0])
     change = np.where((speed >= 1.0) & (speed < 2.0), 1.0, 0.0)
-    found = located([_power(10)], change, np.ones(10), 0.5, {"|omega| [rad/s]": speed})
+    found = located([_power(10)], change, np.ones(10), 0.5, variables={"|omega| [rad/s]": speed})
     assert found.regime == "1 < |omega| < 1.6 rad/s"
-    even = located([_power(10)], np.ones(10), np.ones(10), 0.5, {"|omega| [rad/s]": speed})
+    even = located(
+        [_power(10)], np.ones(10), np.ones(10), 0.5, variables={"|omega| [rad/s]": speed}
+    )
     assert even.regime == "throughout"
 
 
@@ -76,7 +78,7 @@ def test_energy_counts_by_the_weight_of_its_channel() -> None:
     """The same change where noise is ten times smaller shows a hundred times more."""
     channels = [_power(10), evolve(_power(10), name="battery_state", kind="total")]
     weight = np.repeat([10.0, 1.0], 10)
-    found = located(channels, np.ones(20), weight, 0.5, {})
+    found = located(channels, np.ones(20), weight, 0.5, variables={})
     assert found.channels["wheel_1/power"] == pytest.approx(100.0 / 101.0)
 
 
@@ -85,7 +87,7 @@ def test_intervals_are_the_few_that_hold_half_of_the_energy() -> None:
     channel = evolve(_power(600), time=0.1 * np.arange(600) + 0.05)
     burst = (channel.time > 30.0) & (channel.time < 33.0)
     change = np.where(burst, 1.0, np.sqrt(0.25 * burst.sum() / (~burst).sum()))
-    found = located([channel], change, np.ones(600), 0.5, {})
+    found = located([channel], change, np.ones(600), 0.5, variables={})
     assert all(30.0 <= start < end <= 33.0 for start, end in found.intervals)
     length = sum(end - start for start, end in found.intervals)
     assert length == pytest.approx(0.5 / 0.8 * 3.0, abs=0.51)
@@ -94,7 +96,7 @@ def test_intervals_are_the_few_that_hold_half_of_the_energy() -> None:
 def test_intervals_are_at_most_five_and_in_order() -> None:
     channel = evolve(_power(600), time=0.1 * np.arange(600) + 0.05)
     change = np.where(np.floor(channel.time) % 4 == 0, 1.0 + 0.01 * channel.time, 0.0)
-    found = located([channel], change, np.ones(600), 0.5, {}).intervals
+    found = located([channel], change, np.ones(600), 0.5, variables={}).intervals
     assert len(found) == 5
     assert list(found) == sorted(found)
     assert found[-1][1] > 56.0  # the strongest are the last
@@ -105,7 +107,11 @@ def test_maps_show_before_and_after_by_bin() -> None:
     speed = np.linspace(0.0, 9.0, 1000)
     before, after = np.where(speed > 4.5, 3.0, 1.0), np.ones(1000)
     (found,) = maps_of(
-        [_power(1000)], 0.5 * before, 0.5 * after, np.full(1000, 0.5), {"speed [rad/s]": speed}
+        [_power(1000)],
+        0.5 * before,
+        0.5 * after,
+        np.full(1000, 0.5),
+        variables={"speed [rad/s]": speed},
     )
     np.testing.assert_allclose(found.before[0], [1.0] * 6 + [9.0] * 6, atol=0.1)
     np.testing.assert_allclose(found.after[0], np.ones(12))

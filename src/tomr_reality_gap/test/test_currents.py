@@ -7,14 +7,14 @@ import pytest
 from attrs import evolve
 
 from tomr_power_model.drive.record import Drive
+from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
-from tomr_reality_gap.alignment.response import leaps_of
+from tomr_reality_gap.alignment.response import controller_alternatives
 from tomr_reality_gap.alignment.simulation import RecordingSimulation, predict_all
 from tomr_reality_gap.explain import explain
 from tomr_reality_gap.explanation import Explanation
-from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.request import Request
 from tomr_sim_bridge.importers.dataset import choose, default_dataset, import_files, open_dataset
 from tomr_sim_bridge.importers.robotino import Drive as RobotinoDrive
@@ -116,12 +116,12 @@ def test_delay_and_loop_are_seen_in_wheel_speeds(robotino: Robot, integral: floa
     right = RecordingSimulation.of(
         simulation.recorded, evolve(robotino, controller=controller), channels
     )
-    assert leaps_of([right], right.robot) == {}
+    assert controller_alternatives([right], right.robot) == {}
     other = evolve(robotino.controller, delay=0.0, integral=157.0 - integral)
     wrong = RecordingSimulation.of(
         simulation.recorded, evolve(robotino, controller=other), channels
     )
-    found = leaps_of([wrong], wrong.robot)
+    found = controller_alternatives([wrong], wrong.robot)
     assert found["controller.integral"] == pytest.approx(integral)
     assert found["controller.delay"] == pytest.approx(0.1, abs=0.02)
 

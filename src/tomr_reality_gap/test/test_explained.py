@@ -9,12 +9,12 @@ import pytest
 
 from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
+from tomr_power_model.estimation.parameter import ParameterisedRobot, per_wheel
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import Robot, load_robot, read_description
 from tomr_reality_gap.described import described
-from tomr_reality_gap.fit.study import Model
-from tomr_reality_gap.hypotheses.knobs import Turned, turned
+from tomr_reality_gap.fit.model import Model
 from tomr_sim_bridge.plant.simulation import Simulation
 
 WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
@@ -53,7 +53,7 @@ MODELLED = [effect for effect in FOUND if effect != "contact.slip"]
 
 def explained(folder: Path, effects: Mapping[str, Mapping[str, float]], wheels: int = 3) -> Robot:
     """The reference robot with effects at its first wheels, through robot_explained.yaml."""
-    base = turned(dict(read_description("reference")), WHEELS, "reference")
+    base = per_wheel(dict(read_description("reference")), WHEELS, "reference")
     values = dict(base.values)
     for effect, numbers in effects.items():
         for key, number in numbers.items():
@@ -62,13 +62,15 @@ def explained(folder: Path, effects: Mapping[str, Mapping[str, float]], wheels: 
                 values |= {f"physics.{effect}.{wheel}.{key}": number for wheel in names}
             else:
                 values[f"physics.{effect}.{key}"] = number
-    evidence = SimpleNamespace(
+    analysis = SimpleNamespace(
         robot=SimpleNamespace(wheel_names=WHEELS),
         source="reference",
-        study=SimpleNamespace(simulations=()),
+        dataset=SimpleNamespace(simulations=()),
     )
     path = folder / "robot_explained.yaml"
-    path.write_text(described(evidence, Model(Turned(values, "made"), (), ())), encoding="utf-8")
+    path.write_text(
+        described(analysis, Model(ParameterisedRobot(values, "made"), (), ())), encoding="utf-8"
+    )
     return load_robot(path)
 
 

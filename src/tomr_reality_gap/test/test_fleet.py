@@ -13,11 +13,11 @@ from tomr_power_model.errors import InputError
 from tomr_reality_gap.cli import main
 from tomr_reality_gap.explanation import Explanation, Score
 from tomr_reality_gap.fleet import scheduler
-from tomr_reality_gap.fleet.cases import Believed, Case, cases_of
+from tomr_reality_gap.fleet.cases import Case, Defaults, cases_of
 from tomr_reality_gap.fleet.outcome import BAD_INPUT, FAILED, Outcome, outcome_of
 from tomr_reality_gap.fleet.overview import in_order, overview_page
 
-ALIKE = Believed(robot=None, tolerance=0.02, tolerances={})
+ALIKE = Defaults(robot=None, tolerance=0.02, tolerances={})
 
 
 @pytest.fixture

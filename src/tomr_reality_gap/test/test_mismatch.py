@@ -5,22 +5,22 @@ import pytest
 from attrs import evolve
 
 from tomr_power_model.drive.record import Drive
+from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.robot import shipped_robot
 from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
-from tomr_reality_gap.fit.leftover import leftovers
-from tomr_reality_gap.fit.likened import likened
-from tomr_reality_gap.fit.mirrored import Mirror, beyond
-from tomr_reality_gap.fit.noise import rows_of
-from tomr_reality_gap.fit.probed import probed
-from tomr_reality_gap.fit.study import columns_at
+from tomr_reality_gap.fit.basis_responses import basis_responses
+from tomr_reality_gap.fit.jacobian import linearise
+from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
+from tomr_reality_gap.fit.simulator_discrepancy import discrepancy_torques
+from tomr_reality_gap.fit.unmodelled import Remainder, unmodelled_effects
 from tomr_reality_gap.mismatch.locate import located
 from tomr_reality_gap.mismatch.orders import ripple_orders
 from tomr_reality_gap.mismatch.probes import motion_of
 
 from .test_alignment import _recorded as recorded_drive
 from .test_alignment import simulation  # noqa: F401 -- the fixture
-from .test_search import searched
+from .test_forward_selection import searched
 
 POWER_TIME = np.arange(0.02, 60.0, 0.02)
 
@@ -38,7 +38,7 @@ def test_the_regime_and_the_intervals_are_where_the_change_is() -> None:
         1.0 * shows,
         np.full(len(speed), 10.0),
         0.8,
-        {"|omega| [rad/s]": speed, "load [W]": np.cos(POWER_TIME)},
+        variables={"|omega| [rad/s]": speed, "load [W]": np.cos(POWER_TIME)},
     )
     assert "|omega|" in found.regime
     assert found.intervals
@@ -70,9 +70,10 @@ def test_what_has_no_name_is_found_with_its_wheel_and_variable(
     torque = np.zeros((1, *speed.shape))
     moving = np.tanh(speed[:, 2] / 0.1)
     torque[0, :, 2] = 0.15 * np.exp(-(((np.abs(speed[:, 2]) - 4.0) / 1.5) ** 2)) * moving
-    study, found = searched(simulation, next(simulation.respond(robot, torque)), ())
-    columns = columns_at(study, found.best.model, ())
-    first, *others = leftovers(study, found.best, columns, found, probed(study, robot, 0.3))
+    dataset, found = searched(simulation, next(simulation.respond(robot, torque)), ())
+    jacobian = linearise(dataset, found.best.model, ())
+    rest = Remainder.of(dataset, found.best.value, jacobian, found.noise)
+    first, *others = unmodelled_effects(rest, basis_responses(dataset, robot, 0.3))
     assert first.family.variable == "wheel speed [rad/s]"
     assert first.wheels == (2,)
     assert first.evidence > max(20.0, others[0].evidence + 100.0)
@@ -92,13 +93,13 @@ def test_what_the_users_simulation_resists_more_is_taken_off(
         evolve(channel, value=value[1, part])
         for channel, part in zip(simulation.channels, rows_of(simulation.channels), strict=True)
     )
-    alike = likened([evolve(simulation, channels=channels)], robot, 0.3)
-    assert alike is not None
+    more = discrepancy_torques([evolve(simulation, channels=channels)], robot, 0.3)
+    assert more is not None
     turned = evolve(
         simulation,
         recorded=evolve(simulation.recorded, command=simulation.recorded.command[:, [1, 0, 2]]),
     )
-    torque = alike.torque(motion_of(turned, robot, turned.run(robot)))
+    torque = more.torque(motion_of(turned, robot, turned.run(robot)))
     wanted, ours = turned.predict([theirs, robot])
     corrected = evolve(turned, resisting=torque).predict([robot])[0]
     powers = np.concatenate(
@@ -121,7 +122,8 @@ def test_a_simulation_like_ours_is_left_alone(
         evolve(c, value=value[part] + 0.05 * random.standard_normal(len(c.time)))
         for c, part in zip(simulation.channels, rows_of(simulation.channels), strict=True)
     )
-    assert likened([evolve(simulation, channels=channels)], simulation.robot, 0.3) is None
+    theirs = [evolve(simulation, channels=channels)]
+    assert discrepancy_torques(theirs, simulation.robot, 0.3) is None
 
 
 def _as_recorded(made: RecordingSimulation, value: np.ndarray) -> RecordingSimulation:
@@ -142,10 +144,10 @@ def test_what_the_users_simulation_shows_of_a_finding_is_taken_off(
         physics = {**robot.physics, "friction.asymmetric": (None, {"torque": torque}, None)}
         return simulation.predict([evolve(robot, physics=physics)])[0]
 
-    study, found = searched(simulation, resisting(0.02), ("friction.asymmetric",))
+    dataset, found = searched(simulation, resisting(0.02), ("friction.asymmetric",))
     for shown, left in ((0.005, 1), (0.02, 0)):
         simulation = _as_recorded(simulation, resisting(shown))
-        mirror = Mirror.of([simulation], study, found.noise, robot)
-        kept, theirs = beyond(study, found, mirror)
+        baseline = SimulatorBaseline.of([simulation], dataset, found.noise, robot)
+        kept, theirs = beyond_baseline(dataset, found, baseline)
         assert len(kept.best.model.hypotheses) == left
-        assert [turns[0] for turns in theirs] == pytest.approx([shown] * left, rel=0.1)
+        assert [offsets[0] for offsets in theirs] == pytest.approx([shown] * left, rel=0.1)

@@ -15,7 +15,6 @@ from tomr_power_model.effects import EFFECTS
 from tomr_reality_gap.explanation import Estimate, Explanation, Shape
 from tomr_reality_gap.report.html import channel_lines, picture_count, report_page
 from tomr_reality_gap.report.json import report_json
-from tomr_reality_gap.report.leftover import autocorrelation
 from tomr_reality_gap.report.showing import best_view
 from tomr_reality_gap.report.words import effect_words, estimate_words, percent_words
 
@@ -146,7 +145,7 @@ def test_page_shows_the_shape_of_what_has_no_name(with_rest: Callable[..., Expla
 
 
 def test_page_stands_without_drives_and_maps(match: Explanation) -> None:
-    empty = evolve(match, comparisons=(), maps=(), smallest=(), alignment={}, whiteness={})
+    empty = evolve(match, comparisons=(), maps=(), detection_limits=(), alignment={}, whiteness={})
     page = Page(report_page(empty, "my_robot.yaml"))
     assert page.pictures == []
     assert page.open == []
@@ -181,12 +180,6 @@ def test_nrmse_of_a_channel_is_the_residual_over_the_spread(mismatch: Explanatio
     assert line.rms[0] == pytest.approx(np.sqrt(np.mean((value - one.before[1]) ** 2)))
     assert line.nrmse[1] == pytest.approx(np.std(value - one.after[1]) / np.std(value), rel=0.01)
     assert line.level[1] == pytest.approx(1.0, abs=0.05)
-
-
-def test_autocorrelation_does_not_reach_across_recordings() -> None:
-    alternating = np.array([1.0, -1.0, 1.0, -1.0])
-    # Three pairs of product -1 over four squares in each; across, there would be one more.
-    assert autocorrelation([alternating, alternating])[0] == pytest.approx(-6.0 / 8.0)
 
 
 @pytest.mark.parametrize(

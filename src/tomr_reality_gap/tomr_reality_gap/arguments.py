@@ -1,4 +1,4 @@
-"""What the commands are given: recordings, a description and how far it is believed."""
+"""What the commands are given: recordings, a description and how exact it is taken to be."""
 
 import argparse
 from collections.abc import Sequence
@@ -24,7 +24,12 @@ def add_inputs(parser: argparse.ArgumentParser) -> None:
         metavar="BAG",
         help="recordings of the real robot",
     )
-    add("--sim", type=Path, metavar="BAG", help="recording of the simulation, commanded alike")
+    add(
+        "--sim",
+        type=Path,
+        metavar="BAG",
+        help="recording of the simulation, driven with the same commands",
+    )
     add(
         "--holdout",
         nargs="+",

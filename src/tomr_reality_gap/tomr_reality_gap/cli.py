@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
         "--suggest",
         type=Path,
         metavar="MISSION.yaml",
-        help="write the drive that would tell apart what this one cannot",
+        help="write the drive that would separate what this one cannot",
     )
     add_quiet(explain)
     explain.set_defaults(run=_explain)

@@ -3,25 +3,25 @@
 from attrs import evolve
 
 from tomr_power_model.calibration.fitted import fitted_text
-from tomr_reality_gap.evidence import Evidence
-from tomr_reality_gap.fit.study import Model
+from tomr_reality_gap.analysis import AnalysisResult
+from tomr_reality_gap.fit.model import Model
 
 
-def for_users(evidence: Evidence, model: Model) -> Model:
+def for_users(analysis: AnalysisResult, model: Model) -> Model:
     """The model for the user's simulation: without what that shows by itself."""
-    names = [item.name for item in evidence.found.best.model.hypotheses]
-    theirs = dict(zip(names, evidence.shared, strict=True))
-    turns = tuple(
-        tuple(turn - other for turn, other in zip(own, theirs[hypothesis.name], strict=True))
-        for hypothesis, own in zip(model.hypotheses, model.turns, strict=True)
+    names = [item.name for item in analysis.found.best.model.hypotheses]
+    theirs = dict(zip(names, analysis.shared, strict=True))
+    offsets = tuple(
+        tuple(offset - other for offset, other in zip(own, theirs[hypothesis.name], strict=True))
+        for hypothesis, own in zip(model.hypotheses, model.offsets, strict=True)
     )
-    return evolve(model, turns=turns)
+    return evolve(model, offsets=offsets)
 
 
-def described(evidence: Evidence, model: Model) -> str:
-    """Text of robot_explained.yaml: what is alike for all wheels is written once."""
+def described(analysis: AnalysisResult, model: Model) -> str:
+    """Text of robot_explained.yaml: what all wheels share is written once."""
     values = dict(model.described.values)
-    wheels = evidence.robot.wheel_names
+    wheels = analysis.robot.wheel_names
     for key in [key for key in values if f".{wheels[0]}." in key]:
         keys = [key.replace(wheels[0], wheel) for wheel in wheels]
         numbers = {values.get(item) for item in keys}
@@ -31,6 +31,14 @@ def described(evidence: Evidence, model: Model) -> str:
             for item in keys:
                 del values[item]
     findings = ", ".join(item.name for item in model.hypotheses)
-    header = [f"{evidence.source}, with what reality showed besides:", findings]
-    recordings = ", ".join(item.recorded.name for item in evidence.study.simulations)
-    return fitted_text(evidence.source, values, (), (), (), header, {"recordings": recordings})
+    header = [f"{analysis.source}, with what reality showed besides:", findings]
+    recordings = ", ".join(item.recorded.name for item in analysis.dataset.simulations)
+    return fitted_text(
+        analysis.source,
+        values,
+        (),
+        (),
+        half_widths=(),
+        header=header,
+        provenance={"recordings": recordings},
+    )

@@ -6,17 +6,18 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
-from tomr_reality_gap.alignment.response import leaps_of
+from tomr_power_model.estimation.noise import rows_of
+from tomr_reality_gap.alignment.response import controller_alternatives
 from tomr_reality_gap.alignment.simulation import Run
-from tomr_reality_gap.evidence import Evidence
+from tomr_reality_gap.analysis import AnalysisResult
 from tomr_reality_gap.explanation import Explanation
-from tomr_reality_gap.fit.alike import refuse_strangers
-from tomr_reality_gap.fit.mirrored import Mirror, beyond
-from tomr_reality_gap.fit.noise import rows_of
-from tomr_reality_gap.fit.probed import probed
-from tomr_reality_gap.fit.prune import second_thoughts
-from tomr_reality_gap.fit.search import search
-from tomr_reality_gap.fit.study import Model, Study
+from tomr_reality_gap.fit.backward_elimination import backward_elimination
+from tomr_reality_gap.fit.basis_responses import basis_responses
+from tomr_reality_gap.fit.consistency import check_same_robot
+from tomr_reality_gap.fit.dataset import Dataset
+from tomr_reality_gap.fit.forward_selection import forward_selection
+from tomr_reality_gap.fit.model import Model
+from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
 from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
 from tomr_reality_gap.mismatch.orders import ripple_orders
 from tomr_reality_gap.prepared import Prepared, prepared
@@ -32,45 +33,44 @@ def explain(request: Request, progress: Progress = lambda stage, part: None) -> 
     progress("reading", 0.0)
     ready = prepared(request)
     progress("simulating", 0.05)
-    evidence = _searched(request, ready, progress)
+    analysis = _analysed(request, ready, progress)
     progress("what is left", 0.85)
-    explanation = explanation_of(evidence, ready.held, ready.notes)
+    explanation = explanation_of(analysis, ready.held, ready.notes)
     progress("done", 1.0)
     return evolve(explanation, recordings=(*request.real, *request.holdout))
 
 
-def _searched(request: Request, ready: Prepared, progress: Progress) -> Evidence:
+def _analysed(request: Request, ready: Prepared, progress: Progress) -> AnalysisResult:
     """All hypotheses tried on what was prepared."""
-    base, wheels, study = ready.base, ready.robot.wheel_names, Study(ready.real)
-    knobs = nuisances(base, wheels, request.tolerance, request.tolerances)
-    orders = _orders(study, ready.runs)
+    base, wheels, dataset = ready.base, ready.robot.wheel_names, Dataset(ready.real)
+    parameters = nuisances(base, wheels, request.tolerance, request.tolerances)
+    orders = _orders(dataset, ready.runs)
     candidates = catalogue(
         base,
         wheels,
         ready.scales,
         request.tolerance,
-        orders,
-        leaps_of(ready.real, ready.robot),
-        {channel.kind for channel in study.channels}.isdisjoint(("power", "total")),
+        orders=orders,
+        alternatives=controller_alternatives(ready.real, ready.robot),
+        currents_only={channel.kind for channel in dataset.channels}.isdisjoint(("power", "total")),
     )
     tick = _Counter(progress, 3 * len(candidates) * len(ready.real))
-    nameless = probed(study, base.robot, ready.scales.torque, orders)
-    start = Model(base, knobs, (0.0,) * len(knobs))
-    found = search(study, start, candidates, nameless, tick)
-    refuse_strangers(study, found.rounds[-1])
-    found = second_thoughts(study, found, tick)
-    mirror = Mirror.of(ready.simulations, study, found.noise, base.robot)
-    found, shared = beyond(study, found, mirror, tick)
-    return Evidence(
-        study,
+    basis = basis_responses(dataset, base.robot, ready.scales.torque, orders)
+    start = Model(base, parameters, (0.0,) * len(parameters))
+    found = forward_selection(dataset, start, candidates, basis, tick=tick)
+    check_same_robot(dataset, found.rounds[-1])
+    found = backward_elimination(dataset, found, tick)
+    baseline = SimulatorBaseline.of(ready.simulations, dataset, found.noise, base.robot)
+    found, shared = beyond_baseline(dataset, found, baseline, tick)
+    return AnalysisResult(
+        dataset,
         found,
         base,
         ready.robot,
         str(request.robot),
-        ready.scales,
         candidates,
-        nameless,
-        mirror,
+        basis,
+        baseline,
         shared,
     )
 
@@ -89,10 +89,10 @@ class _Counter:
         self._progress("naming", 0.1 + 0.75 * part)
 
 
-def _orders(study: Study, runs: Sequence[Run]) -> tuple[float, ...]:
+def _orders(dataset: Dataset, runs: Sequence[Run]) -> tuple[float, ...]:
     """Orders of ripples that any recording shows."""
     found: list[float] = []
-    for item, run in zip(study.simulations, runs, strict=True):
+    for item, run in zip(dataset.simulations, runs, strict=True):
         value = item.predict([item.robot])[0]
         residuals, speeds = [], []
         for channel, part in zip(item.channels, rows_of(item.channels), strict=True):

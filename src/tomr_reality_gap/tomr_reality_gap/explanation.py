@@ -34,7 +34,7 @@ class Located:
 
 @frozen
 class Rival:
-    """Another explanation that the data cannot tell from the finding."""
+    """Another explanation that the data cannot separate from the finding."""
 
     effect: str
     where: tuple[str, ...]
@@ -46,7 +46,7 @@ class Rival:
 class Score:
     """Errors on held-out data; NRMSE as in the contract.
 
-    Of power, or of current where a robot tells no more: `quantity` says which, with its unit.
+    Of power, or of current where a robot measures no more: `quantity` says which, with its unit.
     """
 
     nrmse_before: float
@@ -119,7 +119,7 @@ class Explanation:
     comparisons: tuple[Comparison, ...]
     maps: tuple[Map, ...]
     alignment: Mapping[str, str]  # what was aligned, in words
-    smallest: tuple[tuple[str, str, str], ...]  # effect, place, smallest size that would be seen
+    detection_limits: tuple[tuple[str, str, str], ...]  # effect, place, size
     whiteness: Mapping[str, tuple[float, float]]  # lag-1 autocorrelation before, after by channel
     score: Score | None  # of everything together on held-out data
     explained: str  # text of robot_explained.yaml; empty where nothing changed

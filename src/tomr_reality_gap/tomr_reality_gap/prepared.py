@@ -1,4 +1,4 @@
-"""From files to what can be compared: recordings read, checked, aligned, and simulated alike."""
+"""From files to what can be compared: recordings read, checked, aligned, and simulated."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,13 +16,13 @@ from tomr_power_model.drive.read import read_drive
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.effects.scales import Scales
 from tomr_power_model.errors import InputError
+from tomr_power_model.estimation.noise import rows_of
+from tomr_power_model.estimation.parameter import ParameterisedRobot, per_wheel
 from tomr_power_model.recordings import open_recording, resolve_topic
 from tomr_power_model.robot import Robot, read_description, robot_from_parameters
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS, channels_of
 from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
-from tomr_reality_gap.fit.likened import Likened, likened
-from tomr_reality_gap.fit.noise import rows_of
-from tomr_reality_gap.hypotheses.knobs import Turned, turned
+from tomr_reality_gap.fit.simulator_discrepancy import DiscrepancyTorques, discrepancy_torques
 from tomr_reality_gap.hypotheses.scales import scales_of, traction_ratios_of
 from tomr_reality_gap.mismatch.probes import motion_of
 from tomr_reality_gap.request import Request
@@ -36,8 +36,8 @@ INTEGRATOR = "controller.integrator"
 class Prepared:
     """A description and recordings of its robot, ready to be compared."""
 
-    base: Turned  # the description, written out for each wheel
-    robot: Robot  # as the drivers believe it to be
+    base: ParameterisedRobot  # the description, written out for each wheel
+    robot: Robot  # as its drivers take it to be
     real: tuple[RecordingSimulation, ...]
     held: tuple[RecordingSimulation, ...]
     simulations: tuple[RecordingSimulation, ...]  # of the user's
@@ -57,10 +57,10 @@ def prepared(request: Request) -> Prepared:
     check_excitation(real, robot)
     refuse(found for item in (*real, *held) for found in sensor_faults(item, robot))
     sim = _read_all((request.sim,), request, robot) if request.sim else ()
-    _check_alike(real, sim, robot)
+    _check_same_commands(real, sim, robot)
     values[INTEGRATOR] = integrator_of(_simulation((*sim, *real)[0], robot))
     robot = robot_from_parameters(values, place)
-    base = turned(values, robot.wheel_names, place)
+    base = per_wheel(values, robot.wheel_names, place)
     recordings, held_out, simulations = (
         tuple(_simulation(item, robot) for item in group) for group in (real, held, sim)
     )
@@ -68,17 +68,17 @@ def prepared(request: Request) -> Prepared:
     for item, run in zip(recordings, runs, strict=True):
         refuse(not_following(item.recorded, robot, item.timeline.middle, run.speed))
     scales = _scales(recordings, runs, robot)
-    alike = likened(simulations, base.robot, scales.torque)
+    discrepancy = discrepancy_torques(simulations, base.robot, scales.torque)
     notes = [note for item in (*real, *held) for note in item.notes]
     return Prepared(
         base=base,
         robot=robot,
-        real=tuple(_with(alike, item, base.robot) for item in recordings),
-        held=tuple(_with(alike, item, base.robot) for item in held_out),
-        simulations=tuple(_with(alike, item, base.robot) for item in simulations),
+        real=tuple(_with(discrepancy, item, base.robot) for item in recordings),
+        held=tuple(_with(discrepancy, item, base.robot) for item in held_out),
+        simulations=tuple(_with(discrepancy, item, base.robot) for item in simulations),
         runs=runs,
         scales=scales,
-        notes=(*notes, *_sim_notes(simulations, alike)),
+        notes=(*notes, *_sim_notes(simulations, discrepancy)),
     )
 
 
@@ -126,13 +126,13 @@ def _simulation(drive: Drive, robot: Robot) -> RecordingSimulation:
 
 
 def _with(
-    alike: Likened | None, simulation: RecordingSimulation, robot: Robot
+    discrepancy: DiscrepancyTorques | None, simulation: RecordingSimulation, robot: Robot
 ) -> RecordingSimulation:
     """The recording, simulated with what the user's simulation resists beyond ours."""
-    if alike is None:
+    if discrepancy is None:
         return simulation
     motion = motion_of(simulation, robot, simulation.run(robot))
-    return evolve(simulation, resisting=alike.torque(motion))
+    return evolve(simulation, resisting=discrepancy.torque(motion))
 
 
 def integrator_of(simulation: RecordingSimulation) -> str:
@@ -151,7 +151,7 @@ def integrator_of(simulation: RecordingSimulation) -> str:
     return min(ways, key=errors.__getitem__)
 
 
-def _check_alike(real: tuple[Drive, ...], sim: tuple[Drive, ...], robot: Robot) -> None:
+def _check_same_commands(real: tuple[Drive, ...], sim: tuple[Drive, ...], robot: Robot) -> None:
     """A simulation must have been driven with the commands of a real recording."""
     for item in sim:
         moved = np.nanmax(np.abs(item.position - item.position[:1]), initial=0.0)
@@ -166,7 +166,7 @@ def _check_alike(real: tuple[Drive, ...], sim: tuple[Drive, ...], robot: Robot) 
 
 
 def _sim_notes(
-    simulations: Sequence[RecordingSimulation], alike: Likened | None
+    simulations: Sequence[RecordingSimulation], discrepancy: DiscrepancyTorques | None
 ) -> tuple[str, ...]:
     """How far the given simulation and the one used here agree."""
     notes = []
@@ -178,7 +178,7 @@ def _sim_notes(
             for channel, part in zip(simulation.channels, rows, strict=True)
             if channel.kind in DRAWN_KINDS
         ]
-        more = "" if alike is None else "; what it resists more is taken off"
+        more = "" if discrepancy is None else "; what it resists more is taken off"
         notes.append(
             f"{simulation.recorded.name}: the simulation that the findings rest on differs from "
             f"it by an NRMSE of {max(errors):.3f} in what it draws{more}"
@@ -197,7 +197,12 @@ def _scales(
     channels = [channel for item in simulations for channel in item.channels]
     currents = [channel.value for channel in channels if channel.kind == "current"]
     scales = scales_of(
-        robot, joined["speed"], joined["power"], joined["copper"], duration, currents
+        robot,
+        joined["speed"],
+        joined["power"],
+        joined["copper"],
+        duration=duration,
+        currents=currents,
     )
     ratios = [
         traction_ratios_of(robot, run.speed, item.timeline.period)

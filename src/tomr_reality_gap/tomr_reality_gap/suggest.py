@@ -9,7 +9,7 @@ from tomr_power_model.effects.base import Phase
 from tomr_power_model.effects.missions import INERTIAL, PAUSE, STAND, VARIED
 from tomr_reality_gap.explanation import Finding
 
-# What tells a wrong parameter, by the beginning of its key.
+# What shows a wrong parameter, by the beginning of its key.
 _PARAMETERS: tuple[tuple[str, Sequence[Phase]], ...] = (
     ("supply.auxiliary_power", STAND),
     ("robot.", INERTIAL),
@@ -51,6 +51,6 @@ class _Plain(yaml.SafeDumper):
 def _phases(name: str) -> Sequence[Phase]:
     key = name.removeprefix("parameter.").removeprefix("physics.")
     for effect_id, effect in EFFECTS.items():
-        if key.startswith(effect_id):
+        if key == effect_id or key.startswith(f"{effect_id}."):
             return effect.mission
     return next(phases for start, phases in _PARAMETERS if key.startswith(start))

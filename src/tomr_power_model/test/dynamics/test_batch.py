@@ -32,7 +32,7 @@ def shown(
     """Of wheel 2, (delays, times); times from the start."""
     channels = np.array([[kind, 1, 0, len(time)]])
     readout = Readout(channels, 10.0 + time, np.full(len(time), span))
-    return np.asarray(predict([Variant(laid_out(vehicle), 0, later)], excitation(), readout)[0])
+    return np.asarray(next(predict([Variant(laid_out(vehicle), 0, later)], excitation(), readout)))
 
 
 @pytest.mark.parametrize(
@@ -107,8 +107,8 @@ def test_variants_do_not_know_of_each_other(make_vehicle: MakeVehicle) -> None:
     readout = Readout(channels, 10.0 + time, np.full(60, 0.02))
     variants = [Variant(laid_out(item)) for item in (light, heavy, light)]
     done: list[int] = []
-    together = predict(variants, excitation(), readout, tick=done.append)
-    alone = [predict([item], excitation(), readout)[0] for item in variants]
+    together = list(predict(variants, excitation(), readout, tick=done.append))
+    alone = [next(predict([item], excitation(), readout)) for item in variants]
     np.testing.assert_array_equal(together, alone)
     assert not np.allclose(alone[0], alone[1])
     assert done == [1, 1, 1]

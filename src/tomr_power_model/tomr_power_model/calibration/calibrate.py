@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tomr_power_model.calibration.fit import Fit, fit
 from tomr_power_model.calibration.identify import warnings_of
-from tomr_power_model.calibration.parameters import Choice, Free, Values, choose
+from tomr_power_model.calibration.parameters import Choice, choose
 from tomr_power_model.calibration.problem import Problem
 from tomr_power_model.calibration.samples import TOTAL, Samples, samples_of
 from tomr_power_model.calibration.scoring import Scores, score, suspicious
@@ -20,7 +20,8 @@ from tomr_power_model.drive.quality import Finding
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
-from tomr_power_model.robot import WHEELS, Robot, robot_from_parameters
+from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, Values, prior_stds
+from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ class Result:
     """All that a calibration found."""
 
     robot: Robot  # fitted
-    free: tuple[Free, ...]
+    parameters: tuple[Parameter, ...]
     fitted: Fit
     samples: tuple[Samples, ...]
     held_out: tuple[Samples, ...]
@@ -56,8 +57,8 @@ class Result:
     @property
     def half_widths(self) -> Array:
         """Half of the 95 % intervals, in the values' units."""
-        width = np.array([item.spread for item in self.free])
-        return np.asarray(self.fitted.spread.factor * self.fitted.spread.deviation * width)
+        found = self.fitted.uncertainty
+        return np.asarray(found.factor * found.deviation * prior_stds(self.parameters))
 
 
 def read_all(
@@ -65,6 +66,7 @@ def read_all(
     robot: Robot,
     namespace: str | None,
     skips: Skips,
+    *,
     tick: Callable[[], None] = lambda: None,
 ) -> tuple[Drive, ...]:
     """Read recordings and cut out what is to be skipped. Raises InputError."""
@@ -95,21 +97,22 @@ def calibrate(
     place: str,
     samples: Sequence[Samples],
     held_out: Sequence[Samples],
+    *,
     choice: Choice,
     robust: bool = True,
     tick: Callable[[], None] = lambda: None,
 ) -> Result:
     """Fit a description to samples and score it on others. Raises InputError."""
-    believed = robot_from_parameters(values, place)
+    described = ParameterisedRobot(values, place)
+    before = described.robot
     measured = [np.isfinite(item.measured) for item in samples]
     choice = evolve(
         choice,
-        quantity=believed.measurement.quantity,
+        quantity=before.measurement.quantity,
         has_total=any(item[:, TOTAL].any() for item in measured),
-        has_motors=any(item[:, :WHEELS].any() for item in measured),
     )
-    free = tuple(choose(values, believed.wheel_names, choice, place))
-    problem = Problem(values, free, tuple(samples), place)
+    parameters = tuple(choose(values, before.wheel_names, choice, place))
+    problem = Problem(described, parameters, tuple(samples))
     fitted = fit(problem, robust, tick)
     robot = problem.robot(fitted.numbers)
     findings = [found for item in samples for found in suspicious(item, robot)]
@@ -117,23 +120,23 @@ def calibrate(
     elsewhere = [found for item in held_out for found in suspicious(item, robot)]
     return Result(
         robot=robot,
-        free=free,
+        parameters=parameters,
         fitted=fitted,
         samples=tuple(samples),
         held_out=tuple(held_out),
         scores=score(samples, robot),
-        scores_before=score(samples, believed),
+        scores_before=score(samples, before),
         held_out_scores=score(held_out, robot),
-        held_out_scores_before=score(held_out, believed),
+        held_out_scores_before=score(held_out, before),
         warnings=(
             *structure_warnings((*samples, *held_out), robot),
-            *warnings_of(free, fitted, robot.wheel_names),
+            *warnings_of(parameters, fitted, robot.wheel_names),
         ),
-        notes=_told([*findings, *elsewhere]),
+        notes=_in_words([*findings, *elsewhere]),
     )
 
 
-def _told(findings: Sequence[Finding]) -> tuple[str, ...]:
+def _in_words(findings: Sequence[Finding]) -> tuple[str, ...]:
     """The longest ones in words, and how many more there are."""
     ordered = sorted(findings, key=lambda found: found.start - found.end)
     more = len(ordered) - _MOST_NOTES

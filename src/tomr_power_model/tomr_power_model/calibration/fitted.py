@@ -4,6 +4,7 @@ The header and the section of `tomr_calibrate` say what was fitted to what, how 
 robot; reading the file as a robot description looks at that robot's identity again.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -11,9 +12,9 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from tomr_power_model.calibration.parameters import Free, Values, with_values
 from tomr_power_model.effects import EFFECTS
-from tomr_power_model.robot import read_sections
+from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, Values
+from tomr_power_model.robot import WHEELS, read_sections
 from tomr_power_model.robot.files import CALIBRATION, EVERY_NODE, IDENTITY
 
 Array = NDArray[np.float64]
@@ -33,8 +34,9 @@ _DIGITS = 6
 def fitted_text(
     source: Path | str,
     values: Values,
-    free: Sequence[Free],
+    parameters: Sequence[Parameter],
     numbers: Sequence[float] | Array,
+    *,
     half_widths: Sequence[float] | Array,
     header: Sequence[str],
     provenance: Mapping[str, object],
@@ -44,7 +46,7 @@ def fitted_text(
     Args:
         source: robot.yaml that was fitted; sections of single nodes are taken over.
         values: its description, flat.
-        free: what was fitted.
+        parameters: what was fitted.
         numbers: fitted values.
         half_widths: half of their 95 % intervals.
         header: lines of comment at the top.
@@ -52,13 +54,15 @@ def fitted_text(
     """
     rounded = [float(f"{number:.{_DIGITS}g}") for number in numbers]
     comments = {
-        item.key: f"fitted, +- {half:.2g} (95 %); was {item.believed:g}"
-        for item, half in zip(free, half_widths, strict=True)
+        item.keys[0]: f"fitted, +- {half:.2g} (95 %); was {item.prior_mean:g}"
+        for item, half in zip(parameters, half_widths, strict=True)
     }
-    fixed = {key for key in IDENTITY_KEYS if not any(item.key == key for item in free)}
+    fixed = set(IDENTITY_KEYS).difference(*(item.keys for item in parameters))
     identity = {IDENTITY + key: values[key] for key in IDENTITY_KEYS if key in fixed}
-    sections = dict(read_sections(source))
-    sections[EVERY_NODE] = _own_values_alone(with_values(values, free, rounded), free)
+    sections: dict[str, Values] = dict(read_sections(source))
+    keys = [item.keys[0] for item in parameters]
+    changed = ParameterisedRobot(values, str(source)).given(dict(zip(keys, rounded, strict=True)))
+    sections[EVERY_NODE] = _own_values_alone(changed.values, parameters)
     sections[CALIBRATION] = {**identity, **provenance}
     lines = [f"# {line}".rstrip() for line in header]
     for node, flat in sections.items():
@@ -67,13 +71,14 @@ def fitted_text(
     return "\n".join(lines) + "\n"
 
 
-def _own_values_alone(values: Values, free: Sequence[Free]) -> Values:
+def _own_values_alone(values: Values, parameters: Sequence[Parameter]) -> Values:
     """Without an effect's value for all wheels where each wheel has its own."""
-    by_general: dict[str, int] = {}
-    for item in free:
-        if item.wheel is not None and item.general.startswith("physics."):
-            by_general[item.general] = by_general.get(item.general, 0) + 1
-    return {key: value for key, value in values.items() if by_general.get(key, 0) < 3}
+    own = Counter(item.name for item in parameters if item.keys[0] != item.name)
+    return {
+        key: value
+        for key, value in values.items()
+        if not key.startswith("physics.") or own[key] < WHEELS
+    }
 
 
 def _nested(flat: Mapping[str, object]) -> Tree:

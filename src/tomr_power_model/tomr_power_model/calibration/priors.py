@@ -1,6 +1,7 @@
 """Priors of a description's values before a fit, and the drives that would determine them."""
 
-from tomr_power_model.effects import EFFECTS, EffectParameter
+from tomr_power_model.effects import EFFECTS
+from tomr_power_model.estimation.parameter import split_effect
 
 # Standard deviation relative to the value: data sheets are good for windings, poor for friction.
 RELATIVE_STD = {
@@ -22,14 +23,14 @@ _ABSENT = {
     "supply.auxiliary_power": (0.0, 50.0),
 }
 
-# The drive that would tell a value, by the beginning of its key.
+# The drive that would determine a value, by the beginning of its key.
 _DRIVES = (
     ("robot.mass_center", "circles and spins while driving, at several headings"),
     ("robot.mass", "starts and stops at full acceleration, straight, at several headings"),
     ("robot.inertia_z", "spins on the spot that start and stop at full acceleration"),
     ("robot.wheel_inertia", "spins and straight starts: it shows only beside mass and inertia_z"),
     ("motor.rotor_inertia", "spins and straight starts: it shows only beside mass and inertia_z"),
-    ("motor.torque_constant", "none, power tells R / k^2 alone: measure the motor's idle speed"),
+    ("motor.torque_constant", "none, power shows R / k^2 alone: measure the motor's idle speed"),
     ("motor.resistance", "hard acceleration, where copper loss counts, and k known otherwise"),
     (
         "supply.auxiliary_power",
@@ -40,18 +41,11 @@ _DRIVES = (
 
 def absent_prior(general: str) -> tuple[float, float]:
     """Mean and standard deviation of a value that a description does not give."""
-    parameter = effect_parameter(general)
-    if parameter is not None:
-        return parameter.start, parameter.prior_std
-    return _ABSENT.get(general, (0.0, 1.0))
-
-
-def effect_parameter(key: str) -> EffectParameter | None:
-    """The effect's parameter that a key ends in, None for a key of anything else."""
-    for effect_id, effect in EFFECTS.items():
-        if key.startswith(f"physics.{effect_id}."):
-            return effect.parameters.get(key.rpartition(".")[2])
-    return None
+    if not general.startswith("physics."):
+        return _ABSENT.get(general, (0.0, 1.0))
+    effect_id, name = split_effect(general)
+    parameter = EFFECTS[effect_id].parameters[name]
+    return parameter.start, parameter.prior_std
 
 
 def drive_for(general: str) -> str:

@@ -6,10 +6,10 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.calibration.parameters import Free, Values, with_values
 from tomr_power_model.calibration.samples import CHANNELS, TOTAL, Samples, motor_power
 from tomr_power_model.dynamics.drives import InverseDynamics, WheelMotion
-from tomr_power_model.robot import WHEELS, Robot, robot_from_parameters
+from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot
+from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
 
@@ -49,10 +49,9 @@ def determined(samples: Samples, robot: Robot) -> Array:
 class Problem:
     """Recordings to be explained by one robot."""
 
-    values: Values
-    free: tuple[Free, ...]
+    described: ParameterisedRobot
+    parameters: tuple[Parameter, ...]
     samples: tuple[Samples, ...]
-    place: str
     _motion: WheelMotion = field(init=False)
     measured: Array = field(init=False)  # W, (n, 4) of all recordings together
 
@@ -62,8 +61,8 @@ class Problem:
             np.concatenate([item.motion.acceleration for item in self.samples]),
         )
         object.__setattr__(self, "_motion", joined)
-        robot = robot_from_parameters(self.values, self.place)
-        measured = np.concatenate([determined(item, robot) for item in self.samples])
+        described = self.described.robot
+        measured = np.concatenate([determined(item, described) for item in self.samples])
         object.__setattr__(self, "measured", measured)
 
     @property
@@ -72,7 +71,8 @@ class Problem:
 
     def robot(self, numbers: Sequence[float] | Array) -> Robot:
         """The robot with these values."""
-        return robot_from_parameters(with_values(self.values, self.free, numbers), self.place)
+        keys = (parameter.keys[0] for parameter in self.parameters)
+        return self.described.given(dict(zip(keys, numbers, strict=True))).robot
 
     def residual(self, numbers: Sequence[float] | Array) -> Array:
         """Measured minus modelled power [W], (n, 4), NaN where nothing was measured."""
@@ -85,8 +85,8 @@ class Problem:
         columns = []
         for index, width in enumerate(step):
             upper, lower = numbers.copy(), numbers.copy()
-            upper[index] = min(numbers[index] + width, self.free[index].upper)
-            lower[index] = max(numbers[index] - width, self.free[index].lower)
+            upper[index] = min(numbers[index] + width, self.parameters[index].upper)
+            lower[index] = max(numbers[index] - width, self.parameters[index].lower)
             change = self.residual(lower) - self.residual(upper)
             columns.append(change / (upper[index] - lower[index]))
             count()

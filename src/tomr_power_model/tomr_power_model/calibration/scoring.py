@@ -82,7 +82,7 @@ def score(drives: Sequence[Samples], robot: Robot) -> Scores:
     if not found:
         return Scores((), None)
     whole = _score("all", seconds, np.concatenate(all_measured), np.concatenate(all_modelled))
-    # Noise differs from drive to drive: it is told drive by drive.
+    # Noise differs from drive to drive: it is estimated drive by drive.
     reachable = np.array([item.reachable for item in found])
     weight = np.array(drawn) * np.isfinite(reachable)
     with np.errstate(invalid="ignore"):

@@ -26,7 +26,7 @@ class Row:
 
     key: str
     unit: str
-    believed: str
+    prior: str
     fitted: str
     half: str  # of the 95 % interval
     left: str  # of the uncertainty before
@@ -61,22 +61,22 @@ def tables(result: Result) -> list[tuple[str, list[Line]]]:
 def rows(result: Result) -> list[Row]:
     """The table of fitted values."""
     found = []
-    for item, number, half, learned in zip(
-        result.free,
+    for item, number, half, shrinkage in zip(
+        result.parameters,
         result.fitted.numbers,
         result.half_widths,
-        result.fitted.spread.learned,
+        result.fitted.uncertainty.shrinkage,
         strict=True,
     ):
         found.append(
             Row(
-                key=item.key,
+                key=item.keys[0],
                 unit=item.unit or "-",
-                believed=f"{item.believed:.4g} ± {1.96 * item.spread:.2g}",
+                prior=f"{item.prior_mean:.4g} ± {1.96 * item.prior_std:.2g}",
                 fitted=f"{number:.4g}",
                 half=f"± {half:.2g}",
-                left=f"{100 * learned:.0f} %",
-                open=learned > HARDLY,
+                left=f"{100 * shrinkage:.0f} %",
+                open=shrinkage > HARDLY,
             )
         )
     return found

@@ -100,7 +100,7 @@ def _blocks(recorded: Drive) -> Channel:
 def _speeds(recorded: Drive, robot: Robot) -> list[Channel]:
     """Mean wheel speeds between encoder samples, from angles; the sample's speed without them.
 
-    A robot whose description tells the quantum of its speeds measures them by themselves: then it
+    A robot whose description gives the quantum of its speeds measures them by themselves: then it
     is they that its drivers follow.
     """
     found = []
@@ -108,8 +108,8 @@ def _speeds(recorded: Drive, robot: Robot) -> list[Channel]:
     for wheel, name in enumerate(robot.wheel_names):
         known = np.isfinite(recorded.position[:, wheel])
         time = recorded.encoder_time
-        told = quantum > 0.0 and bool(np.isfinite(recorded.velocity[:, wheel]).any())
-        if known.sum() > 1 and not told:
+        is_measured = quantum > 0.0 and bool(np.isfinite(recorded.velocity[:, wheel]).any())
+        if known.sum() > 1 and not is_measured:
             every = max(1, round(_BLOCK / float(np.median(np.diff(time[known])))))
             time, angle = time[known][::every], recorded.position[known, wheel][::every]
             span = np.diff(time)

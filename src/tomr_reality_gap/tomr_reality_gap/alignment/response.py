@@ -6,10 +6,10 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
+from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.alignment.simulation import RecordingSimulation, predict_all
-from tomr_reality_gap.fit.noise import rows_of
 
 Array = NDArray[np.float64]
 
@@ -22,11 +22,13 @@ _USUAL = 10.0  # 1/s, of an integral gain over the proportional one
 _GAIN = 50.0  # of log likelihood: what is called better
 
 
-def leaps_of(simulations: Sequence[RecordingSimulation], robot: Robot) -> Mapping[str, float]:
+def controller_alternatives(
+    simulations: Sequence[RecordingSimulation], robot: Robot
+) -> Mapping[str, float]:
     """Values of the controller, by key, with which wheels turn much more as they were seen to.
 
     Both are far off or right: a late command shows for as long as it is late, which no derivative
-    at the described delay tells; a loop without an integral leaves an error, with any none.
+    at the described delay shows; a loop without an integral leaves an error, with any none.
     """
     seen = [
         evolve(item, channels=tuple(_early(c) for c in item.channels if c.kind == "speed"))

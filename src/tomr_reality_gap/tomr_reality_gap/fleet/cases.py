@@ -21,7 +21,7 @@ class Case:
 
 
 @frozen
-class Believed:
+class Defaults:
     """What holds for all cases."""
 
     robot: str | None  # description of cases that have none of their own
@@ -29,13 +29,13 @@ class Believed:
     tolerances: dict[str, float]
 
 
-def cases_of(given: Sequence[Path], believed: Believed) -> tuple[Case, ...]:
+def cases_of(given: Sequence[Path], defaults: Defaults) -> tuple[Case, ...]:
     """Cases of folders, each a case itself or a folder of cases.
 
     Raises:
         InputError: a folder holds no case, a case has no description, or two have one name.
     """
-    found = [case for folder in given for case in _cases_in(folder, believed)]
+    found = [case for folder in given for case in _cases_in(folder, defaults)]
     taken = Counter(case.name for case in found)
     named = [
         evolve(case, name=f"{case.inputs.real[0].resolve().parent.parent.name}_{case.name}")
@@ -49,11 +49,11 @@ def cases_of(given: Sequence[Path], believed: Believed) -> tuple[Case, ...]:
     return tuple(named)
 
 
-def _cases_in(folder: Path, believed: Believed) -> list[Case]:
+def _cases_in(folder: Path, defaults: Defaults) -> list[Case]:
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder: give folders that hold {ROBOT} and {REAL}")
     folders = [folder] if _recordings(folder) else sorted(folder.iterdir())
-    cases = [_case(path, believed) for path in folders if path.is_dir() and _recordings(path)]
+    cases = [_case(path, defaults) for path in folders if path.is_dir() and _recordings(path)]
     if not cases:
         raise InputError(
             f"{folder}: no case in it: a case is a folder that holds {ROBOT} and the recording "
@@ -68,17 +68,17 @@ def _recordings(folder: Path) -> tuple[Path, ...]:
     return tuple(sorted(paths))
 
 
-def _case(folder: Path, believed: Believed) -> Case:
+def _case(folder: Path, defaults: Defaults) -> Case:
     own = folder / ROBOT
-    if not own.is_file() and believed.robot is None:
+    if not own.is_file() and defaults.robot is None:
         raise InputError(f"{folder}: no {ROBOT} in it: add it, or give --robot for all")
     sim = folder / SIM
     inputs = Request(
-        robot=str(own) if own.is_file() else str(believed.robot),
+        robot=str(own) if own.is_file() else str(defaults.robot),
         real=_recordings(folder),
         sim=sim if sim.exists() else None,
         holdout=tuple(sorted(folder.glob(f"{HOLDOUT}*"))),
-        tolerance=believed.tolerance,
-        tolerances=believed.tolerances,
+        tolerance=defaults.tolerance,
+        tolerances=defaults.tolerances,
     )
     return Case(folder.resolve().name, inputs)

@@ -10,7 +10,7 @@ from tqdm import tqdm
 
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_OK
 from tomr_reality_gap.arguments import add_quiet, add_tolerance, tolerances_of
-from tomr_reality_gap.fleet.cases import Believed, cases_of
+from tomr_reality_gap.fleet.cases import Defaults, cases_of
 
 if TYPE_CHECKING:
     from tomr_reality_gap.fleet.outcome import Outcome
@@ -22,7 +22,7 @@ examples:
   tomr_gap fleet recordings/ --out gaps --scheduler tcp://cluster:8786
 
 a case is a folder:
-  robot.yaml      what its simulation believes (else that of --robot)
+  robot.yaml      what its simulation is made of (else that of --robot)
   real            recording of the real robot; real_2 and so on are taken, too
   sim             recording of the simulation, optional
   real_holdout    recording that is scored only, optional
@@ -60,7 +60,7 @@ def add_fleet(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
 
 def _fleet(options: argparse.Namespace) -> int:
     tolerance, tolerances = tolerances_of(options.tolerance)
-    cases = cases_of(options.folders, Believed(options.robot, tolerance, tolerances))
+    cases = cases_of(options.folders, Defaults(options.robot, tolerance, tolerances))
     # What explains is imported by the workers, not by --help.
     from tomr_reality_gap.fleet import overview
     from tomr_reality_gap.fleet.outcome import explain_case

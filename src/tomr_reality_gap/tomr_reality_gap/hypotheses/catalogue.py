@@ -5,22 +5,26 @@ How large an effect may be and which shapes it starts from is part of the effect
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from types import MappingProxyType
+
+from attrs import frozen
 
 from tomr_power_model.effects import EFFECTS, HypothesisPrior
 from tomr_power_model.effects.scales import Scales
-from tomr_reality_gap.hypotheses.knobs import (
-    Hypothesis,
-    Knob,
-    Turned,
+from tomr_power_model.estimation.parameter import (
+    Parameter,
+    ParameterisedRobot,
     bounds_of,
+    uniform_std,
     unit_of,
     wheel_key,
 )
+from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 
 ALL, BODY, SUPPLY = "all_wheels", "body", "supply"
 
-# Parameters that may be wrong, their spread relative to the value, and the place.
+# Parameters that may be wrong, their prior standard deviation over the value, and the place.
 _PARAMETERS: Mapping[str, tuple[float, str]] = {
     "robot.mass": (0.2, BODY),
     "robot.inertia_z": (0.3, BODY),
@@ -38,25 +42,25 @@ _PARAMETERS: Mapping[str, tuple[float, str]] = {
 }
 _DELAY_STEP = 0.002  # s
 _ROLLS = 1.05  # of the largest traction over load: with this friction no wheel slides
-_LEAST_GRIP = 0.01
+_LEAST_FRICTION = 0.01
 _LATE = (0.015, 0.03, 0.06, -0.02)  # s
-_EFFECT_PARAMETER = 0.4  # spread of an included effect's parameter, relative to its value
+_EFFECT_PARAMETER = 0.4  # prior deviation of an included effect's parameter, over its value
 _WRONG = 1.5  # tolerances that a parameter must be off to be called wrong
 _WRONG_PARAMETER = -math.log(2.0)  # what is left out is likelier than a wrong number
-_STEP = 0.1  # of the spread
+_STEP = 0.1  # of the prior_std
 _BEYOND = 1.25  # how far a tolerance is stretched before the value counts as wrong
-_SHAPE_SPREAD = 0.5  # of a shape's start
+_SHAPE_STD = 0.5  # of a shape's start
 
 
 def nuisances(
-    base: Turned,
+    base: ParameterisedRobot,
     wheels: Sequence[str],
     tolerance: float,
     tolerances: Mapping[str, float] = MappingProxyType({}),
-) -> tuple[Knob, ...]:
-    """Knobs for what may be off within the stated tolerance, each wheel by itself.
+) -> tuple[Parameter, ...]:
+    """Parameters for what may be off within the stated tolerance, each wheel by itself.
 
-    A tolerance is half of the range; all of it is equally likely, hence the spread of a uniform
+    A tolerance is half of the range; all of it is equally likely, hence the deviation of a uniform
     distribution. `tolerances` are those of single values, by their keys.
     """
     keys = ["robot.mass", "robot.inertia_z"]
@@ -73,8 +77,11 @@ def nuisances(
         own = tolerances.get(key, tolerances.get(_shared(key, wheels), tolerance))
         if isinstance(value, float) and value and own:
             half = own * abs(value)
-            spread = half / math.sqrt(3.0)
-            found.append(Knob(key, (key,), "", spread, spread, -_BEYOND * half, _BEYOND * half))
+            prior_std = uniform_std(half)
+            edge = _BEYOND * half
+            found.append(
+                Parameter(key, (key,), "", prior_std, step=prior_std, lower=-edge, upper=edge)
+            )
     return tuple(found)
 
 
@@ -86,12 +93,13 @@ def _shared(key: str, wheels: Sequence[str]) -> str:
 
 
 def catalogue(
-    base: Turned,
+    base: ParameterisedRobot,
     wheels: Sequence[str],
     scales: Scales,
     tolerance: float,
+    *,
     orders: Sequence[float] = (),
-    leaps: Mapping[str, float] = MappingProxyType({}),
+    alternatives: Mapping[str, float] = MappingProxyType({}),
     currents_only: bool = False,
 ) -> tuple[Hypothesis, ...]:
     """All hypotheses about a robot.
@@ -102,207 +110,183 @@ def catalogue(
         scales: how large effects may be.
         tolerance: of the description's values.
         orders: of torque ripples that may be there.
-        leaps: values of the drivers that the wheels' speeds ask for, far from the described ones.
+        alternatives: values of the drivers, far from the described ones, that wheel speeds ask for.
         currents_only: whether nothing but the motors' currents is measured.
     """
+    made = _Catalogue(base, tuple(wheels), scales, tolerance)
     found = (
-        *_effects(base, wheels, scales),
-        *_ripples(base, wheels, scales, orders),
-        *_slipping(base, wheels, scales),
-        *_late(base, wheels),
-        *_wrong_parameters(base, wheels, tolerance),
-        *(_leap(base, key, value) for key, value in leaps.items()),
+        *made.effects(),
+        *made.ripples(orders),
+        *made.slipping(),
+        *made.late(),
+        *made.wrong_parameters(),
+        *(made.alternative(key, value) for key, value in alternatives.items()),
     )
     if not currents_only:
         return found
     electrical = [name for name, effect in EFFECTS.items() if not effect.in_currents]
-    hidden = tuple(f"parameter.physics.{name}." for name in electrical)
-    return tuple(
-        item
-        for item in found
-        if item.effect not in electrical and not item.effect.startswith(hidden)
-    )
+    hidden = (*electrical, *(f"parameter.physics.{name}." for name in electrical))
+    return tuple(item for item in found if not item.effect.startswith(hidden))
 
 
-def _leap(base: Turned, key: str, value: float) -> Hypothesis:
-    """A value that is another one, not the same a little off; 0 may be either."""
-    before = base.values.get(key, 0.0)
-    assert isinstance(before, int | float)
-    turn = value - before
-    low, high = bounds_of(key)
-    step = _DELAY_STEP if key == "controller.delay" else _STEP * abs(turn)
-    knob = Knob(
-        "value", (key,), unit_of(key), abs(turn), step, low - before, high - before, leap=turn
-    )
-    place = _PARAMETERS.get(key, (0.0, BODY))[1]
-    return Hypothesis(f"parameter.{key}", (place,), (knob,), {}, _WRONG_PARAMETER)
+@frozen
+class _Catalogue:
+    base: ParameterisedRobot
+    wheels: tuple[str, ...]
+    scales: Scales
+    tolerance: float
 
+    def alternative(self, key: str, value: float) -> Hypothesis:
+        """A value that is another one, not the same a little off; 0 may be either."""
+        before = self.base.values.get(key, 0.0)
+        assert isinstance(before, int | float)
+        offset = value - before
+        step = _DELAY_STEP if key == "controller.delay" else _STEP * abs(offset)
+        parameter = _value((key,), before, abs(offset), step=step, discrete_offset=offset)
+        place = _PARAMETERS.get(key, (0.0, BODY))[1]
+        return Hypothesis(f"parameter.{key}", (place,), (parameter,), log_prior=_WRONG_PARAMETER)
 
-def _ripples(
-    base: Turned, wheels: Sequence[str], scales: Scales, orders: Sequence[float]
-) -> Iterator[Hypothesis]:
-    effect_id = "drivetrain.torque_ripple"
-    if any(key.startswith(f"physics.{effect_id}.") for key in base.values):
-        return
-    for where in _places(effect_id, wheels):
-        keys = {
-            name: _keys(effect_id, name, where, wheels) for name in ("torque", "order", "phase")
-        }
-        size = 0.3 * scales.torque
-        knobs = (
-            Knob("torque", keys["torque"], "N m", size, _STEP * size, 0.0),
-            Knob("order", keys["order"], "1/rev", 0.05, 0.005, is_shape=True),
-            Knob("phase", keys["phase"], "rad", 1.0, 0.05, is_shape=True),
-        )
-        for order in orders:
-            for quarter in range(4):
-                start = dict.fromkeys(keys["torque"], 0.0)
-                start |= dict.fromkeys(keys["order"], order)
-                start |= dict.fromkeys(keys["phase"], 0.5 * math.pi * quarter)
-                yield Hypothesis(effect_id, where, knobs, start)
-
-
-def _slipping(base: Turned, wheels: Sequence[str], scales: Scales) -> Iterator[Hypothesis]:
-    """Grips at which some of what the contacts carry is too much; above all of it nothing shows."""
-    effect_id = "contact.slip"
-    ratios = scales.traction_ratios
-    if not ratios or any(key.startswith(f"physics.{effect_id}.") for key in base.values):
-        return
-    rolls = max(ratios)
-    for where in _places(effect_id, wheels):
-        keys = _keys(effect_id, "friction", where, wheels)
-        for number, grip in enumerate(scales.traction_ratios[1:]):
-            # Starts differ a little so that hypotheses do; at none of them does a wheel slide.
-            start = rolls * (_ROLLS + 0.001 * number)
-            leap = grip - start
-            low = _LEAST_GRIP - start
-            knob = Knob("friction", keys, "", -leap, -_STEP * grip, low, 0.0, leap=leap)
-            yield Hypothesis(effect_id, where, (knob,), dict.fromkeys(keys, start))
-
-
-def _late(base: Turned, wheels: Sequence[str]) -> Iterator[Hypothesis]:
-    """Power sensors that are late, or early, by more than a step in power lasts."""
-    effect_id = "sensor.clock_offset"
-    if any(key.startswith(f"physics.{effect_id}.") for key in base.values):
-        return
-    for where in _places(effect_id, wheels):
-        keys = _keys(effect_id, "delay", where, wheels)
-        for number, leap in enumerate(_LATE):
-            start = 1e-6 * (number + 1)  # what tells hypotheses of one name apart
-            knob = Knob("delay", keys, "s", abs(leap), 0.1 * _LATE[0], leap=leap)
-            yield Hypothesis(effect_id, where, (knob,), dict.fromkeys(keys, start))
-
-
-def _effects(base: Turned, wheels: Sequence[str], scales: Scales) -> Iterator[Hypothesis]:
-    for effect_id, effect in EFFECTS.items():
-        prior = effect.prior
-        if prior is None or any(key.startswith(f"physics.{effect_id}.") for key in base.values):
-            continue
-        for where in _places(effect_id, wheels):
-            yield from (
-                _effect(effect_id, prior, where, wheels, scales, shape)
-                for shape in prior.shapes(scales)
+    def ripples(self, orders: Sequence[float]) -> Iterator[Hypothesis]:
+        effect_id, size = "drivetrain.torque_ripple", 0.3 * self.scales.torque
+        for where in self._places(effect_id):
+            torque, order, phase = (
+                self._keys(effect_id, name, where) for name in ("torque", "order", "phase")
             )
+            parameters = (
+                Parameter("torque", torque, "N m", size, step=_STEP * size, lower=0.0),
+                Parameter("order", order, "1/rev", 0.05, step=0.005, is_shape=True),
+                Parameter("phase", phase, "rad", 1.0, step=0.05, is_shape=True),
+            )
+            for number, quarter in product(orders, range(4)):
+                start = dict.fromkeys(torque, 0.0) | dict.fromkeys(order, number)
+                start |= dict.fromkeys(phase, 0.5 * math.pi * quarter)
+                yield Hypothesis(effect_id, where, parameters, start=start)
 
+    def slipping(self) -> Iterator[Hypothesis]:
+        """Friction at which some of what the contacts carry is too much; more shows nothing."""
+        effect_id, ratios = "contact.slip", self.scales.traction_ratios
+        for where in self._places(effect_id):
+            keys = self._keys(effect_id, "friction", where)
+            for number, friction in enumerate(ratios[1:]):
+                # Starts differ a little so that hypotheses do; at none of them does a wheel slide.
+                start = max(ratios) * (_ROLLS + 0.001 * number)
+                low, offset = _LEAST_FRICTION - start, friction - start
+                size, step = -offset, -_STEP * friction
+                parameter = Parameter(
+                    "friction",
+                    keys,
+                    "",
+                    size,
+                    step=step,
+                    lower=low,
+                    upper=0.0,
+                    discrete_offset=offset,
+                )
+                yield Hypothesis(effect_id, where, (parameter,), start=dict.fromkeys(keys, start))
 
-def _places(effect_id: str, wheels: Sequence[str]) -> list[tuple[str, ...]]:
-    place = EFFECTS[effect_id].place
-    if place != "wheel":
-        return [(place,)]
-    return [(ALL,), *((wheel,) for wheel in wheels)]
+    def late(self) -> Iterator[Hypothesis]:
+        """Power sensors that are late, or early, by more than a step in power lasts."""
+        effect_id, step = "sensor.clock_offset", 0.1 * _LATE[0]
+        for where in self._places(effect_id):
+            keys = self._keys(effect_id, "delay", where)
+            for number, delay in enumerate(_LATE):
+                start = 1e-6 * (number + 1)  # what distinguishes hypotheses of one name
+                size = abs(delay)
+                parameter = Parameter("delay", keys, "s", size, step=step, discrete_offset=delay)
+                yield Hypothesis(effect_id, where, (parameter,), start=dict.fromkeys(keys, start))
 
+    def effects(self) -> Iterator[Hypothesis]:
+        for effect_id, effect in EFFECTS.items():
+            if effect.prior is not None:
+                shapes = list(effect.prior.shapes(self.scales))
+                for where, shape in product(self._places(effect_id), shapes):
+                    yield self._effect(effect_id, effect.prior, where, shape)
 
-def _keys(
-    effect_id: str, name: str, where: tuple[str, ...], wheels: Sequence[str]
-) -> tuple[str, ...]:
-    if EFFECTS[effect_id].place != "wheel":
-        return (f"physics.{effect_id}.{name}",)
-    chosen = wheels if where == (ALL,) else where
-    return tuple(f"physics.{effect_id}.{wheel}.{name}" for wheel in chosen)
+    def _places(self, effect_id: str) -> list[tuple[str, ...]]:
+        """Where an effect may be that the description leaves out."""
+        if any(key.startswith(f"physics.{effect_id}.") for key in self.base.values):
+            return []
+        place = EFFECTS[effect_id].place
+        return [(place,)] if place != "wheel" else [(ALL,), *((wheel,) for wheel in self.wheels)]
 
+    def _keys(self, effect_id: str, name: str, where: tuple[str, ...]) -> tuple[str, ...]:
+        if EFFECTS[effect_id].place != "wheel":
+            return (f"physics.{effect_id}.{name}",)
+        chosen = self.wheels if where == (ALL,) else where
+        return tuple(f"physics.{effect_id}.{wheel}.{name}" for wheel in chosen)
 
-def _effect(
-    effect_id: str,
-    prior: HypothesisPrior,
-    where: tuple[str, ...],
-    wheels: Sequence[str],
-    scales: Scales,
-    shape: Mapping[str, float],
-) -> Hypothesis:
-    knobs, start = [], {}
-    parameters = EFFECTS[effect_id].parameters
-    for name, size in prior.sizes.items():
-        keys = _keys(effect_id, name, where, wheels)
-        spread, neutral = size(scales), parameters[name].neutral
-        start.update(dict.fromkeys(keys, neutral))
-        low, high = bounds_of(keys[0])
-        step = (prior.sign or 1) * _STEP * spread
-        unit = parameters[name].unit
-        low, high = low - neutral, high - neutral
-        if prior.sign > 0:
-            low = max(low, 0.0)
-        elif prior.sign < 0:
-            high = min(high, 0.0)
-        knobs.append(Knob(name, keys, unit, spread, step, low, high))
-    for name, value in shape.items():
-        keys = _keys(effect_id, name, where, wheels)
-        start.update(dict.fromkeys(keys, value))
-        unit = parameters[name].unit
-        if unit == "rad":  # an angle may turn either way, and has no smallest value
-            knobs.append(Knob(name, keys, unit, 1.0, 0.05, is_shape=True))
-            continue
-        spread = _SHAPE_SPREAD * value
-        low, high = -0.9 * value, 9.0 * value
-        knobs.append(Knob(name, keys, unit, spread, _STEP * spread, low, high, True))
-    return Hypothesis(effect_id, where, tuple(knobs), start, 0.0, prior.least(scales))
+    def _effect(
+        self,
+        effect_id: str,
+        prior: HypothesisPrior,
+        where: tuple[str, ...],
+        shape: Mapping[str, float],
+    ) -> Hypothesis:
+        found, start, described = [], {}, EFFECTS[effect_id].parameters
+        for name, size in prior.sizes.items():
+            keys, neutral = self._keys(effect_id, name, where), described[name].neutral
+            start.update(dict.fromkeys(keys, neutral))
+            std, unit = size(self.scales), described[name].unit
+            low, high = (bound - neutral for bound in bounds_of(keys[0]))
+            low = max(low, 0.0) if prior.sign > 0 else low
+            high = min(high, 0.0) if prior.sign < 0 else high
+            step = (prior.sign or 1) * _STEP * std
+            found.append(Parameter(name, keys, unit, std, step=step, lower=low, upper=high))
+        for name, value in shape.items():
+            keys, unit = self._keys(effect_id, name, where), described[name].unit
+            start.update(dict.fromkeys(keys, value))
+            std, step, low, high = _SHAPE_STD * value, _SHAPE_STD * _STEP * value, -0.9, 9.0
+            if unit == "rad":  # an angle may be off either way, and has no smallest value
+                std, step, low, high = 1.0, 0.05, -math.inf, math.inf
+            low, high = (low, high) if unit == "rad" else (low * value, high * value)
+            found.append(
+                Parameter(name, keys, unit, std, step=step, lower=low, upper=high, is_shape=True)
+            )
+        least = prior.least(self.scales)
+        return Hypothesis(effect_id, where, tuple(found), start=start, least=least)
 
+    def wrong_parameters(self) -> Iterator[Hypothesis]:
+        relatives = dict(_PARAMETERS)
+        for effect_id, effect in EFFECTS.items():
+            place = BODY if effect_id.startswith("body.") else SUPPLY
+            for name in effect.parameters:
+                relatives[f"physics.{effect_id}.{name}"] = (_EFFECT_PARAMETER, place)
+        for general, (relative, place) in relatives.items():
+            if general in self.base.values and not general.startswith("motor."):
+                if self.base.values[general] or general.startswith("physics."):
+                    yield self._wrong(general, (general,), relative, place)
+                continue
+            own = {wheel: wheel_key(general, wheel) for wheel in self.wheels}
+            own = {wheel: key for wheel, key in own.items() if self.base.values.get(key)}
+            if len(own) == len(self.wheels):
+                yield self._wrong(general, tuple(own.values()), relative, ALL)
+            for wheel, key in own.items():
+                yield self._wrong(general, (key,), relative, wheel)
 
-def _wrong_parameters(
-    base: Turned, wheels: Sequence[str], tolerance: float
-) -> Iterator[Hypothesis]:
-    for general, (relative, place) in _PARAMETERS.items():
-        if general.startswith("motor."):
-            yield from _wrong(base, general, relative, wheels, tolerance)
-        elif base.values.get(general):
-            yield _wrong_at(base, general, (general,), relative, (place,), tolerance)
-    seen = dict.fromkeys(
-        f"physics.{effect}.{name}"
-        for effect, described in EFFECTS.items()
-        for name in described.parameters
-    )
-    for general in seen:
-        if general in base.values:
-            place = BODY if general.startswith("physics.body.") else SUPPLY
-            yield _wrong_at(base, general, (general,), _EFFECT_PARAMETER, (place,), tolerance)
-        else:
-            yield from _wrong(base, general, _EFFECT_PARAMETER, wheels, tolerance)
-
-
-def _wrong(
-    base: Turned, general: str, relative: float, wheels: Sequence[str], tolerance: float
-) -> Iterator[Hypothesis]:
-    own = [(wheel, wheel_key(general, wheel)) for wheel in wheels]
-    present = [(wheel, key) for wheel, key in own if base.values.get(key)]
-    if len(present) == len(wheels):
-        yield _wrong_at(
-            base, general, tuple(key for _, key in present), relative, (ALL,), tolerance
+    def _wrong(
+        self, general: str, keys: tuple[str, ...], relative: float, place: str
+    ) -> Hypothesis:
+        value = self.base.values[keys[0]]
+        assert isinstance(value, float)
+        std, least = relative * abs(value), _WRONG * self.tolerance * abs(value)
+        parameter = _value(keys, value, std, step=_STEP * std)
+        return Hypothesis(
+            f"parameter.{general}", (place,), (parameter,), log_prior=_WRONG_PARAMETER, least=least
         )
-    for wheel, key in present:
-        yield _wrong_at(base, general, (key,), relative, (wheel,), tolerance)
 
 
-def _wrong_at(
-    base: Turned,
-    general: str,
-    keys: tuple[str, ...],
-    relative: float,
-    where: tuple[str, ...],
-    tolerance: float,
-) -> Hypothesis:
-    value = base.values[keys[0]]
-    assert isinstance(value, float)
-    spread = relative * abs(value)
-    low, high = bounds_of(keys[0])
-    knob = Knob("value", keys, unit_of(keys[0]), spread, _STEP * spread, low - value, high - value)
-    least = _WRONG * tolerance * abs(value)
-    return Hypothesis(f"parameter.{general}", where, (knob,), {}, _WRONG_PARAMETER, least)
+def _value(
+    keys: tuple[str, ...], value: float, std: float, *, step: float, discrete_offset: float = 0.0
+) -> Parameter:
+    """Offset of a described value."""
+    lower, upper = (bound - value for bound in bounds_of(keys[0]))
+    return Parameter(
+        "value",
+        keys,
+        unit_of(keys[0]),
+        std,
+        step=step,
+        lower=lower,
+        upper=upper,
+        discrete_offset=discrete_offset,
+    )

@@ -13,7 +13,7 @@ from tomr_power_model.robot import GRAVITY, WHEELS, Robot
 
 Array = NDArray[np.float64]
 
-_PARTS = (1.0, 0.8, 0.64, 0.51, 0.41, 0.33, 0.26)  # of what the contacts carry at most
+_TRACTION_PARTS = (1.0, 0.8, 0.64, 0.51, 0.41, 0.33, 0.26)  # of what the contacts carry at most
 
 
 def traction_ratios_of(robot: Robot, speed: Array, period: float) -> tuple[float, ...]:
@@ -36,7 +36,7 @@ def traction_ratios_of(robot: Robot, speed: Array, period: float) -> tuple[float
     force += p[at.MASS] * wz[:, None] * turning
     traction = np.abs(force @ to_twist.T) / robot.wheel_radius
     most = float(np.max(traction / wheels[:, at.LOAD]))
-    return tuple(part * most for part in _PARTS)
+    return tuple(part * most for part in _TRACTION_PARTS)
 
 
 def scales_of(
@@ -44,6 +44,7 @@ def scales_of(
     speed: Array,
     power: Array,
     copper: Array,
+    *,
     duration: float,
     currents: Sequence[Array] = (),
 ) -> Scales:

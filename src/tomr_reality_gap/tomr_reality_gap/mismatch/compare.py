@@ -5,12 +5,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.statistics import robust_scale
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
 from tomr_reality_gap.explanation import Comparison, Score
-from tomr_reality_gap.fit.noise import rows_of
 from tomr_reality_gap.mismatch.probes import Motion, motion_of
 
 Array = NDArray[np.float64]

@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_power_model.estimation.noise import rows_of
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS, Channel
 from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
 from tomr_reality_gap.explanation import Located, Map
-from tomr_reality_gap.fit.noise import rows_of
 
 Array = NDArray[np.float64]
 
@@ -24,6 +24,7 @@ def located(
     change: Array,
     weight: Array,
     share: float,
+    *,
     variables: Mapping[str, Array],
 ) -> Located:
     """Where a change of the simulated values shows.
@@ -117,6 +118,7 @@ def maps_of(
     before: Array,
     after: Array,
     sigma: Array,
+    *,
     variables: Mapping[str, Array],
 ) -> tuple[Map, ...]:
     """Mean squares of whitened residuals over each variable, before and after."""

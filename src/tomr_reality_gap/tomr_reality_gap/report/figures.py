@@ -8,9 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from tomr_reality_gap.alignment.channels import DRAWN_KINDS
-from tomr_reality_gap.explanation import Comparison, Explanation, Map, Shape
-from tomr_reality_gap.report.canvas import (
+from tomr_power_model.canvas import (
     AFTER,
     BEFORE,
     MEASURED,
@@ -20,6 +18,8 @@ from tomr_reality_gap.report.canvas import (
     sheet,
     smooth,
 )
+from tomr_reality_gap.alignment.channels import DRAWN_KINDS
+from tomr_reality_gap.explanation import Comparison, Explanation, Map, Shape
 from tomr_reality_gap.report.showing import View, leading
 from tomr_reality_gap.report.words import channel_name
 

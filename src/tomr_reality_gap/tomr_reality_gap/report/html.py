@@ -10,7 +10,7 @@ from jinja2 import Environment, StrictUndefined
 
 from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.explanation import Comparison, Explanation, Finding
-from tomr_reality_gap.report import figures, leftover
+from tomr_reality_gap.report import figures, residuals
 from tomr_reality_gap.report.showing import best_view
 from tomr_reality_gap.report.words import (
     channel_name,
@@ -148,6 +148,6 @@ def _pictures(explanation: Explanation, found: bool, tick: Tick) -> dict[str, ob
         ],
         "left_out": max(0, len(drives) - _MOST_DRIVES),
         "held_out": bool(drives) and drives[0].held_out,
-        "residuals": drawn(leftover.residuals(drives, found)) if drives else "",
-        "whiteness": drawn(leftover.whiteness(drives, found)) if drives else "",
+        "residuals": drawn(residuals.residuals(drives, found)) if drives else "",
+        "whiteness": drawn(residuals.whiteness(drives, found)) if drives else "",
     }

@@ -30,7 +30,7 @@ def report_fields(explanation: Explanation) -> dict[str, Value]:
         "holdout": _score(explanation.score),
         "smallest_detectable": [
             {"effect": effect, "where": where, "size": size}
-            for effect, where, size in explanation.smallest
+            for effect, where, size in explanation.detection_limits
         ],
         "whiteness": {
             channel: {"lag1_before": _number(before, 3), "lag1_after": _number(after, 3)}

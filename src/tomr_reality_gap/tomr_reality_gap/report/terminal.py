@@ -31,9 +31,9 @@ def print_explanation(explanation: Explanation) -> None:
         )
     for finding in explanation.findings:
         for rival in finding.rivals:
-            advice = f": to tell, {rival.experiment}" if rival.experiment else ""
+            advice = f": to separate them, {rival.experiment}" if rival.experiment else ""
             console.print(
-                f"{finding.effect} at {place_words(finding.where)} cannot be told from "
+                f"{finding.effect} at {place_words(finding.where)} cannot be separated from "
                 f"{rival.effect} at {place_words(rival.where)}{advice}"
             )
     for note in explanation.notes:

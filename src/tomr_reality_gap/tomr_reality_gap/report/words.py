@@ -30,7 +30,7 @@ def place_words(where: Sequence[str]) -> str:
 
 
 def channel_name(channel: Channel) -> str:
-    """A channel's name; a topic's voltage is told from its power."""
+    """A channel's name; a topic's voltage is distinguished from its power."""
     return f"{channel.name} voltage" if channel.kind == "voltage" else channel.name
 
 

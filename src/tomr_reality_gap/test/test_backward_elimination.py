@@ -1,4 +1,4 @@
-"""Second thoughts about findings: by a table of what each set of them is worth."""
+"""Backward elimination of findings, by a table of what each set of them is worth."""
 
 from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
@@ -6,11 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tomr_reality_gap.fit import prune
-from tomr_reality_gap.fit.refine import Fitted
-from tomr_reality_gap.fit.search import Found
-from tomr_reality_gap.fit.study import Model
-from tomr_reality_gap.hypotheses.knobs import Hypothesis, Knob, Turned
+from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot
+from tomr_reality_gap.fit import backward_elimination
+from tomr_reality_gap.fit.forward_selection import Selection
+from tomr_reality_gap.fit.model import Model
+from tomr_reality_gap.fit.refine import FittedModel
+from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 
 WORTH: Mapping[str, float] = {
     "": 0.0,
@@ -25,14 +26,14 @@ WORTH: Mapping[str, float] = {
     "ad": 1000.0,
     "bd": 310.0,
 }
-EMPTY = Model(Turned({}, "made"), (), ())
+EMPTY = Model(ParameterisedRobot({}, "made"), (), ())
 
 
 def _model(names: str) -> Model:
     model = EMPTY
     for name in names:
-        knob = Knob("size", (name,), "", 1.0, 0.1)
-        model = model.joined(Hypothesis(name, ("body",), (knob,)))
+        parameter = Parameter("size", (name,), "", 1.0)
+        model = model.joined(Hypothesis(name, ("body",), (parameter,)))
     return model
 
 
@@ -40,34 +41,34 @@ def _letters(model: Model) -> str:
     return "".join(item.effect for item in model.hypotheses)
 
 
-def _fitted(model: Model) -> Fitted:
+def _fitted(model: Model) -> FittedModel:
     worth = WORTH["".join(sorted(_letters(model)))]
     none = np.empty(0)
-    return Fitted(model, worth, 0.0, none, none, none)
+    return FittedModel(model, worth, 0.0, none, none, none)
 
 
 @pytest.fixture
 def second(monkeypatch: pytest.MonkeyPatch) -> object:
-    """`second(best, rounds)`: what second thoughts leave; rounds as (so far, tried together)."""
+    """`second(best, rounds)`: what is left; rounds as (so far, tried together)."""
 
     def refine(
-        study: object, states: Sequence[tuple[Model, object]], *rest: object
-    ) -> list[Fitted]:
+        dataset: object, states: Sequence[tuple[Model, object]], *rest: object, tick: object
+    ) -> list[FittedModel]:
         return [_fitted(model) for model, _ in states]
 
-    monkeypatch.setattr(prune, "refine", refine)
-    study = SimpleNamespace(value=np.zeros(1000))
+    monkeypatch.setattr(backward_elimination, "refine", refine)
+    dataset = SimpleNamespace(value=np.zeros(1000))
 
-    def think(best: str, *rounds: tuple[str, str]) -> Found:
+    def think(best: str, *rounds: tuple[str, str]) -> Selection:
         steps = tuple(
             SimpleNamespace(
-                columns=SimpleNamespace(model=_model(so_far)),
+                jacobian=SimpleNamespace(model=_model(so_far)),
                 tried=tuple(_fitted(_model(so_far + letter)) for letter in tried),
             )
             for so_far, tried in rounds
         )
-        start = Found(_fitted(_model(best)), _fitted(EMPTY), steps, None)  # type: ignore[arg-type]
-        return prune.second_thoughts(study, start)  # type: ignore[arg-type]
+        start = Selection(_fitted(_model(best)), _fitted(EMPTY), steps, None)  # type: ignore[arg-type]
+        return backward_elimination.backward_elimination(dataset, start)  # type: ignore[arg-type]
 
     return think
 
@@ -85,7 +86,7 @@ def test_what_a_finding_displaced_may_take_its_place(second) -> None:  # type: i
     assert [_letters(item.model) for item in found.alternatives[1]] == ["ad", "ab"]
 
 
-def test_needed_findings_stay_and_their_rivals_are_told(second) -> None:  # type: ignore[no-untyped-def]
+def test_needed_findings_stay_and_their_rivals_are_named(second) -> None:  # type: ignore[no-untyped-def]
     found = second("ab", ("", "ab"), ("a", "bc"))
     assert _letters(found.best.model) == "ac"  # 905 against 900
     assert _letters(found.alternatives[0][0].model) == "ac"

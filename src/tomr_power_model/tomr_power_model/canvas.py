@@ -1,4 +1,4 @@
-"""Sheets of panels that look alike, as PNG for embedding in a page."""
+"""Sheets of panels of one style, as PNG for embedding in a page."""
 
 import base64
 from collections.abc import Iterator, Sequence
@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 
 MEASURED, BEFORE, AFTER, PLACE = "#8a8f98", "#c2410c", "#1d4ed8", "#fde68a"
 _BREAK = 3.0  # usual periods without a sample: the line is broken
+_BINS = 24
+_LEAST_IN_BIN = 8
+_MOST_DOTS = 6000
 
 
 @contextmanager
@@ -53,3 +56,18 @@ def smooth(values: Array, over: int) -> Array:
     return np.asarray(
         np.convolve(values, kernel, "same") / np.convolve(np.ones(len(values)), kernel, "same")
     )
+
+
+def scatter(panel: Axes, over: Array, values: Array) -> None:
+    """A dot for each sample, of many samples for some."""
+    step = max(1, len(over) // _MOST_DOTS)
+    panel.plot(over[::step], values[::step], ".", ms=1.2, color=MEASURED, alpha=0.3)
+
+
+def medians(panel: Axes, over: Array, values: Array, colour: str) -> None:
+    """Median of each bin that holds enough samples."""
+    edges = np.linspace(over.min(), over.max() + 1e-9, _BINS + 1)
+    bins = np.digitize(over, edges)
+    full = [b for b in range(1, _BINS + 1) if np.count_nonzero(bins == b) >= _LEAST_IN_BIN]
+    centers = [0.5 * (edges[b - 1] + edges[b]) for b in full]
+    panel.plot(centers, [np.median(values[bins == b]) for b in full], "-o", ms=2, color=colour)

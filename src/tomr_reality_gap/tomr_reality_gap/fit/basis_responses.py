@@ -1,4 +1,4 @@
-"""What smooth torques of one variable would show: columns for effects that have no name."""
+"""What smooth torques of one variable would show: radial basis functions for unmodelled effects."""
 
 from collections.abc import Collection, Sequence
 from itertools import pairwise
@@ -7,24 +7,24 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.estimation.noise import Local, rows_of
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_reality_gap.alignment.channels import MOTOR_KINDS
-from tomr_reality_gap.fit.noise import Local, rows_of
-from tomr_reality_gap.fit.study import Study
+from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.mismatch.probes import Family, families, motion_of
 
 Array = NDArray[np.float64]
 
-_SIZE = 0.1  # of a typical torque, belief about each bump
+_SIZE = 0.1  # of a typical torque: prior standard deviation of each basis function's weight
 
 
 @frozen
-class Probed:
+class BasisResponses:
     """Families of torques and what they do to every channel."""
 
     families: tuple[Family, ...]
     responses: tuple[Array, ...]  # of each family, all wheels resisting at once, (n, k)
-    size: float  # N m of each bump
+    size: float  # N m, of each basis function
     rows: tuple[NDArray[np.intp], ...]  # of each wheel's own channels; the total's without any
 
     @property
@@ -35,39 +35,40 @@ class Probed:
         return [Local(rows, joined[rows]) for rows in wheels]
 
 
-def probed(
-    study: Study,
+def basis_responses(
+    dataset: Dataset,
     robot: Robot,
     torque: float,
     orders: Sequence[float] = (),
+    *,
     only: Collection[str] | None = None,
-) -> Probed:
+) -> BasisResponses:
     """Simulate families of torques on a robot.
 
     Args:
-        study: its recordings.
+        dataset: its recordings.
         robot: as described.
         torque: typical of it [N m].
         orders: at which its power swings with wheel angles [1/rev].
         only: names of variables; None: all.
     """
-    motions = [motion_of(item, robot, item.run(robot)) for item in study.simulations]
+    motions = [motion_of(item, robot, item.run(robot)) for item in dataset.simulations]
     tried = tuple(
         family for family in families(motions, orders) if only is None or family.variable in only
     )
     size = _SIZE * torque
     torques = [np.concatenate([size * item.torques(one) for item in tried]) for one in motions]
-    response = study.respond(robot, torques) - study.predict([robot])[0]
+    response = dataset.respond(robot, torques) - dataset.predict([robot])[0]
     edges = np.cumsum([0, *(len(item.knots) for item in tried)])
     parts = tuple(response[first:last].T for first, last in pairwise(edges))
-    return Probed(tried, parts, size, tuple(own_rows(study)))
+    return BasisResponses(tried, parts, size, tuple(own_rows(dataset)))
 
 
-def own_rows(study: Study) -> Sequence[NDArray[np.intp]]:
+def own_rows(dataset: Dataset) -> Sequence[NDArray[np.intp]]:
     """Rows of each wheel's own channels; of the total where no wheel is measured by itself."""
-    alone = not any(channel.kind in MOTOR_KINDS for channel in study.channels)
+    alone = not any(channel.kind in MOTOR_KINDS for channel in dataset.channels)
     found: list[list[NDArray[np.intp]]] = [[] for _ in range(WHEELS)]
-    for channel, part in zip(study.channels, rows_of(study.channels), strict=True):
+    for channel, part in zip(dataset.channels, rows_of(dataset.channels), strict=True):
         for wheel in range(WHEELS):
             if channel.kind == "total" if alone else channel.wheel == wheel:
                 found[wheel].append(np.arange(part.start, part.stop))

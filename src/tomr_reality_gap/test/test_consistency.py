@@ -1,4 +1,4 @@
-"""Recordings of different robots in one list: told by parameters that cannot change in between."""
+"""Recordings of different robots in one list: shown by parameters that cannot change in between."""
 
 from types import SimpleNamespace
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tomr_power_model.errors import InputError
-from tomr_reality_gap.fit.alike import refuse_strangers
-from tomr_reality_gap.hypotheses.knobs import Knob
+from tomr_power_model.estimation.parameter import Parameter
+from tomr_reality_gap.fit.consistency import check_same_robot
 
 KEYS = ("robot.mass", "motor.wheel_1_joint.torque_constant", "physics.friction.coulomb.torque")
 VALUES = {KEYS[0]: 15.0, KEYS[1]: 0.035, KEYS[2]: 0.06}
@@ -17,12 +17,12 @@ ROWS = 400
 def _made(
     *off: tuple[float, float, float], noise: float = 0.1, duration: float = 60.0
 ) -> tuple[object, object]:
-    """A study whose recordings' robots are off by such shares of mass, constant and friction."""
+    """A dataset whose recordings' robots are off by such shares of mass, constant and friction."""
     random = np.random.default_rng(2)
-    knobs = tuple(Knob(key, (key,), "", 0.01 * VALUES[key], 1.0) for key in KEYS)
-    matrix = random.standard_normal((ROWS * len(off), 4))  # spreads, and one instrument
-    turns = np.repeat([[part / 0.01 for part in parts] for parts in off], ROWS, axis=0)
-    value = (matrix[:, :3] * turns).sum(axis=1) + noise * random.standard_normal(len(matrix))
+    parameters = tuple(Parameter(key, (key,), "", 0.01 * VALUES[key]) for key in KEYS)
+    matrix = random.standard_normal((ROWS * len(off), 4))  # and one sensor nuisance
+    offsets = np.repeat([[part / 0.01 for part in parts] for parts in off], ROWS, axis=0)
+    value = (matrix[:, :3] * offsets).sum(axis=1) + noise * random.standard_normal(len(matrix))
     channel = SimpleNamespace(time=np.zeros(ROWS))
     simulations = tuple(
         SimpleNamespace(
@@ -30,23 +30,24 @@ def _made(
         )
         for number in range(len(off))
     )
-    model = SimpleNamespace(nuisances=knobs, described=SimpleNamespace(values=VALUES))
-    columns = SimpleNamespace(
+    model = SimpleNamespace(nuisances=parameters, described=SimpleNamespace(values=VALUES))
+    jacobian = SimpleNamespace(
         matrix=matrix,
         nuisance=slice(0, 3),
-        instruments=slice(3, 4),
+        sensors=slice(3, 4),
+        kept=4,
         own=(),
         value=np.zeros(len(matrix)),
         model=model,
     )
     weight = np.full(len(matrix), 1.0 / noise)
-    last = SimpleNamespace(columns=columns, noise=SimpleNamespace(weight=weight))
+    last = SimpleNamespace(jacobian=jacobian, noise=SimpleNamespace(weight=weight))
     return SimpleNamespace(simulations=simulations, value=value), last
 
 
 def test_recordings_of_one_robot_go_together() -> None:
     """Off by five times the tolerance, but all of them alike."""
-    refuse_strangers(*_made((0.1, 0.0, 0.3), (0.1, 0.0, 0.3), (0.11, 0.0, 0.3)))  # type: ignore[arg-type]
+    check_same_robot(*_made((0.1, 0.0, 0.3), (0.1, 0.0, 0.3), (0.11, 0.0, 0.3)))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -58,17 +59,17 @@ def test_recordings_of_one_robot_go_together() -> None:
 )
 def test_another_robot_among_them_is_refused(other: tuple[float, float, float], said: str) -> None:
     with pytest.raises(InputError, match=said):
-        refuse_strangers(*_made((0.0, 0.0, 0.0), (0.01, 0.0, 0.0), other))  # type: ignore[arg-type]
+        check_same_robot(*_made((0.0, 0.0, 0.0), (0.01, 0.0, 0.0), other))  # type: ignore[arg-type]
 
 
 def test_another_floor_is_no_other_robot() -> None:
-    refuse_strangers(*_made((0.0, 0.0, 0.0), (0.0, 0.0, 0.5)))  # type: ignore[arg-type]
+    check_same_robot(*_made((0.0, 0.0, 0.0), (0.0, 0.0, 0.5)))  # type: ignore[arg-type]
 
 
-def test_what_a_recording_hardly_tells_is_not_held_against_it() -> None:
-    refuse_strangers(*_made((0.0, 0.0, 0.0), (0.3, 0.0, 0.0), noise=200.0))  # type: ignore[arg-type]
+def test_what_a_recording_hardly_shows_is_not_held_against_it() -> None:
+    check_same_robot(*_made((0.0, 0.0, 0.0), (0.3, 0.0, 0.0), noise=200.0))  # type: ignore[arg-type]
 
 
-def test_short_drives_tell_the_floor_under_them() -> None:
+def test_short_drives_show_the_floor_under_them() -> None:
     """One straight each, in directions of their own."""
-    refuse_strangers(*_made((0.0, 0.0, 0.0), (0.3, 0.0, 0.0), duration=18.0))  # type: ignore[arg-type]
+    check_same_robot(*_made((0.0, 0.0, 0.0), (0.3, 0.0, 0.0), duration=18.0))  # type: ignore[arg-type]

@@ -6,16 +6,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from tomr_power_model.canvas import AFTER, BEFORE, MEASURED, medians, png, scatter, sheet
+from tomr_power_model.estimation.statistics import autocorrelation
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.explanation import Comparison
-from tomr_reality_gap.report.canvas import AFTER, BEFORE, MEASURED, png, sheet
 from tomr_reality_gap.report.words import channel_name
 
 Array = NDArray[np.float64]
 
-_BINS = 24
-_LEAST_IN_BIN = 8
-_MOST_DOTS = 6000
 _SPREAD = 5.0  # standard deviations shown in a histogram
 _LAGS = 40
 _WHITE = 0.2  # shown of the autocorrelation at least, so that none looks like none
@@ -41,10 +39,10 @@ def residuals(comparisons: Sequence[Comparison], found: bool) -> str:
             span = float(np.percentile(np.abs(before), 99.5)) or 1.0
             labels = ("wheel speed, rad/s", "acceleration, rad/s²", "time, s")
             for panel, variable, label in zip(line, over, labels, strict=True):
-                _scatter(panel, variable, after if found else before, MEASURED)
-                _medians(panel, variable, before, BEFORE)
+                scatter(panel, variable, after if found else before)
+                medians(panel, variable, before, BEFORE)
                 if found:
-                    _medians(panel, variable, after, AFTER)
+                    medians(panel, variable, after, AFTER)
                 panel.axhline(0.0, color="black", lw=0.6)
                 panel.set_ylim(-span, span)
                 panel.set_xlabel(label if row == len(names) - 1 else "", fontsize=8)
@@ -81,20 +79,6 @@ def _against(
     return (speed, rate, time), before, after, unit
 
 
-def _scatter(panel: Axes, over: Array, rest: Array, colour: str) -> None:
-    step = max(1, len(over) // _MOST_DOTS)
-    panel.plot(over[::step], rest[::step], ".", ms=1.2, color=colour, alpha=0.3)
-
-
-def _medians(panel: Axes, over: Array, rest: Array, colour: str) -> None:
-    """Median of each bin that holds enough samples."""
-    edges = np.linspace(over.min(), over.max() + 1e-9, _BINS + 1)
-    bins = np.digitize(over, edges)
-    full = [b for b in range(1, _BINS + 1) if np.count_nonzero(bins == b) >= _LEAST_IN_BIN]
-    centers = [0.5 * (edges[b - 1] + edges[b]) for b in full]
-    panel.plot(centers, [np.median(rest[bins == b]) for b in full], "-o", ms=2, color=colour)
-
-
 def whiteness(comparisons: Sequence[Comparison], found: bool) -> str:
     """Histogram of residual / sigma with the normal one, and its autocorrelation."""
     names = shown_names(comparisons)
@@ -105,7 +89,7 @@ def whiteness(comparisons: Sequence[Comparison], found: bool) -> str:
             for label, colour, explained in sides[: 2 if found else 1]:
                 series = _standard(comparisons, name, explained)
                 _histogram(histogram, np.concatenate(series), colour, label)
-                values = autocorrelation(series)
+                values = autocorrelation(series, _LAGS + 1)[1:]
                 correlation.plot(range(1, _LAGS + 1), values, "-o", ms=2, lw=0.9, color=colour)
             samples = sum(len(item) for item in series)
             correlation.axhspan(*_chance(samples), color=MEASURED, alpha=0.3, lw=0)
@@ -144,15 +128,3 @@ def _chance(samples: int) -> tuple[float, float]:
     """95 % of the autocorrelations of white noise."""
     half = 1.96 / np.sqrt(max(1, samples))
     return -half, half
-
-
-def autocorrelation(series: Sequence[Array]) -> Array:
-    """Of residuals about zero, lags 1 to 40; pairs do not reach across recordings, (40,)."""
-    power = sum(float(item @ item) for item in series) or 1.0
-    return np.array(
-        [
-            sum(float(item[: len(item) - lag] @ item[lag:]) for item in series if len(item) > lag)
-            / power
-            for lag in range(1, _LAGS + 1)
-        ]
-    )

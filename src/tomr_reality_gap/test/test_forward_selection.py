@@ -1,21 +1,22 @@
-"""Evidence by hand, and effects that the search must find in made recordings."""
+"""Effects that the forward selection must find in made recordings."""
 
 import numpy as np
 import pytest
 from attrs import evolve
-from scipy.stats import multivariate_normal
 
+from tomr_power_model.estimation.noise import rows_of
+from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, per_wheel
 from tomr_power_model.robot import Robot, read_description
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
-from tomr_reality_gap.fit.linear import Gram, evidence
-from tomr_reality_gap.fit.noise import rows_of
-from tomr_reality_gap.fit.probed import probed
-from tomr_reality_gap.fit.refine import moved
-from tomr_reality_gap.fit.screen import _companions
-from tomr_reality_gap.fit.search import Found, search
-from tomr_reality_gap.fit.study import Columns, Model, Study
+from tomr_reality_gap.fit.basis_responses import basis_responses
+from tomr_reality_gap.fit.dataset import Dataset
+from tomr_reality_gap.fit.forward_selection import Selection, forward_selection
+from tomr_reality_gap.fit.jacobian import Jacobian
+from tomr_reality_gap.fit.model import Model
+from tomr_reality_gap.fit.refine import state_at
+from tomr_reality_gap.fit.screening import joint_candidates
 from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
-from tomr_reality_gap.hypotheses.knobs import Hypothesis, Knob, Turned, turned
+from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 from tomr_reality_gap.hypotheses.scales import scales_of, traction_ratios_of
 
 from .test_alignment import simulation  # noqa: F401 -- the fixture
@@ -24,22 +25,13 @@ NOISE = {"power": 0.1, "total": 0.2, "voltage": 3e-3, "speed": 0.02, "yaw": 2e-3
 TRIED = ("friction.asymmetric", "friction.viscous", "electrical.switching_loss", "body.payload")
 
 
-def test_evidence_is_the_ratio_of_gaussian_densities() -> None:
-    random = np.random.default_rng(0)
-    columns, residual = random.normal(size=(12, 3)), random.normal(size=12)
-    with_all = multivariate_normal(np.zeros(12), np.eye(12) + columns @ columns.T)
-    nothing = multivariate_normal(np.zeros(12), np.eye(12))
-    expected = with_all.logpdf(residual) - nothing.logpdf(residual)
-    assert evidence(Gram.of(columns, residual), [0, 1, 2]) == pytest.approx(expected)
-
-
-def _base(robot: Robot) -> Turned:
-    return turned(dict(read_description("reference")), robot.wheel_names, "reference")
+def _base(robot: Robot) -> ParameterisedRobot:
+    return per_wheel(dict(read_description("reference")), robot.wheel_names, "reference")
 
 
 def searched(
     made: RecordingSimulation, value: np.ndarray, tried: tuple[str, ...] = TRIED
-) -> tuple[Study, Found]:
+) -> tuple[Dataset, Selection]:
     """Record values with noise, and search with the description of the reference robot."""
     random = np.random.default_rng(5)
     channels = tuple(
@@ -48,19 +40,20 @@ def searched(
     )
     base, wheels = _base(made.robot), made.robot.wheel_names
     run = made.run(base.robot)
-    scales = scales_of(made.robot, run.speed, run.power, run.copper, 30.0)
+    scales = scales_of(made.robot, run.speed, run.power, run.copper, duration=30.0)
     ratios = traction_ratios_of(made.robot, run.speed, made.timeline.period)
     scales = evolve(scales, traction_ratios=ratios)
-    knobs = nuisances(base, wheels, 0.02)
+    parameters = nuisances(base, wheels, 0.02)
     candidates = [
         item for item in catalogue(base, wheels, scales, 0.02) if item.effect.startswith(tried)
     ]
-    study = Study((evolve(made, channels=channels),))
-    nameless = probed(study, base.robot, scales.torque)
-    return study, search(study, Model(base, knobs, (0.0,) * len(knobs)), candidates, nameless)
+    dataset = Dataset((evolve(made, channels=channels),))
+    basis = basis_responses(dataset, base.robot, scales.torque)
+    model = Model(base, parameters, (0.0,) * len(parameters))
+    return dataset, forward_selection(dataset, model, candidates, basis)
 
 
-def _found(made: RecordingSimulation, real: Robot, tried: tuple[str, ...] = TRIED) -> Found:
+def _found(made: RecordingSimulation, real: Robot, tried: tuple[str, ...] = TRIED) -> Selection:
     return searched(made, made.predict([real])[0], tried)[1]
 
 
@@ -76,7 +69,7 @@ def test_a_concealed_friction_is_named_with_its_wheel_and_size(
     assert [item.name for item in found.model.hypotheses] == [
         "friction.asymmetric at wheel_2_joint"
     ]
-    value, sigma = found.model.turns[0][0], found.own_sigma[0]
+    value, sigma = found.model.offsets[0][0], found.own_sigma[0]
     assert abs(value - 0.02) < 4.0 * sigma
     assert sigma < 0.004
 
@@ -113,66 +106,75 @@ def test_two_wrongs_that_hide_each_other_are_found_together(
     }
 
 
-def test_a_wheel_that_slides_is_named_with_its_grip(
+def test_a_wheel_that_slides_is_named_with_its_friction(
     simulation: RecordingSimulation,  # noqa: F811
 ) -> None:
-    """Far from where nothing slides: no derivative there tells of it."""
+    """Far from where nothing slides: no derivative there shows it."""
     robot = simulation.robot
     slips = (None, {"friction": 0.2}, None)
     real = evolve(robot, physics={**robot.physics, "contact.slip": slips})
     tried = ("contact.slip", "friction.viscous")
     best = _found(simulation, real, tried).best
     assert [item.name for item in best.model.hypotheses] == ["contact.slip at wheel_2_joint"]
-    knob, turn = best.model.own[0], best.model.turns[0][0]
-    assert best.model.hypotheses[0].start[knob.keys[0]] + turn == pytest.approx(0.2, abs=0.004)
+    start = best.model.hypotheses[0].start[best.model.own[0].keys[0]]
+    assert start + best.model.offsets[0][0] == pytest.approx(0.2, abs=0.004)
 
 
 def test_a_parameter_that_an_addition_pushes_far_out_of_its_tolerance_comes_along() -> None:
     key = "motor.wheel_1_joint.resistance"
-    model = Model(Turned({}, "made"), (Knob(key, (key,), "", 1.0, 0.1, -1.25, 1.25),), (0.0,))
+    tolerated = Parameter(key, (key,), "", 1.0, lower=-1.25, upper=1.25)
+    model = Model(ParameterisedRobot({}, "made"), (tolerated,), (0.0,))
     wrong = Hypothesis(
-        "parameter.motor.resistance", ("wheel_1_joint",), (Knob("value", (key,), "ohm", 1.0, 0.1),)
+        "parameter.motor.resistance",
+        ("wheel_1_joint",),
+        (Parameter("value", (key,), "ohm", 1.0),),
     )
-    friction = Knob("torque", ("physics.friction.coulomb.torque",), "N m", 1.0, 0.1)
+    friction = Parameter("torque", ("physics.friction.coulomb.torque",), "N m", 1.0)
     added = Hypothesis("friction.coulomb", ("all_wheels",), (friction,))
-    for turn, expected in ((3.0, (wrong,)), (-3.0, (wrong,)), (1.2, ())):
-        assert _companions(model, [0], np.array([turn]), added, [added, wrong]) == expected
+    for offset, expected in ((3.0, (wrong,)), (-3.0, (wrong,)), (1.2, ())):
+        assert joint_candidates(model, np.array([offset]), added, [added, wrong]) == expected
 
 
-def test_late_power_sensors_are_told_from_slow_ones(
+def test_late_power_sensors_are_distinguished_from_slow_ones(
     simulation: RecordingSimulation,  # noqa: F811
 ) -> None:
-    """15 ms, longer than a step in power lasts: its derivative at none tells nothing."""
+    """15 ms, longer than a step in power lasts: its derivative at none shows nothing."""
     robot = simulation.robot
     late = ({"delay": 0.015},) * 3
     real = evolve(robot, physics={**robot.physics, "sensor.clock_offset": late})
     tried = ("sensor.clock_offset", "sensor.power_lag")
     best = _found(simulation, real, tried).best
     assert [item.name for item in best.model.hypotheses] == ["sensor.clock_offset at all_wheels"]
-    assert best.model.turns[0][0] == pytest.approx(0.015, abs=0.002)
+    assert best.model.offsets[0][0] == pytest.approx(0.015, abs=0.002)
 
 
-def test_an_instrument_is_off_by_a_little_or_not_at_all() -> None:
+def test_a_sensor_nuisance_is_off_by_a_little_or_not_at_all() -> None:
     """A clock's column is a straight line: far out it would pass for a slow sensor."""
     nothing = np.empty((0, 3))
-    columns = Columns(
-        Model(Turned({}, "made"), (), ()), *np.empty((2, 0)), nothing, slice(0), slice(3), (), {}
+    jacobian = Jacobian(
+        Model(ParameterisedRobot({}, "made"), (), ()),
+        *np.empty((2, 0)),
+        nothing,
+        slice(0),
+        slice(3),
+        (),
+        {},
     )
-    turns = np.array([0.5, 7.0, -20.0])
-    _, instruments = moved(columns.model, turns, columns)
-    np.testing.assert_array_equal(instruments, [0.5, 4.0, -4.0])
+    offsets = np.array([0.5, 7.0, -20.0])
+    _, sensors = state_at(jacobian.model, offsets, jacobian)
+    np.testing.assert_array_equal(sensors, [0.5, 4.0, -4.0])
 
 
 def test_delays_of_power_sensors_are_tried_far_from_none(
     simulation: RecordingSimulation,  # noqa: F811
 ) -> None:
     base, run = _base(simulation.robot), simulation.run(simulation.robot)
-    scales = scales_of(simulation.robot, run.speed, run.power, run.copper, 30.0)
-    leaps = {
-        item.knobs[0].leap
+    scales = scales_of(simulation.robot, run.speed, run.power, run.copper, duration=30.0)
+    alternatives = {
+        item.parameters[0].discrete_offset
         for item in catalogue(base, simulation.robot.wheel_names, scales, 0.02)
         if item.name == "sensor.clock_offset at all_wheels"
     }
-    assert 0.0 in leaps
-    assert max(leaps) > 0.05
-    assert min(leaps) < -0.01
+    assert 0.0 in alternatives
+    assert max(alternatives) > 0.05
+    assert min(alternatives) < -0.01

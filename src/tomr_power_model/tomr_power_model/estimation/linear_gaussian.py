@@ -1,7 +1,7 @@
 """Linear Gaussian models of a mismatch: what each set of columns explains, and its evidence.
 
-With whitened data r (residuals / sigma), columns A of derivatives scaled by the spread of each
-knob's belief, and knobs x ~ N(0, 1), the log evidence against no columns at all is
+With whitened data r (residuals / sigma), columns A of derivatives scaled by the prior standard
+deviation of each parameter, and parameters x ~ N(0, 1), the log evidence against no columns is
 
     L = 1/2 b^T (I + G)^-1 b - 1/2 log|I + G|,   G = A^T A,  b = A^T r
 
@@ -31,7 +31,7 @@ class Gram:
 
     @classmethod
     def of(cls, columns: Matrix, residual: Array, weight: Array | None = None) -> "Gram":
-        """From columns (n, p), scaled by their spreads, and residuals (n,).
+        """From columns (n, p), in prior standard deviations, and residuals (n,).
 
         Both are whitened already, or to be multiplied by `weight`, (n,).
         """
@@ -47,17 +47,17 @@ class Gram:
         return cls(matrix, vector, float(whitened @ whitened))
 
 
-def times(columns: Matrix, turns: Array) -> Array:
-    """Columns (n, p) times turns (p,), in double precision."""
-    parts = [columns[row : row + _ROWS] @ turns for row in range(0, len(columns), _ROWS)]
+def product(columns: Matrix, units: Array) -> Array:
+    """Columns (n, p) times units (p,), in double precision."""
+    parts = [columns[row : row + _ROWS] @ units for row in range(0, len(columns), _ROWS)]
     return np.concatenate([np.empty(0), *parts])
 
 
 @frozen
 class Solution:
-    """Posterior of one subset of columns, in units of their spreads."""
+    """Posterior of one subset of columns, in units of their prior standard deviations."""
 
-    evidence: float
+    evidence: float  # log, against no columns
     mean: Array  # (k,)
     factor: tuple[Array, bool]  # Cholesky factor of I + G
 
@@ -65,14 +65,6 @@ class Solution:
     def covariance(self) -> Array:
         """Of the mean, (k, k)."""
         return np.asarray(cho_solve(self.factor, np.eye(len(self.mean))))
-
-
-def evidence(gram: Gram, chosen: Sequence[int]) -> float:
-    """Log evidence of a subset of columns against none."""
-    rows = np.asarray(chosen)
-    factor = cho_factor(gram.matrix[np.ix_(rows, rows)] + np.eye(len(rows)), lower=True)
-    explained = float(gram.vector[rows] @ cho_solve(factor, gram.vector[rows]))
-    return 0.5 * explained - float(np.log(np.diag(factor[0])).sum())
 
 
 def solve(gram: Gram, chosen: Sequence[int]) -> Solution:

@@ -1,19 +1,19 @@
 """What a sample weighs: on made residuals whose noise is known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from tomr_reality_gap.alignment.channels import Channel, Kind
-from tomr_reality_gap.fit.noise import Local, noise_of
+from tomr_power_model.estimation.noise import Local, noise_of
 
 COUNT = 4000
 NOTHING = np.zeros((COUNT, 1))
 STILL = np.zeros(COUNT)
 
 
-def _channel(kind: Kind = "voltage") -> Channel:
-    time = 0.02 * np.arange(COUNT)
-    return Channel("made", kind, None, "V", time, np.full(COUNT, 0.005), STILL)
+def _channel(kind: str = "voltage") -> SimpleNamespace:
+    return SimpleNamespace(kind=kind, time=0.02 * np.arange(COUNT), quantum=0.0)
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def white() -> np.ndarray:
 
 
 def test_white_noise_weighs_by_its_size(white: np.ndarray) -> None:
-    found = noise_of([_channel()], 0.5 * white, NOTHING, STILL, STILL)
+    found = noise_of([_channel()], 0.5 * white, NOTHING, STILL, time_derivative=STILL)
     assert found.time[0] == pytest.approx(1.0, abs=0.1)
     assert np.median(found.weight) == pytest.approx(2.0, rel=0.05)
 
@@ -33,7 +33,7 @@ def test_correlated_noise_weighs_as_few_samples(white: np.ndarray) -> None:
     noise[0] = white[0]
     for row in range(1, COUNT):
         noise[row] = 0.9 * noise[row - 1] + white[row]
-    found = noise_of([_channel()], noise, NOTHING, STILL, STILL)
+    found = noise_of([_channel()], noise, NOTHING, STILL, time_derivative=STILL)
     assert found.time[0] == pytest.approx(19.0, rel=0.25)
     usual = np.sqrt(0.19 / 19.0)
     assert np.median(found.weight) == pytest.approx(usual, rel=0.2)
@@ -43,42 +43,49 @@ def test_outliers_weigh_less(white: np.ndarray) -> None:
     """20 deviations off weigh as 4: a fifth."""
     noise = white.copy()
     noise[100] = 20.0
-    weight = noise_of([_channel()], noise, NOTHING, STILL, STILL).weight
+    weight = noise_of([_channel()], noise, NOTHING, STILL, time_derivative=STILL).weight
     assert weight[100] / np.median(weight) == pytest.approx(0.2, rel=0.1)
 
 
-def test_jitter_and_noise_of_scale_are_told_from_constant_noise(white: np.ndarray) -> None:
+def test_jitter_and_noise_of_scale_are_separated_from_constant_noise(white: np.ndarray) -> None:
     phase = 2.0 * np.pi * np.arange(COUNT) / 500.0
-    slope, value = 10.0 * np.cos(phase), 5.0 * np.sin(phase)
-    for shape in (slope, value):
+    time_derivative, value = 10.0 * np.cos(phase), 5.0 * np.sin(phase)
+    for shape in (time_derivative, value):
         noise = white * np.hypot(0.1, 0.1 * shape)
-        sigma = noise_of([_channel("power")], noise, NOTHING, value, slope).sigma
+        sigma = noise_of(
+            [_channel("power")], noise, NOTHING, value, time_derivative=time_derivative
+        ).sigma
         np.testing.assert_allclose(sigma[::50], np.hypot(0.1, 0.1 * shape)[::50], rtol=0.3)
 
 
 def test_what_can_be_explained_is_no_noise(white: np.ndarray) -> None:
     column = np.sign(np.sin(0.01 * np.arange(COUNT)))
     residual = 3.0 * column + 0.2 * white
-    sigma = noise_of([_channel()], residual, column[:, None], STILL, STILL).sigma
+    sigma = noise_of([_channel()], residual, column[:, None], STILL, time_derivative=STILL).sigma
     assert np.median(sigma) == pytest.approx(0.2, rel=0.1)
 
 
 def test_what_can_be_explained_in_some_rows_only_is_no_noise_there(white: np.ndarray) -> None:
-    """Columns of two halves, beside one of all rows that they overlap with."""
+    """Jacobian of two halves, beside one of all rows that they overlap with."""
     whole = np.sign(np.sin(0.01 * np.arange(COUNT)))
     first, last = np.arange(COUNT // 2), np.arange(COUNT // 2, COUNT)
     part = np.cos(0.02 * np.arange(COUNT))
     residual = 2.0 * whole + np.where(np.arange(COUNT) < COUNT // 2, 3.0, -1.0) * part
     local = [Local(rows, part[rows, None]) for rows in (first, last)]
     sigma = noise_of(
-        [_channel()], residual + 0.2 * white, whole[:, None], STILL, STILL, local
+        [_channel()],
+        residual + 0.2 * white,
+        whole[:, None],
+        STILL,
+        time_derivative=STILL,
+        local=local,
     ).sigma
     assert np.median(sigma) == pytest.approx(0.2, rel=0.1)
 
 
-def test_a_channel_that_mostly_stands_still_is_not_believed_to_be_exact(white: np.ndarray) -> None:
+def test_a_channel_that_mostly_stands_still_is_not_taken_to_be_exact(white: np.ndarray) -> None:
     """Without noise at rest a sample there would weigh all."""
     value = np.where(np.arange(COUNT) % 1000 < 500, 0.0, 8.0)
     noise = 0.02 * white * (value > 0.0)
-    sigma = noise_of([_channel("speed")], noise, NOTHING, value, STILL).sigma
+    sigma = noise_of([_channel("speed")], noise, NOTHING, value, time_derivative=STILL).sigma
     assert sigma.min() > 0.3 * 4e-3 * value.std()

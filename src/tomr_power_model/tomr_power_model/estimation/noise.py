@@ -9,6 +9,7 @@ autocorrelation time in samples.
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from attrs import frozen
@@ -16,16 +17,15 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dpstrf
 from scipy.optimize import nnls
 
-from tomr_power_model.estimation.statistics import robust_scale
-from tomr_reality_gap.alignment.channels import Channel
-from tomr_reality_gap.fit.linear import Gram, Matrix, times
+from tomr_power_model.estimation.discrepancy import SIMULATOR
+from tomr_power_model.estimation.linear_gaussian import Gram, Matrix, product
+from tomr_power_model.estimation.statistics import autocorrelation_time, robust_scale
 
 Array = NDArray[np.float64]
 
 _ROUNDS = 4
 _RIDGE = 1e-2
 _FLOOR = 0.3  # of the median deviation: a channel that stands still for long is not that exact
-_INEXACT = 2e-3  # of motion: what the simulator itself is not sure of
 _OUTLIER = 4.0  # standard deviations: beyond, a sample weighs less
 _LAGS = 80
 _UNCORRELATED = 0.03
@@ -38,6 +38,19 @@ class Noise:
     weight: Array  # 1 / sigma of each sample, correlation and outliers accounted for, (n,)
     sigma: Array  # of each sample, (n,)
     time: tuple[float, ...]  # autocorrelation time of each channel [samples]
+
+
+class Channel(Protocol):
+    """What is known of a measured quantity."""
+
+    @property
+    def time(self) -> Array: ...  # s, (m,)
+
+    @property
+    def kind(self) -> str: ...  # "voltage", "speed", ...
+
+    @property
+    def quantum(self) -> float: ...  # in its unit
 
 
 @frozen
@@ -59,7 +72,8 @@ def noise_of(
     residual: Array,
     columns: Matrix,
     value: Array,
-    slope: Array,
+    *,
+    time_derivative: Array,
     local: Sequence[Local] = (),
 ) -> Noise:
     """Noise left by a fit of all columns together.
@@ -67,9 +81,9 @@ def noise_of(
     Args:
         channels: that the rows belong to.
         residual: measured - modelled, (n,).
-        columns: of everything that may explain it, scaled by beliefs, (n, p).
+        columns: of everything that may explain it, in prior standard deviations, (n, p).
         value: modelled, (n,).
-        slope: its derivative in time, (n,).
+        time_derivative: its derivative in time, (n,).
         local: further columns, of rows that do not overlap.
     """
     rows = rows_of(channels)
@@ -84,9 +98,13 @@ def noise_of(
         left = _left(columns, residual, weight, local)
         for number, (channel, part) in enumerate(zip(channels, rows, strict=True)):
             noise = left[part]
-            variance[part] = _variance(channel, noise, variance[part], value[part], slope[part])
+            variance[part] = _variance(
+                channel, noise, variance[part], value[part], time_derivative[part]
+            )
             standard = noise / np.sqrt(variance[part])
-            times[number] = _correlation_time(np.clip(standard, -_OUTLIER, _OUTLIER))
+            series = np.clip(standard, -_OUTLIER, _OUTLIER)
+            lags = max(1, min(_LAGS, len(series) // 4))
+            times[number] = autocorrelation_time([series], lags, _UNCORRELATED)
             outlier[part] = np.minimum(1.0, _OUTLIER / np.maximum(np.abs(standard), 1e-12))
     weight = _weight(rows, variance, times, outlier)
     return Noise(weight, np.sqrt(variance), tuple(times.tolist()))
@@ -123,39 +141,26 @@ def _left(columns: Matrix, residual: Array, weight: Array, local: Sequence[Local
         matrix -= cross @ solved[:, :-1]
         vector -= cross @ solved[:, -1]
         blocks.append(solved)
-    turns = np.asarray(np.linalg.solve(matrix, vector), dtype=np.float64)
-    left = residual - times(columns, turns)
+    found = np.asarray(np.linalg.solve(matrix, vector), dtype=np.float64)
+    left = residual - product(columns, found)
     for item, solved in zip(local, blocks, strict=True):
-        left[item.rows] -= item.matrix @ (solved[:, -1] - solved[:, :-1] @ turns)
+        left[item.rows] -= item.matrix @ (solved[:, -1] - solved[:, :-1] @ found)
     return np.asarray(left)
 
 
 def _scale(noise: Array, quantum: float) -> float:
-    spread = robust_scale(noise)
-    return max(spread, 0.1 * float(np.std(noise)), quantum / math.sqrt(12.0), 1e-9)
+    return max(robust_scale(noise), 0.1 * float(np.std(noise)), quantum / math.sqrt(12.0), 1e-9)
 
 
-def _variance(channel: Channel, noise: Array, before: Array, value: Array, slope: Array) -> Array:
+def _variance(channel: Channel, noise: Array, before: Array, value: Array, change: Array) -> Array:
     features = [np.ones_like(noise)]
     if channel.kind != "voltage":
-        features += [slope**2, value**2]
+        features += [change**2, value**2]
     matrix = np.stack(features, axis=1) / before[:, None]
     square = np.minimum(noise**2, _OUTLIER**2 * before) / before
     unit = np.sqrt((matrix**2).sum(axis=0)) + 1e-300
     shares, _ = nnls(matrix / unit, square)
     floor = max((_FLOOR * _scale(noise, channel.quantum)) ** 2, channel.quantum**2 / 12.0)
     if channel.kind in ("speed", "yaw"):
-        floor += (_INEXACT * float(np.std(value))) ** 2
+        floor += (SIMULATOR.motion * float(np.std(value))) ** 2
     return np.asarray(np.maximum((matrix * before[:, None]) @ (shares / unit), floor))
-
-
-def _correlation_time(series: Array) -> float:
-    """1 + 2 sum of the autocorrelation up to where it has died away."""
-    power = max(float(np.mean(series**2)), 1e-300)  # a simulation may be told without noise
-    time = 1.0
-    for lag in range(1, min(_LAGS, len(series) // 4)):
-        share = float(np.mean(series[:-lag] * series[lag:])) / power
-        if share < _UNCORRELATED:
-            break
-        time += 2.0 * share
-    return time

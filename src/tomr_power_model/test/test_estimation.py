@@ -1,0 +1,141 @@
+"""Evidence, optimiser, loss and parameters of the estimation, on problems solved by hand."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import least_squares, lsq_linear
+from scipy.stats import multivariate_normal
+
+from tomr_power_model.estimation.gauss_newton import (
+    GaussNewtonSettings,
+    Linearisation,
+    Start,
+    maximise,
+)
+from tomr_power_model.estimation.linear_gaussian import Gram, solve
+from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, per_wheel
+from tomr_power_model.estimation.robust import soft_l1
+from tomr_power_model.estimation.statistics import (
+    autocorrelation,
+    autocorrelation_time,
+    robust_scale,
+)
+from tomr_power_model.robot import read_description
+
+Array = NDArray[np.float64]
+
+WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
+PRECISE = GaussNewtonSettings(most_steps=60, settled=1e-12)
+
+
+@pytest.fixture
+def linear() -> tuple[Array, Array]:
+    random = np.random.default_rng(0)
+    return random.normal(size=(12, 3)), 3.0 * random.normal(size=12)
+
+
+def _start(units: Sequence[float], edge: float = np.inf) -> Start:
+    wide = np.full(len(units), np.inf)
+    return Start(np.array(units), np.full(len(units), -edge), np.full(len(units), edge), wide)
+
+
+def test_evidence_is_the_ratio_of_gaussian_densities(linear: tuple[Array, Array]) -> None:
+    columns, residual = linear
+    with_all = multivariate_normal(np.zeros(12), np.eye(12) + columns @ columns.T)
+    nothing = multivariate_normal(np.zeros(12), np.eye(12))
+    expected = with_all.logpdf(residual) - nothing.logpdf(residual)
+    assert solve(Gram.of(columns, residual), [0, 1, 2]).evidence == pytest.approx(expected)
+
+
+def test_a_linear_problem_takes_one_step(linear: tuple[Array, Array]) -> None:
+    columns, measured = linear
+    (found,) = maximise(
+        [_start([0.5, 0.0, -1.0])],
+        lambda _, points: [Linearisation.of(measured - columns @ points[0], columns)],
+        GaussNewtonSettings(most_steps=2, settled=-1.0),
+    )
+    whole = solve(Gram.of(columns, measured), [0, 1, 2])
+    assert found.best is not None
+    np.testing.assert_allclose(found.best.units, whole.mean)
+    np.testing.assert_allclose(found.best.covariance, whole.covariance)
+    expected = whole.evidence - 0.5 * measured @ measured
+    assert found.best.log_evidence == pytest.approx(expected)
+
+
+def test_an_unknown_at_its_bound_is_held_and_the_others_go_on(linear: tuple[Array, Array]) -> None:
+    columns, measured = linear
+    columns = columns @ np.array([[1.0, 0.9, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 1.0]])  # correlated
+    (found,) = maximise(
+        [_start([0.0, 0.0, 0.0], edge=0.3)],
+        lambda _, points: [Linearisation.of(measured - columns @ points[0], columns)],
+        PRECISE,
+    )
+    stacked = np.concatenate([columns, np.eye(3)]), np.concatenate([measured, np.zeros(3)])
+    expected = lsq_linear(*stacked, bounds=(-0.3, 0.3), tol=1e-14).x
+    assert np.isclose(np.abs(expected), 0.3, atol=1e-6).any()
+    assert found.best is not None
+    np.testing.assert_allclose(found.best.units, expected, atol=1e-6)
+
+
+def test_a_robust_nonlinear_problem_agrees_with_scipy() -> None:
+    time = np.linspace(0.0, 2.0, 40)
+    measured = 2.0 * np.exp(-1.3 * time)
+    measured[7] += 30.0
+
+    def standard(x: Array) -> Array:
+        return np.asarray((measured - x[0] * np.exp(-x[1] * time)) / 0.1)
+
+    def evaluate(_: Sequence[int], points: Sequence[Array]) -> list[Linearisation]:
+        (a, b) = points[0]
+        root, change = soft_l1(standard(points[0]))
+        slope = np.stack([np.exp(-b * time), -a * time * np.exp(-b * time)], axis=1) / 0.1
+        return [Linearisation.of(root, change[:, None] * slope)]
+
+    (found,) = maximise([_start([1.0, 0.2])], evaluate, PRECISE)
+    expected = least_squares(
+        lambda x: np.concatenate([soft_l1(standard(x))[0], x]), [1.0, 0.2], xtol=1e-12
+    ).x
+    assert found.best is not None
+    np.testing.assert_allclose(found.best.units, expected, rtol=1e-5)
+    np.testing.assert_allclose(expected, [2.0, 1.3], rtol=0.1)
+
+
+def test_hopeless_problems_are_left_alone(linear: tuple[Array, Array]) -> None:
+    columns, measured = linear
+    asked: list[list[int]] = []
+
+    def evaluate(numbers: Sequence[int], points: Sequence[Array]) -> list[Linearisation]:
+        asked.append(list(numbers))
+        scale = [1.0 if number else 100.0 for number in numbers]
+        return [
+            Linearisation.of(s * (measured - 0.1 * columns @ point), 1e-3 * columns)
+            for s, point in zip(scale, points, strict=True)
+        ]
+
+    maximise([_start([1.0] * 3)] * 2, evaluate, GaussNewtonSettings(settled=-1.0))
+    assert asked[0] == [0, 1]
+    assert all(numbers == [1] for numbers in asked[1:])
+
+
+def test_autocorrelation_ends_with_each_piece() -> None:
+    """(1, -1, 1, -1) twice: three pairs of product -1 over four squares in each."""
+    alternating = np.array([1.0, -1.0, 1.0, -1.0])
+    assert autocorrelation([alternating, alternating])[1] == pytest.approx(-6.0 / 8.0)
+    assert autocorrelation_time([np.ones(2), np.ones(2)]) == pytest.approx(2.0)
+    assert autocorrelation_time([np.ones(400)], 10, 0.03) > 15.0
+    assert robust_scale(np.array([-1.0, 1.0, 1.0, 50.0])) == pytest.approx(1.4826, rel=1e-4)
+
+
+def test_offsets_stay_within_the_bounds_of_the_description() -> None:
+    base = per_wheel(read_description("reference"), WHEELS, "reference")
+    keys = tuple(f"physics.friction.coulomb.{wheel}.torque" for wheel in WHEELS)
+    torque = Parameter("torque", keys, "N m", 0.01)
+    assert base.offset([torque], [0.02]).values[keys[1]] == pytest.approx(0.08)
+    assert base.offset([torque], [-1.0]).values[keys[1]] == 0.0
+
+
+def test_coordinates_of_the_mass_centre_are_set_one_by_one() -> None:
+    base = ParameterisedRobot(read_description("reference"), "reference")
+    assert base.given({"robot.mass_center.y": 0.03}).robot.mass_center[1] == 0.03

@@ -1,0 +1,25 @@
+"""The error model of the simulator: how exact it is taken to be, in one place.
+
+No simulator is exact, and a recording of minutes has samples enough to show it. What a fit finds
+counts only beyond these shares.
+"""
+
+from attrs import frozen
+
+
+@frozen(kw_only=True)
+class SimulatorDiscrepancy:
+    """Errors of the simulator itself, each a share of what it is written beside."""
+
+    motion: float = 2e-3  # of the standard deviation of a speed: floor of its noise
+    power: float = 0.03  # of the standard deviation of a power: counts as explained
+    torque: float = 0.006  # of the power's standard deviation: less is not worth a correction
+    parameter: float = 0.02  # of a fitted offset: added to its interval
+    log_evidence_per_sample: float = 0.003  # that a finding must bring
+    named: float = 0.01  # of the log evidence of all findings: what one of them must bring
+    unmodelled: float = 0.12  # the same, of an effect without a name
+    beside_unmodelled: float = 0.3  # of an unnamed effect's log evidence: a named one beside it
+    temper: float = 3.0  # root of the odds: likelihoods are not exact either
+
+
+SIMULATOR = SimulatorDiscrepancy()

@@ -1,0 +1,100 @@
+"""The rules of a verdict, on numbers made by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tomr_reality_gap.rules import (
+    Residuals,
+    confidence_of,
+    energy_shares,
+    estimate_of,
+    is_doubted,
+    is_rival,
+    is_unmodelled,
+    unexplained,
+    unmodelled_share,
+)
+
+COUNT = 3000
+
+
+def _channel(before: float, after: float, is_drawn: bool = True) -> Residuals:
+    """White noise of 0.1 about offsets."""
+    noise = 0.1 * np.random.default_rng(1).standard_normal(COUNT)
+    return Residuals(before + noise, after + noise, 1.0, 0.0, is_drawn)
+
+
+def test_an_interval_holds_noise_simulator_and_what_the_simulation_shows() -> None:
+    found = estimate_of(0.5, 0.3, offset=20.0, baseline=0.0)
+    assert found.high - found.value == pytest.approx(1.96 * 0.5)  # 3, 4, 5 with 2 % of 20
+    found = estimate_of(0.5, 0.3, offset=0.0, baseline=0.8)
+    assert found.value - found.low == pytest.approx(1.96 * 0.5)
+
+
+def test_an_interval_ends_at_the_bounds_and_an_angle_turns() -> None:
+    found = estimate_of(0.1, 1.0, offset=0.1, bounds=(0.0, 1.5))
+    assert (found.low, found.high) == (0.0, 1.5)
+    assert estimate_of(math.pi + 0.1, 0.1, offset=0.0, unit="rad").value < 0.0
+
+
+def test_rivals_are_what_comes_within_five_of_log_evidence() -> None:
+    assert [is_rival(odds) for odds in (1.0, -4.9, -5.1)] == [True, True, False]
+
+
+def test_confidence_is_the_tempered_odds_of_a_finding_and_its_rivals() -> None:
+    assert confidence_of([]) == pytest.approx(0.97)
+    near, rest = 1.0 + math.exp(-1.0), math.exp(-4.0)
+    assert confidence_of([-3.0, -12.0]) == pytest.approx(0.97 * near / (near + rest))
+    assert confidence_of([-1e9]) == pytest.approx(0.97)
+
+
+@pytest.mark.parametrize(
+    ("evidence", "named", "cost", "expected"),
+    [(59.0, 0.0, 20.0, False), (61.0, 0.0, 20.0, True), (90.0, 0.0, 100.0, False),
+     (119.0, 1000.0, 20.0, False), (121.0, 1000.0, 20.0, True)],
+)  # fmt: skip
+def test_what_has_no_name_must_bring_more_than_a_name(
+    evidence: float, named: float, cost: float, expected: bool
+) -> None:
+    assert is_unmodelled(evidence, named, cost) is expected
+
+
+def test_names_that_leave_much_are_doubted_and_a_small_rest_casts_no_doubt() -> None:
+    """Small against the noise, or against what was explained."""
+    assert is_doubted(0.5, 2.0, has_findings=True)
+    assert not is_doubted(0.5, 0.8, has_findings=True)
+    assert not is_doubted(0.2, 5.0, has_findings=True)
+
+
+def test_slow_noise_is_a_match_and_much_more_is_none() -> None:
+    assert not is_doubted(0.9, 2.0, has_findings=False)
+    assert is_doubted(0.9, 50.0, has_findings=False)
+
+
+def test_findings_share_what_they_explain_by_what_is_lost_without_them() -> None:
+    """Of 1100 units of energy 100 are noise; 1000 are explained, three parts to one."""
+    assert energy_shares(1100.0, 100.0, [700.0, 300.0], 100) == pytest.approx([0.75, 0.25])
+    assert energy_shares(1100.0, 600.0, [1100.0], 100) == pytest.approx([0.5])
+    assert energy_shares(100.0, 100.0, [], 100) == []
+    assert unmodelled_share(250.0, 1100.0, 600.0, 100) == pytest.approx(0.5)
+    assert unmodelled_share(9e9, 1100.0, 600.0, 100) == 1.0
+
+
+def test_what_is_left_counts_beyond_noise_and_a_part_of_the_spread() -> None:
+    """Noise 0.1 and 3 % of 1: what is 1.0 off is 1 / 0.0109 = 92 times that."""
+    share, size = unexplained([_channel(1.0, 1.0)])
+    assert share == pytest.approx(1.0)
+    assert size == pytest.approx(92.0, rel=0.05)
+    share, size = unexplained([_channel(1.0, 0.0)])
+    assert share < 0.01
+    assert size < 0.1
+    assert unexplained([_channel(0.0, 0.0)])[0] <= 1.0
+    assert unexplained([]) == (0.0, 0.0)
+
+
+def test_speeds_count_for_the_share_only() -> None:
+    share, size = unexplained([_channel(1.0, 0.0), _channel(1.0, 1.0, is_drawn=False)])
+    assert share == pytest.approx(0.5, abs=0.02)
+    assert size < 0.1

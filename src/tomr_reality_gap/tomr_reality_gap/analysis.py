@@ -1,0 +1,82 @@
+"""All that a verdict rests on, and what it could not have seen."""
+
+import math
+from functools import cached_property
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_power_model.estimation.linear_gaussian import Gram, solve
+from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot
+from tomr_power_model.robot import Robot
+from tomr_reality_gap.alignment.simulation import Run
+from tomr_reality_gap.fit.basis_responses import BasisResponses
+from tomr_reality_gap.fit.dataset import Dataset
+from tomr_reality_gap.fit.forward_selection import Selection, finding_cost
+from tomr_reality_gap.fit.simulator_baseline import Offsets, SimulatorBaseline
+from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
+
+Array = NDArray[np.float64]
+
+_LISTED = 12  # detection limits that are reported
+
+
+@frozen
+class AnalysisResult:
+    """All that a verdict rests on."""
+
+    dataset: Dataset
+    found: Selection
+    base: ParameterisedRobot
+    robot: Robot  # as described
+    source: str  # robot.yaml
+    candidates: tuple[Hypothesis, ...]
+    basis: BasisResponses
+    baseline: SimulatorBaseline | None = None
+    shared: Offsets = ()  # what the user's simulation shows of each finding
+
+    @cached_property
+    def simulated(self) -> tuple[Array, ...]:
+        """Values of the robot as described, of the best model, and of that without each finding."""
+        model = self.found.best.model
+        fewer = [model.without(number) for number in range(len(model.hypotheses))]
+        robots = [item.described.robot for item in (model, *fewer)]
+        return tuple(self.dataset.predict([self.base.robot, *robots]))
+
+    @cached_property
+    def runs(self) -> tuple[Run, ...]:
+        """Motion of the best model in each recording."""
+        robot = self.found.best.model.described.robot
+        return tuple(item.run(robot) for item in self.dataset.simulations)
+
+
+def detection_limits(analysis: AnalysisResult) -> tuple[tuple[str, str, str], ...]:
+    """The smallest size of each effect that would have been found."""
+    step = analysis.found.rounds[-1]
+    jacobian, noise = step.jacobian, step.noise
+    samples = len(noise.weight)
+    gram = Gram.of(jacobian.matrix, np.zeros(samples), noise.weight)
+    cost = finding_cost(samples)
+    base = list(range(jacobian.sensors.stop))
+    inverse = solve(gram, base).covariance
+    found: dict[str, tuple[float, Hypothesis, Parameter]] = {}
+    open_ones = [h for h in analysis.candidates if h.name not in jacobian.model.names]
+    for hypothesis in open_ones:
+        row = jacobian.candidates[hypothesis.key].start
+        cross = gram.matrix[row, base]
+        information = gram.matrix[row, row] - float(cross @ inverse @ cross)
+        if information <= 0.0 or hypothesis.effect.startswith("parameter."):
+            continue
+        parameter = hypothesis.parameters[0]
+        size = parameter.prior_std * math.sqrt(2.0 * (cost + math.log1p(information)) / information)
+        size = max(size, hypothesis.least)
+        best = found.get(hypothesis.name)
+        if best is None or size < best[0]:
+            found[hypothesis.name] = (size, hypothesis, parameter)
+    rows = [
+        (item.effect, ", ".join(item.where), f"{first.name} {size:.2g} {first.unit}".rstrip())
+        for size, item, first in found.values()
+        if item.where[0] in ("all_wheels", "body", "supply")
+    ]
+    return tuple(rows[: 2 * _LISTED])

@@ -1,0 +1,132 @@
+"""Which hypotheses explain the recordings: forward selection by evidence.
+
+Each round linearises everything at the model so far, ranks all additions by the evidence of the
+linear Gaussian model, refines the best few with the simulator, and takes the one whose evidence,
+now of the nonlinear model (Laplace), is highest:
+
+    log p = -1/2 |r|^2 - 1/2 |u|^2 - 1/2 log|I + G| + log prior
+
+with r the whitened residual, u all offsets in prior standard deviations, G their normal matrix.
+"""
+
+from collections.abc import Sequence
+
+from attrs import evolve, field, frozen
+
+from tomr_power_model.estimation.discrepancy import SIMULATOR
+from tomr_power_model.estimation.noise import Local, Noise, noise_of
+from tomr_reality_gap.fit.basis_responses import BasisResponses
+from tomr_reality_gap.fit.dataset import Dataset
+from tomr_reality_gap.fit.jacobian import Jacobian, linearise
+from tomr_reality_gap.fit.model import Model
+from tomr_reality_gap.fit.refine import FittedModel, State, Tick, refine
+from tomr_reality_gap.fit.screening import Screened, screen
+from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
+
+_COST = 20.0  # log evidence that an addition must bring: about e^20 : 1
+_MOST_FINDINGS = 4
+_NOTHING = 1e-3  # prior standard deviations
+_SIGMAS = 3.0  # that a size must be away from nothing
+
+
+@frozen
+class Round:
+    """One linearisation and what was tried from it."""
+
+    jacobian: Jacobian
+    noise: Noise
+    tried: tuple[FittedModel, ...]  # refined additions, best first
+
+    def without_derivatives(self) -> "Round":
+        """The same without what takes most of the memory."""
+        return evolve(self, jacobian=evolve(self.jacobian, matrix=self.jacobian.matrix[:0].copy()))
+
+
+@frozen
+class Selection:
+    """Outcome of the selection."""
+
+    best: FittedModel
+    without: FittedModel  # nothing but tolerances
+    rounds: tuple[Round, ...]
+    noise: Noise
+    alternatives: tuple[tuple[FittedModel, ...], ...] = field(factory=tuple)  # for each finding
+
+
+def forward_selection(
+    dataset: Dataset,
+    model: Model,
+    candidates: Sequence[Hypothesis],
+    basis: BasisResponses,
+    *,
+    tick: Tick = lambda done: None,
+) -> Selection:
+    """Add hypotheses while they bring evidence; what has no name is not mistaken for noise."""
+    rounds: list[Round] = []
+    without: FittedModel | None = None
+    local = basis.local
+    while True:
+        open_ones = [item for item in candidates if item.name not in model.names]
+        jacobian = linearise(
+            dataset, model, open_ones, tick, before=rounds[-1].jacobian if rounds else None
+        )
+        rounds = [item.without_derivatives() for item in rounds]
+        noise = _noise(dataset, jacobian, local)
+        start, screened = screen(dataset, jacobian, noise, open_ones)
+        current, tried = _tried(dataset, start, screened, jacobian, noise, tick)
+        without = without or current
+        cost = finding_cost(len(dataset.value), current.evidence - without.evidence)
+        tried.sort(key=lambda item: len(item.model.hypotheses) * cost - item.evidence)
+        rounds.append(Round(jacobian, noise, tuple(tried)))
+        added = len(tried[0].model.hypotheses) - len(model.hypotheses) if tried else 0
+        if not tried or tried[0].evidence < current.evidence + added * cost:
+            break
+        model = tried[0].model
+        if len(model.hypotheses) > _MOST_FINDINGS:
+            break
+    return Selection(current, without, tuple(rounds), noise)
+
+
+def _tried(
+    dataset: Dataset,
+    start: State,
+    screened: Sequence[Screened],
+    jacobian: Jacobian,
+    noise: Noise,
+    tick: Tick,
+) -> tuple[FittedModel, list[FittedModel]]:
+    """Refine the model, and additions, alone and with the wrong parameters that they would need."""
+    trials = [start, *(trial for item in screened for trial in item.starts)]
+    current, *fitted = refine(dataset, trials, jacobian, noise, tick=tick)
+    first = len(start[0].hypotheses)
+    return current, [item for item in fitted if _is_large_enough(item, first)]
+
+
+def finding_cost(samples: int, explained: float = 0.0) -> float:
+    """Log evidence that a finding must bring beside others that have explained so much."""
+    return max(_COST, SIMULATOR.log_evidence_per_sample * samples, SIMULATOR.named * explained)
+
+
+def _is_large_enough(fitted: FittedModel, first: int) -> bool:
+    """Whether every hypothesis from the first added on has a size that is significant."""
+    at = sum(len(item.parameters) for item in fitted.model.hypotheses[:first])
+    for hypothesis, offsets in zip(
+        fitted.model.hypotheses[first:], fitted.model.offsets[first:], strict=True
+    ):
+        sigma = float(fitted.own_sigma[at])
+        at += len(offsets)
+        prior_std = hypothesis.parameters[0].prior_std
+        if abs(offsets[0]) <= max(hypothesis.least, _NOTHING * prior_std, _SIGMAS * sigma):
+            return False
+    return True
+
+
+def _noise(dataset: Dataset, jacobian: Jacobian, local: Sequence[Local]) -> Noise:
+    return noise_of(
+        dataset.channels,
+        dataset.value - jacobian.value,
+        jacobian.matrix,
+        jacobian.value,
+        time_derivative=jacobian.time_derivative,
+        local=local,
+    )

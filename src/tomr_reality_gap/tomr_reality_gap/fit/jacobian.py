@@ -1,0 +1,96 @@
+"""Derivatives of the recordings' values by everything that a model and its additions can change."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_power_model.estimation.linear_gaussian import Matrix
+from tomr_power_model.estimation.parameter import prior_stds
+from tomr_reality_gap.alignment.simulation import Tick
+from tomr_reality_gap.fit.dataset import Dataset
+from tomr_reality_gap.fit.model import Model
+from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
+
+Array = NDArray[np.float64]
+
+
+@frozen
+class Jacobian:
+    """Derivatives at one model, in units of each parameter's prior_std; rows are samples."""
+
+    model: Model
+    value: Array  # simulated, (n,)
+    time_derivative: Array  # of the value, (n,)
+    matrix: Matrix  # (n, p): nuisances, sensor nuisances, the model's own, candidates
+    nuisance: slice
+    sensors: slice  # sensor nuisances
+    own: tuple[slice, ...]  # of each of the model's hypotheses
+    candidates: Mapping[tuple[object, ...], slice]  # of each candidate, by its key
+
+    @property
+    def kept(self) -> int:
+        """Columns of all but the candidates; they come first."""
+        return self.own[-1].stop if self.own else int(self.sensors.stop)
+
+
+def linearise(
+    dataset: Dataset,
+    model: Model,
+    candidates: Sequence[Hypothesis],
+    tick: Tick = lambda done: None,
+    *,
+    before: Jacobian | None = None,
+) -> Jacobian:
+    """Derivatives at a model, by its parameters and those of candidates.
+
+    With `before` the derivatives by nuisances and candidates are taken from there: they change
+    little from one model to the next, and cost most.
+    """
+    described = model.described
+    parameters = [*([] if before else model.nuisances), *model.own]
+    steps = [item.step for item in parameters[: len(parameters) - len(model.own)]]
+    steps += [
+        item.step_at(offset) for item, offset in zip(model.own, model.own_offsets, strict=True)
+    ]
+    robots = [described.offset([p], [s]).robot for p, s in zip(parameters, steps, strict=True)]
+    for candidate in candidates if before is None else ():
+        started = described.given(
+            {key: at for key, at in candidate.start.items() if key not in described.values}
+        )
+        for parameter in candidate.sizes:
+            step = parameter.discrete_offset or parameter.step
+            robots.append(started.offset([parameter], [step]).robot)
+            steps.append(step)
+            parameters.append(parameter)
+    scale = prior_stds(parameters) / np.array(steps)
+    value, time_derivative, changes = dataset.with_time_derivative(
+        described.robot, robots, scale, tick
+    )
+    sensors = dataset.sensor_nuisances(value, time_derivative)
+    first, own = len(model.nuisances), len(model.own)
+    nuisance: Matrix
+    others: list[Matrix]
+    if before is None:
+        nuisance, mine = changes[:first], changes[first : first + own]
+        others = [changes[first + own :]]
+    else:
+        nuisance, mine = before.matrix[:, before.nuisance].T, changes
+        others = [before.matrix[:, before.candidates[item.key]].T for item in candidates]
+    edge = first + sensors.shape[1]
+    parts, found = [], {}
+    for hypothesis in model.hypotheses:
+        parts.append(slice(edge, edge := edge + len(hypothesis.parameters)))
+    for candidate in candidates:
+        found[candidate.key] = slice(edge, edge := edge + len(candidate.sizes))
+    return Jacobian(
+        model,
+        value,
+        time_derivative,
+        np.concatenate([nuisance, sensors.T, mine, *others], dtype=np.float32).T,
+        slice(0, first),
+        slice(first, first + sensors.shape[1]),
+        tuple(parts),
+        found,
+    )

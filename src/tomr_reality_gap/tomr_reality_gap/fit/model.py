@@ -1,0 +1,84 @@
+"""A description and what has been changed in it so far."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, bounds
+from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
+
+Array = NDArray[np.float64]
+
+
+@frozen
+class Model:
+    """A description and what has been changed in it so far."""
+
+    base: ParameterisedRobot
+    nuisances: tuple[Parameter, ...]
+    nuisance_offsets: tuple[float, ...]
+    hypotheses: tuple[Hypothesis, ...] = ()
+    offsets: tuple[tuple[float, ...], ...] = ()  # of each hypothesis' parameters
+
+    @property
+    def described(self) -> ParameterisedRobot:
+        """The description with all offsets."""
+        start: dict[str, float] = {}
+        for hypothesis in self.hypotheses:
+            start.update(hypothesis.start)
+        changed = self.base.given(start).offset(self.nuisances, self.nuisance_offsets)
+        for hypothesis, offsets in zip(self.hypotheses, self.offsets, strict=True):
+            changed = changed.offset(hypothesis.parameters, offsets)
+        return changed
+
+    @property
+    def own(self) -> tuple[Parameter, ...]:
+        """Parameters of the hypotheses, in order."""
+        return tuple(item for hypothesis in self.hypotheses for item in hypothesis.parameters)
+
+    @property
+    def own_offsets(self) -> tuple[float, ...]:
+        return tuple(offset for offsets in self.offsets for offset in offsets)
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of the hypotheses."""
+        return frozenset(hypothesis.name for hypothesis in self.hypotheses)
+
+    def joined(self, hypothesis: Hypothesis) -> "Model":
+        """With one more hypothesis, at no offset yet."""
+        return evolve(
+            self,
+            hypotheses=(*self.hypotheses, hypothesis),
+            offsets=(*self.offsets, (0.0,) * len(hypothesis.parameters)),
+        )
+
+    def without(self, number: int) -> "Model":
+        """With one hypothesis less."""
+        return self.kept([index != number for index in range(len(self.hypotheses))])
+
+    def kept(self, wanted: Sequence[bool]) -> "Model":
+        """With some of its hypotheses."""
+        keep = [index for index, is_wanted in enumerate(wanted) if is_wanted]
+        return evolve(
+            self,
+            hypotheses=tuple(self.hypotheses[index] for index in keep),
+            offsets=tuple(self.offsets[index] for index in keep),
+        )
+
+    def swapped(self, number: int, hypothesis: Hypothesis, offsets: tuple[float, ...]) -> "Model":
+        """With another hypothesis in the place of one."""
+        hypotheses, all_offsets = list(self.hypotheses), list(self.offsets)
+        hypotheses[number], all_offsets[number] = hypothesis, offsets
+        return evolve(self, hypotheses=tuple(hypotheses), offsets=tuple(all_offsets))
+
+    def moved(self, nuisance: Array, own: Array) -> "Model":
+        """With all parameters at new offsets, within their bounds."""
+        nuisance = np.clip(nuisance, *bounds(self.nuisances))
+        own, offsets, at = np.clip(own, *bounds(self.own)), [], 0
+        for hypothesis in self.hypotheses:
+            part = own[at : (at := at + len(hypothesis.parameters))]
+            offsets.append(tuple(part.tolist()))
+        return evolve(self, nuisance_offsets=tuple(nuisance.tolist()), offsets=tuple(offsets))

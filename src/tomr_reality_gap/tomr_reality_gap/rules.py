@@ -1,0 +1,127 @@
+"""The rules of a verdict, as functions of numbers."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_power_model.estimation.discrepancy import SIMULATOR
+from tomr_power_model.estimation.statistics import robust_scale
+from tomr_reality_gap.explanation import Estimate
+
+Array = NDArray[np.float64]
+
+_RIVAL = 5.0  # log odds within which data do not separate two explanations
+_UNMODELLED_COST = 60.0  # log evidence that an effect without a name must bring
+_WIDE = 1.96
+_MUCH = 0.3  # of the mismatch left: what was named is not the whole story
+_GROSS = 10.0  # times the noise: no match, even if nothing is named; slow noise reaches 1
+_SURE = 0.97
+DOUBTED = 0.45  # confidence of a finding that leaves much at most
+
+
+@frozen
+class Residuals:
+    """What a channel is off before and after, by its own noise."""
+
+    before: Array  # measured - simulated as described, (n,)
+    after: Array  # measured - simulated as explained, (n,)
+    std: float  # of what was measured
+    quantum: float
+    is_drawn: bool  # power or current drawn, not a speed
+
+
+def estimate_of(
+    value: float,
+    sigma: float,
+    *,
+    offset: float,
+    baseline: float = 0.0,
+    unit: str = "",
+    bounds: tuple[float, float] = (-math.inf, math.inf),
+) -> Estimate:
+    """A value with its 95 % interval.
+
+    The simulator is not exact either: a part of the offset from the description is never known, nor
+    all of what the user's simulation shows of it (`baseline`).
+    """
+    half = _WIDE * math.hypot(sigma, SIMULATOR.parameter * offset, 0.5 * baseline)
+    if unit == "rad":
+        value = math.remainder(value, 2.0 * math.pi)
+    return Estimate(value, max(value - half, bounds[0]), min(value + half, bounds[1]), unit)
+
+
+def is_rival(log_odds: float) -> bool:
+    """Whether the data do not separate it from the finding."""
+    return log_odds > -_RIVAL
+
+
+def confidence_of(log_odds: Sequence[float]) -> float:
+    """Posterior probability of a finding and its rivals together, from all others' log odds."""
+    weights = [math.exp(max(min(odds, 0.0), -600.0) / SIMULATOR.temper) for odds in log_odds]
+    near = 1.0 + sum(w for w, odds in zip(weights, log_odds, strict=True) if is_rival(odds))
+    return _SURE * near / (1.0 + sum(weights))
+
+
+def is_unmodelled(evidence: float, named: float, cost: float) -> bool:
+    """Whether an effect without a name is there, from its log evidence and that of all named ones.
+
+    `cost` is the log evidence that any finding must bring.
+    """
+    return evidence > max(_UNMODELLED_COST, cost, SIMULATOR.unmodelled * named)
+
+
+def is_doubted(share: float, size: float, has_findings: bool) -> bool:
+    """Whether too much is left (see `unexplained`) for what was named, or for a match."""
+    return share > _MUCH and size > (1.0 if has_findings else _GROSS)
+
+
+def energy_shares(
+    before: float, after: float, without: Sequence[float], samples: int
+) -> list[float]:
+    """Part of the mismatch's energy that each finding explains, by leaving it out.
+
+    Args:
+        before: sum of squared whitened residuals without any finding.
+        after: with all of them.
+        without: without each of them.
+        samples: that white noise alone would leave.
+    """
+    energies = [item - after for item in without]
+    explained = _share(before - after, before - min(after, float(samples)))
+    return [explained * energy / max(sum(energies), 1e-9) for energy in energies]
+
+
+def unmodelled_share(evidence: float, before: float, after: float, samples: int) -> float:
+    """The same of an effect without a name: twice its log evidence is the energy it explains."""
+    return _share(2.0 * evidence, before - min(after, float(samples)))
+
+
+def _share(part: float, whole: float) -> float:
+    return max(0.0, min(1.0, part / max(whole, 1e-9)))
+
+
+def unexplained(channels: Sequence[Residuals]) -> tuple[float, float]:
+    """Part of the mismatch that is left, beyond noise and what the simulator is unsure of; and how
+    much that is in what is drawn, noise being 1.
+
+    Noise is what differs from one sample to the next: unlike the noise of the fit it knows nothing
+    of slow mismatches that no hypothesis explains.
+    """
+    first, left, drawn = 0.0, 0.0, []
+    for item in channels:
+        steps = np.abs(np.diff(item.after))
+        noise = max(
+            0.5 * robust_scale(steps) ** 2,
+            0.5 * float(np.mean(np.minimum(steps, 5.0 * np.median(steps)) ** 2)),
+            item.quantum**2 / 12.0,
+        )
+        known = noise + (SIMULATOR.power * item.std) ** 2
+        first += max(float(np.mean(item.before**2)) - known, 0.0) / known
+        rest = max(float(np.mean(item.after**2)) - known, 0.0) / known
+        left += rest
+        if item.is_drawn:
+            drawn.append(rest)
+    return _share(left, first) if first > 0.0 else 0.0, sum(drawn) / max(len(drawn), 1)
