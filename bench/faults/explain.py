@@ -1,7 +1,6 @@
 """`tomr_gap explain` and `tomr_calibrate` on healthy drives: cost, findings beside the truth."""
 
 import json
-import os
 import subprocess
 import sys
 import time
@@ -94,17 +93,26 @@ def _tool(name: str) -> Path:
     return Path(sys.executable).with_name(name)
 
 
+# A process counts the memory of the one that it was forked from: a small one starts the command.
+_LAUNCHER = """
+import json, os, subprocess, sys
+process = subprocess.Popen(sys.argv[2:])
+_, status, usage = os.wait4(process.pid, 0)
+cost = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024.0
+json.dump([os.waitstatus_to_exitcode(status), *cost], open(sys.argv[1], "w"))
+"""
+
+
 def measured(command: Sequence[str | Path], log: Path) -> Run:
     """Run a command, its output into a file, and say what it cost."""
-    begin = time.perf_counter()
+    begin, cost = time.perf_counter(), log.with_suffix(".cost")
+    launched = [sys.executable, "-c", _LAUNCHER, cost, *command]
     with log.open("wb") as stream:
-        process = subprocess.Popen(list(map(str, command)), stdout=stream, stderr=stream)
-        _, status, usage = os.wait4(process.pid, 0)
+        subprocess.run(list(map(str, launched)), stdout=stream, stderr=stream, check=True)
     wall = time.perf_counter() - begin
-    process.returncode = os.waitstatus_to_exitcode(status)
     lines = log.read_text(errors="replace").strip().splitlines() or ["it said nothing"]
-    cpu, memory = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024.0
-    return Run(process.returncode, lines[-1], wall, cpu, memory)
+    code, cpu, memory = json.loads(cost.read_text())
+    return Run(code, lines[-1], wall, cpu, memory)
 
 
 def print_ratios(description: Path, real: Mapping[str, Any], console: Console) -> None:

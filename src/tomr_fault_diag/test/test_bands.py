@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tomr_fault_diag.residuals.calibrated import fit_band, fit_bands
+from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.errors import InputError
 
 COUNT = 20_000
@@ -42,8 +43,8 @@ def test_currents_and_missing_residuals() -> None:
     residual[:, 0] = np.nan  # no battery_state
     bands = fit_bands(residual, modelled, change, unit="A")
     assert bands.current != pytest.approx(0.15)
-    assert bands.power == 1.2
-    assert bands.total_relative == 0.13
+    assert bands.power == BandSettings().power
+    assert bands.total_relative == BandSettings().total_relative
 
 
 def test_too_little_is_refused() -> None:

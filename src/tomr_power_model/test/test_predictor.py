@@ -91,6 +91,18 @@ def test_without_encoders_only_the_commands_speak() -> None:
     assert all(math.isfinite(reading.power) for reading in last.motors)
 
 
+def test_motor_currents_are_told_where_they_are_what_is_measured() -> None:
+    """Of a robot that publishes them: both paths, and the power that the modelled voltage makes."""
+    robot = shipped_robot("robotino_v2_gray")
+    last = _run(_events(3000), twist=(0.1, 0.0, 0.0), robot=robot)[-1]
+    for wheel in (0, 2):  # the second is idle along x
+        commanded, measured = last.motors[wheel], last.from_encoders[wheel]
+        assert commanded.drawn_current > 0.05
+        assert commanded.drawn_current == pytest.approx(measured.drawn_current, rel=0.3)
+    total = sum(reading.power for reading in last.motors)
+    assert last.total.power == pytest.approx(total, rel=1e-3)
+
+
 def test_the_delay_postpones_the_response() -> None:
     robot = shipped_robot("reference")
     delayed = evolve(robot, controller=evolve(robot.controller, delay=0.15))

@@ -150,17 +150,15 @@ class Physical:
         def read(column: int) -> list[float]:
             return [self._read(column, wheel, windows) for wheel in range(WHEELS)]
 
-        current = at_motor = power = _UNKNOWN
         shown = [monitor.shown for monitor in self._monitors]
+        current = at_motor = power = _UNKNOWN
         if self._reads_motor:  # monitors take the current for that of the supply
-            seen = [
-                show(self._nominal * i) / self._nominal
-                for show, i in zip(shown, current, strict=True)
-            ]
+            volts, flows = self._nominal, read(_CURRENT)
+            current = [show(volts * i) / volts for show, i in zip(shown, flows, strict=True)]
             at_motor = [
-                p * b / a if a else p for p, a, b in zip(at_motor, current, seen, strict=True)
+                p * seen / true if true else p
+                for p, true, seen in zip(read(_AT_MOTOR), flows, current, strict=True)
             ]
-            current = seen
         else:
             power = [show(p) for show, p in zip(shown, read(_POWER), strict=True)]
         return Means(motion.torque, current, at_motor, power, None, motion.voltage, total)
