@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_power_model.effects import EFFECTS
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.statistics import autocorrelation
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
@@ -160,6 +161,9 @@ def _whiteness(analysis: AnalysisResult) -> dict[str, tuple[float, float]]:
     }
 
 
+_NAMES = frozenset({"Coulomb", "Stribeck"})
+
+
 def _sentence(findings: Sequence[Finding]) -> str:
     if not findings:
         return "The simulation matches: nothing differs beyond noise and the stated tolerances."
@@ -168,11 +172,19 @@ def _sentence(findings: Sequence[Finding]) -> str:
         where = ", ".join(item.where).replace("_", " ")
         if item.effect == "unknown":
             variable = item.shape.variable if item.shape else "?"
-            parts.append(f"an effect without a name at {where}, depending on {variable}")
+            parts.append(f"an effect without a name ({where}, depending on {variable})")
             continue
         sizes = ", ".join(
             f"{name} {value.value:.3g} {value.unit}".rstrip()
             for name, value in item.parameters.items()
         )
-        parts.append(f"{item.effect} at {where} ({sizes})")
-    return f"Reality differs by {' and '.join(parts)}."
+        parts.append(f"{_label(item.effect)} ({where}: {sizes})")
+    return f"Reality differs: {'; '.join(parts)}."
+
+
+def _label(effect: str) -> str:
+    """What an effect does, or which value is wrong, in the middle of a sentence."""
+    if effect not in EFFECTS:
+        return f"wrong value of {effect.removeprefix('parameter.')}"
+    label = EFFECTS[effect].label
+    return label if label.split()[0] in _NAMES else f"{label[0].lower()}{label[1:]}"

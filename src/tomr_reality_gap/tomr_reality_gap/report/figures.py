@@ -21,7 +21,6 @@ from tomr_power_model.canvas import (
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.explanation import Comparison, Explanation, Map, Shape
 from tomr_reality_gap.report.showing import View, leading
-from tomr_reality_gap.report.words import channel_name
 
 Array = NDArray[np.float64]
 
@@ -139,7 +138,7 @@ def over_time(comparison: Comparison, found: bool) -> str:
                 left = channel.value - simulated
                 rest.plot(*broken(channel.time, left), color=colour, lw=_NARROW)
             rest.axhline(0.0, color="black", lw=0.6)
-            values.set_ylabel(f"{channel_name(channel)}\n{channel.unit}", fontsize=8)
+            values.set_ylabel(f"{channel.name}\n{channel.unit}", fontsize=8)
             rest.set_ylabel(f"residual\n{channel.unit}", fontsize=8)
             for panel in (values, rest):
                 panel.set_xlim(channel.time[0], channel.time[-1])

@@ -13,7 +13,6 @@ from tomr_reality_gap.explanation import Comparison, Explanation, Finding
 from tomr_reality_gap.report import figures, residuals
 from tomr_reality_gap.report.showing import best_view
 from tomr_reality_gap.report.words import (
-    channel_name,
     effect_words,
     estimate_words,
     number_words,
@@ -72,7 +71,7 @@ def channel_lines(comparisons: tuple[Comparison, ...]) -> list[ChannelLine]:
         ChannelLine(
             recording=one.name,
             held_out=one.held_out,
-            channel=channel_name(channel),
+            channel=channel.name,
             unit=channel.unit,
             rms=_pair(channel.value, one, number, 1.0),
             nrmse=_pair(channel.value, one, number, _spread(channel)),

@@ -10,7 +10,6 @@ from tomr_power_model.canvas import AFTER, BEFORE, MEASURED, medians, png, scatt
 from tomr_power_model.estimation.statistics import autocorrelation
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.explanation import Comparison
-from tomr_reality_gap.report.words import channel_name
 
 Array = NDArray[np.float64]
 
@@ -21,7 +20,7 @@ _WHITE = 0.2  # shown of the autocorrelation at least, so that none looks like n
 
 def shown_names(comparisons: Sequence[Comparison]) -> list[str]:
     """Channels to show: the powers, and without any all."""
-    channels = {channel_name(item): item.kind for one in comparisons for item in one.channels}
+    channels = {item.name: item.kind for one in comparisons for item in one.channels}
     powers = [name for name, kind in channels.items() if kind in DRAWN_KINDS]
     return powers or list(channels)
 
@@ -58,7 +57,7 @@ def _against(
     unit = ""
     for one in comparisons:
         for number, channel in enumerate(one.channels):
-            if channel_name(channel) != name:
+            if channel.name != name:
                 continue
             unit = channel.unit
             wheel = channel.wheel
@@ -113,7 +112,7 @@ def _standard(comparisons: Sequence[Comparison], name: str, explained: bool) -> 
         (channel.value - (one.after if explained else one.before)[number]) / one.sigma[number]
         for one in comparisons
         for number, channel in enumerate(one.channels)
-        if channel_name(channel) == name
+        if channel.name == name
     ]
 
 

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.explanation import Comparison, Explanation, Finding
-from tomr_reality_gap.report.words import channel_name
 
 Array = NDArray[np.float64]
 
@@ -29,7 +28,7 @@ class View:
     @property
     def name(self) -> str:
         """Of the channel."""
-        return channel_name(self.comparison.channels[self.channel])
+        return self.comparison.channels[self.channel].name
 
 
 def leading(explanation: Explanation) -> Finding | None:

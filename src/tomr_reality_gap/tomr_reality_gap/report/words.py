@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 
 from tomr_power_model.effects import EFFECTS
-from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.explanation import Estimate, Finding
 
 _PLACES = {
@@ -27,11 +26,6 @@ def effect_words(effect: str) -> str:
 def place_words(where: Sequence[str]) -> str:
     """Where it acts, in words."""
     return ", ".join(_PLACES.get(place, place) for place in where)
-
-
-def channel_name(channel: Channel) -> str:
-    """A channel's name; a topic's voltage is distinguished from its power."""
-    return f"{channel.name} voltage" if channel.kind == "voltage" else channel.name
 
 
 def title(finding: Finding) -> str:
