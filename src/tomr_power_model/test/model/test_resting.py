@@ -1,0 +1,53 @@
+"""What drivers hold while their wheels are at rest, by hand."""
+
+import math
+
+import pytest
+
+from tomr_power_model.dynamics import layout as at
+from tomr_power_model.model.commanded import CommandPath, CommandTiming, Seen
+from tomr_power_model.model.resting import RestingDrivers
+from tomr_power_model.robot import shipped_robot
+
+MS = 1_000_000
+BASE = 1_700_000_000_000 * MS
+ROBOT = shipped_robot("reference")
+REST = (0.0, 0.0, 0.0)
+
+
+@pytest.fixture(name="path")
+def _path() -> CommandPath:
+    """Of a robot that is told to stand and stands."""
+    path = CommandPath(ROBOT, CommandTiming(50 * MS))
+    path.command(BASE, REST)
+    path.over(BASE + 50 * MS, Seen(REST, REST, 0.0))
+    return path
+
+
+def test_nothing_is_known_before_the_first_command() -> None:
+    path = CommandPath(ROBOT, CommandTiming(50 * MS))
+    found = RestingDrivers(ROBOT.controller, 3).voltages(path, REST, REST, 1.0)
+    assert all(math.isnan(volts) for volts in found)
+
+
+def test_a_wheel_pushed_aside_is_pulled_back(path: CommandPath) -> None:
+    # k_i = 12 V/rad: 0.1 rad ahead are -1.2 V.
+    drivers = RestingDrivers(ROBOT.controller, 3)
+    assert drivers.voltages(path, REST, REST, 1.0) == pytest.approx(REST)
+    assert drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0)[0] == pytest.approx(-1.2)
+
+
+def test_voltages_are_those_of_the_time_asked_for(path: CommandPath) -> None:
+    drivers = RestingDrivers(ROBOT.controller, 3)
+    drivers.voltages(path, REST, REST, 1.0)
+    assert drivers.voltages(path, (0.1, 0.0, 0.0), REST, 0.25)[0] == pytest.approx(-0.3)
+
+
+def test_what_a_start_left_different_fades_in_motion(path: CommandPath) -> None:
+    drivers = RestingDrivers(ROBOT.controller, 3)
+    drivers.voltages(path, REST, REST, 1.0)
+    assert path.state is not None
+    asked = path.wheel(at.ASKED)[0]
+    for _ in range(500):
+        found = drivers.voltages(path, (0.1, 0.0, 0.0), (2.0, 0.0, 0.0), 1.0)[0]
+    assert found == pytest.approx(1.2 * (asked - 2.0), abs=0.02)
