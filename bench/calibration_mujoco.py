@@ -19,7 +19,7 @@ from tqdm import tqdm
 from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
-from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS
+from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, ResidualFrame
 from tomr_power_model.calibrate_cli import main as tomr_calibrate
 from tomr_power_model.calibration.problem import modelled_power
 from tomr_power_model.calibration.samples import samples_of
@@ -91,7 +91,7 @@ def record(job: Job) -> None:
 def streamed(bag: Path, robot: str) -> tuple[Array, Array, Array]:
     """Measured, encoder-derived and command-predicted power by decision [W], (n, 3) each."""
     pipeline = Pipeline(load_robot(robot), DiagnosisSettings.of({}, "bench"))
-    frames = []
+    frames: list[ResidualFrame] = []
     with open_recording(bag) as recording:
         for _, step in diagnose(recording, pipeline):
             frames.extend(step.frames)
@@ -150,7 +150,9 @@ def measure_mujoco() -> dict[str, Any]:
         folder = Path(name)
         seeds = range(1, ROBOTS + 1)
         fitted = [Job(s, *mission, False, folder) for s in seeds for mission in FITTED]
-        unseen = [Job(s, *m, truth, folder) for s in seeds for m in UNSEEN for truth in (0, 1)]
+        unseen = [
+            Job(s, *m, truth, folder) for s in seeds for m in UNSEEN for truth in (False, True)
+        ]
         jobs = fitted + unseen
         with ProcessPoolExecutor(min(2, os.cpu_count() or 1)) as pool:
             list(tqdm(pool.map(record, jobs), total=len(jobs), desc="driving", unit="drive"))
