@@ -20,9 +20,11 @@ examples:
 
 exit codes: 0 done, 2 bad input, or the recordings are absent"""
 
-_SUMMARIES = {
+_FITTING = {
     "explain": "run tomr_gap explain on the healthy drives: cost, findings beside the truth, error",
     "calibrate": "run tomr_calibrate on the same: cost, values over the truth, or why it refused",
+}
+_SCORING = {
     "diagnose": "diagnose all drives with a description and score that",
     "power": "compare power residuals of the nodes with those of tomr_gap's simulation, by regime",
 }
@@ -36,26 +38,27 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
-    for name, summary in _SUMMARIES.items():
+    for name, summary in {**_FITTING, **_SCORING}.items():
         command = commands.add_parser(name, help=summary, description=summary)
-        command.add_argument(
-            "--out",
-            type=Path,
-            default=Path("build/faults_practice"),
-            metavar="DIR",
-            help="results go here (default %(default)s)",
-        )
-        if name in ("explain", "calibrate"):
+        if name != "power":
+            command.add_argument(
+                "--out",
+                type=Path,
+                default=Path("build/faults_practice"),
+                metavar="DIR",
+                help="results go here (default %(default)s)",
+            )
+        if name in _FITTING:
             command.add_argument(
                 "--fit", type=int, default=3, metavar="N", help="drives to fit (default 3)"
+            )
+        else:
+            command.add_argument(
+                "--robot", type=Path, metavar="FILE", help="description (default: the owner's)"
             )
         if name == "explain":
             command.add_argument(
                 "--tolerance", metavar="REL", help="how far stated values may be off, for tomr_gap"
-            )
-        if name in ("diagnose", "power"):
-            command.add_argument(
-                "--robot", type=Path, metavar="FILE", help="description (default: the owner's)"
             )
     return parser
 
@@ -76,9 +79,10 @@ def main(arguments: Sequence[str] | None) -> int:
         explain(recordings, options.out / "explained", options.fit, more, console)
     elif options.command == "calibrate":
         calibrate(recordings, options.out / "calibrated", options.fit, console)
-    elif options.command == "diagnose":
-        robot = options.robot or recordings.description
-        print(diagnose(recordings, robot, options.out / "diagnosed" / robot.stem), end="")
     else:
-        power(recordings, options.robot or recordings.description, console)
+        robot = options.robot or recordings.description
+        if options.command == "power":
+            power(recordings, robot, console)
+        else:
+            print(diagnose(recordings, robot, options.out / "diagnosed" / robot.stem), end="")
     return EXIT_OK
