@@ -38,6 +38,7 @@ import numpy as np
 from attrs import evolve, field, frozen
 from diagnosis_report import report
 from numpy.typing import NDArray
+from stages import as_arrays
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.judges import make_judge
@@ -116,7 +117,7 @@ class Outcome:
 
 def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[ResidualFrame]:
     """The same residuals in other bands."""
-    modelled = np.array([[item.modelled for item in frame.residuals] for frame in frames])
+    _, modelled = as_arrays(frames)
     _, band = Compared(modelled, modelled).residuals(bands)
     return [
         evolve(

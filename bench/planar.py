@@ -14,6 +14,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
+from stages import as_arrays
 from tqdm import tqdm
 
 from tomr_fault_diag.residuals.settings import BandSettings
@@ -33,10 +34,10 @@ def both(seed: int, kind: str | None) -> tuple[Array, Array]:
     drive = random_drive(shipped_robot("reference"), seed, kind)
     labelled = simulated_drive(drive)
     planar, _ = simulate(drive).compared.residuals(BandSettings())
-    frames = [[item.residual for item in frame.residuals] for frame in labelled.frames]
-    ticks = labelled.first - 1 + np.arange(len(frames))
+    residual, _ = as_arrays(labelled.frames)
+    ticks = labelled.first - 1 + np.arange(len(residual))
     chosen = (ticks < len(planar)) & (labelled.faulty if kind else True)
-    return np.array(frames)[chosen], planar[ticks[chosen]]
+    return residual[chosen], planar[ticks[chosen]]
 
 
 def _main(arguments: Sequence[str] | None) -> int:

@@ -22,18 +22,14 @@ from typing import cast
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
+from stages import as_arrays, pipeline_of, steps_of
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.states import FAULTLESS
-from tomr_fault_diag.cli.diagnose import STAGE_NODES
-from tomr_fault_diag.diagnosis.offline import diagnose
-from tomr_fault_diag.diagnosis.pipeline import Pipeline
-from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.diagnosis.summary import Summariser
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS
 from tomr_power_model.cli import run_main
-from tomr_power_model.recordings import open_recording
-from tomr_power_model.robot import load_robot, read_node_sections
+from tomr_power_model.robot import read_node_sections
 from tomr_sim_bridge.cli.import_robotino import import_robotino
 from tomr_sim_bridge.importers.dataset import default_dataset
 
@@ -54,18 +50,14 @@ class Drive:
 
 def play(bag: Path, robot: str) -> Drive:
     """Play one recording through the stages."""
-    settings = DiagnosisSettings.of(read_node_sections(robot, STAGE_NODES), robot)
-    pipeline = Pipeline(load_robot(robot), settings)
     summariser, frames = Summariser(), []
-    with open_recording(bag) as recording:
-        for _, step in diagnose(recording, pipeline):
-            for diagnosis in step.diagnoses:
-                summariser.diagnosis(diagnosis, [])
-            for frame in step.frames:
-                summariser.frame(frame)
-                frames.append(frame)
-    residual = np.array([[item.residual for item in frame.residuals] for frame in frames])
-    modelled = np.array([[item.modelled for item in frame.residuals] for frame in frames])
+    for _, step in steps_of(bag, pipeline_of(robot)):
+        for diagnosis in step.diagnoses:
+            summariser.diagnosis(diagnosis, [])
+        for frame in step.frames:
+            summariser.frame(frame)
+            frames.append(frame)
+    residual, modelled = as_arrays(frames)
     motors, encoders = list(MOTORS), list(ENCODERS)
     summary = summariser.summary()
     counts = Counter({name: round(share * summary.ticks) for name, share in summary.shares.items()})

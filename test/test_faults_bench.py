@@ -14,7 +14,7 @@ sys.path.append(str(ROOT / "bench"))
 from faults.cli import main
 from faults.closed_loop import MotorPower, Prediction
 from faults.explain import measured
-from faults.play import Played, changes_of, scored_name
+from faults.play import Played, changes_of, play, scored_name
 from faults.power import PATHS, compared
 from faults.regimes import AT_REST, noise_of, regimes_of, rms, tick_means, tick_speeds, undisturbed
 from faults.truth import missed, ratios, true_value
@@ -98,6 +98,17 @@ def test_noise_is_of_neighbours_and_no_jump() -> None:
     assert noise_of(noise) == pytest.approx(0.1, rel=0.05)
     assert rms(np.array([3.0, np.nan, -3.0])) == 3.0
     assert np.isnan(noise_of(np.zeros(1)))
+
+
+def test_a_recording_is_played_up_to_its_end_or_an_earlier_one() -> None:
+    played = play(ROOT / "bags" / "circle_encoder_lost", Path("reference"), 3.0)
+    assert np.diff(played.stamp_ns).tolist() == [played.period_ns] * 58
+    assert played.changes[-1][1] == "normal"
+    standing = played.stamp_ns - played.stamp_ns[0] < 8e8
+    assert played.measured[standing].mean() == pytest.approx(1.2, abs=0.05)  # W of standby
+    # Expected motion is not noisy, encoders are.
+    command, encoder = (path[~standing] for path in (played.command_path, played.encoder_path))
+    assert rms(command) < 0.8 * rms(encoder) < 0.2
 
 
 def test_three_predictions_are_compared_on_the_same_ticks() -> None:

@@ -8,18 +8,13 @@ from pathlib import Path
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
+from stages import as_arrays, pipeline_of, steps_of
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.stage import Diagnosis
 from tomr_fault_diag.classifier.states import NOT_OBSERVABLE, UNKNOWN
-from tomr_fault_diag.cli.diagnose import STAGE_NODES
-from tomr_fault_diag.diagnosis.offline import diagnose
-from tomr_fault_diag.diagnosis.pipeline import Pipeline
-from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, ResidualFrame
 from tomr_power_model.model.ticks import NANOSECONDS
-from tomr_power_model.recordings import open_recording
-from tomr_power_model.robot import load_robot, read_node_sections
 
 Array = NDArray[np.float64]
 Change = tuple[float, str, int | None]  # stamp [s], state, wheel 1..3
@@ -43,34 +38,24 @@ class Played:
 
 def play(bag: Path, robot: Path, seconds: float = float("inf")) -> Played:
     """Diagnose a recording, or its first seconds, with a robot's description."""
-    settings = DiagnosisSettings.of(read_node_sections(robot, STAGE_NODES), str(robot))
-    pipeline = Pipeline(load_robot(robot), settings)
+    pipeline = pipeline_of(robot)
     frames: list[ResidualFrame] = []
     diagnoses: list[Diagnosis] = []
-    with open_recording(bag) as recording:
-        for receive_ns, step in diagnose(recording, pipeline):
-            if receive_ns - recording.start_ns > seconds * NANOSECONDS:
-                break
-            frames += step.frames
-            diagnoses += step.diagnoses
-    command, encoder = _watts(frames, MOTORS), _watts(frames, ENCODERS)
+    for passed_ns, step in steps_of(bag, pipeline):
+        if passed_ns > seconds * NANOSECONDS:
+            break
+        frames += step.frames
+        diagnoses += step.diagnoses
+    residual, modelled = as_arrays(frames)
+    motors = list(MOTORS)
     return Played(
         changes=changes_of(diagnoses),
         stamp_ns=np.array([frame.stamp_ns for frame in frames], dtype=np.int64),
-        period_ns=settings.model.ticks.period,
-        measured=command.sum(axis=2),
-        command_path=command[:, :, 0],
-        encoder_path=encoder[:, :, 0],
+        period_ns=pipeline.settings.model.ticks.period,
+        measured=residual[:, motors] + modelled[:, motors],
+        command_path=residual[:, motors],
+        encoder_path=residual[:, list(ENCODERS)],
     )
-
-
-def _watts(frames: Iterable[ResidualFrame], which: range) -> Array:
-    """Residual and what is modelled [W] of some residuals, (n, 3, 2)."""
-    rows = [
-        [(frame.residuals[index].residual, frame.residuals[index].modelled) for index in which]
-        for frame in frames
-    ]
-    return np.array(rows, dtype=np.float64).reshape(-1, len(which), 2)
 
 
 def changes_of(diagnoses: Iterable[Diagnosis]) -> tuple[Change, ...]:

@@ -9,19 +9,17 @@ import numpy as np
 from attrs import frozen
 from calibration_robotino import Straight, drives_in
 from numpy.typing import NDArray
+from stages import pipeline_of
 from tqdm import tqdm
 
 from figures.result import Missing
 from figures.simulated import Played, gathered
-from tomr_fault_diag.cli.diagnose import STAGE_NODES
 from tomr_fault_diag.diagnosis.offline import diagnose
-from tomr_fault_diag.diagnosis.pipeline import Pipeline
-from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_power_model.calibration.samples import Samples, samples_of
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.recordings import open_recording
-from tomr_power_model.robot import Robot, load_robot, read_node_sections
+from tomr_power_model.robot import Robot, load_robot
 from tomr_power_model.wang2024 import Samples as PaperSamples
 from tomr_power_model.wang2024 import Wang2024Model, fit_wang2024
 from tomr_sim_bridge.cli.import_robotino import import_robotino
@@ -77,10 +75,8 @@ def drives(surface: str, scratch: Path, speeds: Sequence[float] = ()) -> list[Re
 
 def as_streamed(item: RealDrive) -> Played:
     """A drive through the stages; motor columns are currents [A]."""
-    settings = DiagnosisSettings.of(read_node_sections(ROBOT, STAGE_NODES), ROBOT)
-    pipeline = Pipeline(robot(), settings)
     with open_recording(item.drive.path) as recording:
-        steps = [step for _, step in diagnose(recording, pipeline)]
+        steps = [step for _, step in diagnose(recording, pipeline_of(ROBOT))]
         return gathered(steps, recording.start_ns)
 
 

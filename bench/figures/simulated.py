@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
+from stages import as_arrays
 from tqdm import tqdm
 
 from tomr_fault_diag.diagnosis.pipeline import Pipeline, Step
@@ -125,8 +126,7 @@ def gathered(steps: Iterable[Step], start_ns: int) -> Played:
         frames.extend(step.frames)
         named.extend((found.stamp_ns, found.state.name) for found in step.diagnoses)
     stamps = np.array([frame.stamp_ns for frame in frames])
-    residual = np.array([[item.residual for item in frame.residuals] for frame in frames])
-    modelled = np.array([[item.modelled for item in frame.residuals] for frame in frames])
+    residual, modelled = as_arrays(frames)
     at = np.searchsorted([stamp for stamp, _ in named], stamps, side="right") - 1
     motors, speeds, encoders = list(MOTORS), list(SPEEDS), list(ENCODERS)
     expected = modelled[:, speeds]
