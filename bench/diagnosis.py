@@ -35,9 +35,8 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from attrs import evolve, field, frozen
-from diagnosis_report import report
-from numpy.typing import NDArray
+from attrs import evolve, frozen
+from diagnosis_report import Codes, Onset, Outcome, report
 from stages import as_arrays
 from tqdm import tqdm
 
@@ -64,7 +63,6 @@ _EXCUSE = 10  # ticks in which a wheel that slipped excuses the name of slip
 _TURNING = 0.5  # rad/s: a slower wheel is idle
 _DRIVE_SECONDS = 18.0  # mean length of a drive, at least
 
-Codes = NDArray[np.int64]
 Result = TypeVar("Result")
 
 
@@ -90,29 +88,6 @@ def kinds() -> dict[str, Kind]:
         ),
         "wang2024, paper's bands": Kind(paper, PAPER_BANDS),
     }
-
-
-@frozen
-class Onset:
-    """A fault began to show."""
-
-    state: int
-    severity: float
-    delay: float  # s, infinite if it was not named while it showed or half a second later
-
-
-@frozen
-class Outcome:
-    """One drive as one classifier saw it; counts of ticks, rows true, columns named."""
-
-    decisions: Codes  # (6, 6): healthy ticks and observable faults
-    idle: Codes  # (6, 6): the observable ones of them with the faulty wheel idle
-    unseen: Codes  # (6, 6): faults in force that are not observable
-    by_severity: dict[str, tuple[int, int]]  # right, all
-    onsets: tuple[Onset, ...] = ()
-    alarms: tuple[int, ...] = ()  # faults named that were not there, while healthy
-    excused: int = 0  # slip named where a healthy robot's wheel did slip
-    healthy_seconds: float = field(default=0.0)
 
 
 def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[ResidualFrame]:

@@ -2,9 +2,9 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
+from attrs import frozen
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
@@ -13,36 +13,27 @@ from tomr_fault_diag.classifier.states import STATES
 Codes = NDArray[np.int64]
 
 
-class Onset(Protocol):
-    """A fault began to show; see `diagnosis.Onset`."""
+@frozen
+class Onset:
+    """A fault began to show."""
 
-    @property
-    def state(self) -> int: ...
-    @property
-    def severity(self) -> float: ...
-    @property
-    def delay(self) -> float: ...
+    state: int
+    severity: float
+    delay: float  # s, infinite if it was not named while it showed or half a second later
 
 
-class Outcome(Protocol):
-    """One drive; see `diagnosis.Outcome`."""
+@frozen
+class Outcome:
+    """One drive as one classifier saw it; counts of ticks, rows true, columns named."""
 
-    @property
-    def decisions(self) -> Codes: ...
-    @property
-    def idle(self) -> Codes: ...
-    @property
-    def unseen(self) -> Codes: ...
-    @property
-    def by_severity(self) -> dict[str, tuple[int, int]]: ...
-    @property
-    def onsets(self) -> Sequence[Onset]: ...
-    @property
-    def alarms(self) -> tuple[int, ...]: ...
-    @property
-    def excused(self) -> int: ...
-    @property
-    def healthy_seconds(self) -> float: ...
+    decisions: Codes  # (6, 6): healthy ticks and observable faults
+    idle: Codes  # (6, 6): the observable ones of them with the faulty wheel idle
+    unseen: Codes  # (6, 6): faults in force that are not observable
+    by_severity: dict[str, tuple[int, int]]  # right, all
+    onsets: tuple[Onset, ...] = ()
+    alarms: tuple[int, ...] = ()  # faults named that were not there, while healthy
+    excused: int = 0  # slip named where a healthy robot's wheel did slip
+    healthy_seconds: float = 0.0
 
 
 def report(sick: Sequence[Outcome], well: Sequence[Outcome]) -> dict[str, object]:
@@ -146,13 +137,18 @@ def _by_state(onsets: Sequence[Onset]) -> dict[str, dict[str, float | int | None
     }
 
 
+def poisson_interval(count: int) -> tuple[float, float]:
+    """Exact 95 % interval of the mean of which a count is one sample."""
+    low = float(chi2.ppf(0.025, 2 * count)) / 2.0 if count else 0.0
+    return low, float(chi2.ppf(0.975, 2 * count + 2)) / 2.0
+
+
 def _alarms(outcomes: Sequence[Outcome]) -> dict[str, object]:
     """Faults named in healthy driving, per hour with the exact interval of a Poisson count."""
     hours = sum(outcome.healthy_seconds for outcome in outcomes) / 3600.0
     kinds = Counter(STATES[state].name for outcome in outcomes for state in outcome.alarms)
     count = sum(kinds.values())
-    low = float(chi2.ppf(0.025, 2 * count)) / 2.0 if count else 0.0
-    high = float(chi2.ppf(0.975, 2 * count + 2)) / 2.0
+    low, high = poisson_interval(count)
     return {
         "count": count,
         "kinds": dict(kinds),

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
-from scipy.stats import chi2
+from diagnosis_report import poisson_interval
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.judges import make_judge
@@ -69,8 +69,7 @@ def _main(arguments: Sequence[str] | None) -> int:
     kinds = Counter(name for found, _, _ in parts for name in found)
     hours = sum(ticks for _, _, ticks in parts) * 0.05 / 3600.0
     total = sum(kinds.values())
-    low = float(chi2.ppf(0.025, 2 * total)) / 2.0 if total else 0.0
-    high = float(chi2.ppf(0.975, 2 * total + 2)) / 2.0
+    low, high = poisson_interval(total)
     report = {
         "hours": round(hours, 2),
         "false_alarms": dict(kinds),
