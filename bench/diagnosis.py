@@ -43,13 +43,14 @@ from tqdm import tqdm
 from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
-from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STATES
+from tomr_fault_diag.classifier.states import NORMAL, SLIP, STATES
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
 from tomr_power_model.cli import run_main
 from tomr_power_model.robot import shipped_robot
-from tomr_training.drives import Drive, random_drive
-from tomr_training.labels import SLIPPING, Flags, GroundTruth, Noise, deviates, lasting
+from tomr_training.drives import Drive, random_drive, severity_of, wheel_of
+from tomr_training.labels import LASTING, SLIPPING, Flags, GroundTruth, Noise, deviates, lasting
+from tomr_training.planar.generate import STATE_OF, class_of
 from tomr_training.planar.residuals import Compared
 from tomr_training.simulated_drive import LabelledDrive, healthy_twin, simulated_drive
 
@@ -122,24 +123,20 @@ def observable(drive: Drive, labelled: LabelledDrive, twin: GroundTruth) -> Flag
     """Ticks in which the fault has been measurable for 0.2 s, (n,)."""
     shows = deviates(labelled.truth, twin, Noise.of(drive.plant))
     shows &= labelled.faulty
-    if drive.mission.faults[0].fault_id == "floor_slippery":
+    if true_state(drive) == SLIP:
         shows &= np.abs(labelled.truth.slip).max(axis=1) > SLIPPING
     return lasting(shows)
 
 
 def true_state(drive: Drive) -> int:
     """State that the fault of a drive is to be named."""
-    fault = drive.mission.faults[0]
-    if fault.fault_id == "floor_slippery":
-        return SLIP
-    wheel = int(str(fault.settings["wheel"])) - 1
-    return CONTROL if fault.fault_id == "control_signal_lost" else MOTOR + wheel
+    return int(STATE_OF[class_of(drive.mission.faults[0])])
 
 
 def score_faulty(drive: Drive, labelled: LabelledDrive, twin: GroundTruth, named: Codes) -> Outcome:
     """Hold the states named in a drive with a fault against the truth."""
     state, fault = true_state(drive), drive.mission.faults[0]
-    severity = float(str(fault.settings["severity"]))
+    severity = severity_of(fault)
     shows = observable(drive, labelled, twin)
     onsets, late = [], np.zeros(len(named), dtype=bool)
     for start, end in episodes(shows):
@@ -152,10 +149,10 @@ def score_faulty(drive: Drive, labelled: LabelledDrive, twin: GroundTruth, named
     begin, end = np.flatnonzero(labelled.faulty)[[0, -1]]
     well = (ticks < begin) | (ticks > end + _RECOVERY)
     counted = shows & ~late
-    wheel = fault.settings.get("wheel")
+    wheel = wheel_of(fault)
     idle = np.zeros(len(named), dtype=bool)
     if wheel is not None:
-        idle = np.abs(twin.speed[:, int(str(wheel)) - 1]) < _TURNING
+        idle = np.abs(twin.speed[:, wheel]) < _TURNING
     decisions = counts(NORMAL, named[well]) + counts(state, named[counted])
     rises = np.diff(np.concatenate([[NORMAL], named]) != NORMAL) & (named != NORMAL)
     return Outcome(
@@ -197,7 +194,7 @@ def episodes(flags: Flags) -> list[tuple[int, int]]:
     if not len(ticks):
         return []
     cuts = np.flatnonzero(np.diff(ticks) > _APART)
-    starts = np.concatenate([[ticks[0]], ticks[cuts + 1]]) - 3  # `lasting` tells it 0.2 s later
+    starts = np.concatenate([[ticks[0]], ticks[cuts + 1]]) - (LASTING - 1)
     return list(zip(starts.tolist(), [*ticks[cuts].tolist(), int(ticks[-1])], strict=True))
 
 

@@ -242,6 +242,16 @@ def _faults(
     return (PlannedFault(kind, start, end, settings),)
 
 
+def wheel_of(fault: PlannedFault) -> int | None:
+    """The wheel 0..2 that a fault of a random drive is at; None for the floor's."""
+    return None if fault.fault_id == "floor_slippery" else int(str(fault.settings["wheel"])) - 1
+
+
+def severity_of(fault: PlannedFault) -> float:
+    """How severe a fault of a random drive is, 0 to 1."""
+    return float(str(fault.settings["severity"]))
+
+
 def bumps(robot: Robot, random: np.random.Generator, count: int, until: float) -> tuple[Bump, ...]:
     """So many bumps that start before a time [s]."""
     found = []

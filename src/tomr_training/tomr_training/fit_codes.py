@@ -12,13 +12,11 @@ from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.states import STATES
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, RESIDUALS, SPEEDS, TOTAL
 from tomr_fault_diag.residuals.settings import BandSettings
-from tomr_training.planar.generate import IGNORED, NORMAL, LabelledTicks
+from tomr_training.fit import begin, epoch, weights_of
+from tomr_training.planar.generate import IGNORED, NORMAL, STATE_OF, LabelledTicks
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
-
-# The named state of each true one: of a lost signal the wheel does not matter.
-_STATE_OF = np.array([0, 1, 2, 2, 2, 3, 4, 5], dtype=np.int8)
 
 
 @frozen
@@ -57,7 +55,7 @@ def examples_of(drives: Iterable[LabelledTicks], bands: BandSettings) -> Example
         kept = drive.labels != IGNORED
         kept &= (drive.labels == NORMAL) | code.any(axis=1)
         codes.append(code[kept])
-        labels.append(_STATE_OF[drive.labels[kept]])
+        labels.append(STATE_OF[drive.labels[kept]])
     return Examples(np.concatenate(codes), np.concatenate(labels))
 
 
@@ -96,26 +94,16 @@ class Fitted:
 
 def fit(examples: Examples, recipe: Recipe, progress: Callable[[float], None]) -> Fitted:
     """Train; the same examples and recipe give the same weights."""
-    torch.manual_seed(recipe.seed)
-    torch.set_num_threads(1)  # faster for so small a network, and the sums keep their order
+    begin(recipe.seed)
     inputs, labels = prepared(examples, recipe)
     x = torch.tensor(inputs, dtype=torch.float32)
     y = torch.tensor(labels)
     module = module_of(recipe)
     optimiser = torch.optim.Adam(module.parameters(), lr=recipe.learning_rate)
-    loss = nn.CrossEntropyLoss()
     for _ in range(recipe.epochs):
-        order = torch.randperm(len(x))
-        total = 0.0
-        for start in range(0, len(x), recipe.batch):
-            rows = order[start : start + recipe.batch]
-            optimiser.zero_grad()
-            cost = loss(module(x[rows]), y[rows])
-            cost.backward()
-            optimiser.step()
-            total += float(cost.detach()) * len(rows)
-        progress(total / len(x))
-    weights = [parameter.detach().numpy().astype(np.float64) for parameter in module.parameters()]
+        batches = torch.randperm(len(x)).split(recipe.batch)
+        progress(epoch(module, (x, y), batches, optimiser.step))
+    weights = weights_of(module)
     # In double precision, as the robot computes it: the trained weights are exact there.
     check = torch.randint(-1, 2, (40, RESIDUALS), dtype=torch.float64)
     answers = torch.softmax(module.double()(check), dim=1).detach().numpy()

@@ -19,6 +19,7 @@ from tomr_fault_diag.classifier.features import (
 )
 from tomr_fault_diag.classifier.window_network import WindowNetwork
 from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_training.fit import begin, epoch, weights_of
 from tomr_training.planar.generate import CONTROL, IGNORED, MOTOR, NORMAL, LabelledTicks
 
 Floats = NDArray[np.float32]
@@ -114,29 +115,18 @@ def fit_window(
     examples: Examples, recipe: WindowRecipe, progress: Callable[[float], None]
 ) -> FittedWindow:
     """Train; the same examples and recipe give the same weights."""
-    torch.manual_seed(recipe.seed)
-    torch.set_num_threads(1)  # so that sums keep their order
+    begin(recipe.seed)
     module = WindowModule(recipe.hidden)
     optimiser = torch.optim.Adam(module.parameters(), lr=recipe.learning_rate)
     per_epoch = -(-len(examples) // recipe.batch)
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimiser, max_lr=recipe.learning_rate, total_steps=recipe.epochs * per_epoch
     )
-    loss = nn.CrossEntropyLoss()
     random = np.random.default_rng(recipe.seed)
-    views, labels = views_of(examples, recipe, random), torch.from_numpy(examples.label)
+    trained = views_of(examples, recipe, random), torch.from_numpy(examples.label)
     for _ in range(recipe.epochs):
-        order = torch.from_numpy(random.permutation(len(examples)))
-        total = 0.0
-        for start in range(0, len(order), recipe.batch):
-            rows = order[start : start + recipe.batch]
-            optimiser.zero_grad()
-            cost = loss(module(views[rows]), labels[rows])
-            cost.backward()
-            optimiser.step()
-            schedule.step()
-            total += float(cost.detach()) * len(rows)
-        progress(total / len(examples))
+        batches = torch.from_numpy(random.permutation(len(examples))).split(recipe.batch)
+        progress(epoch(module, trained, batches, optimiser.step, schedule.step))
     return _fitted(module, examples)
 
 
@@ -169,12 +159,10 @@ def prior_of(labels: NDArray[np.int64]) -> NDArray[np.float64]:
 
 
 def _fitted(module: WindowModule, examples: Examples) -> FittedWindow:
-    weights = [p.detach().numpy().astype(np.float64) for p in module.parameters()]
     rows = np.arange(0, len(examples), max(1, len(examples) // 20))[:20]
     check = examples.windows(rows)
+    arrays = [*weights_of(module), prior_of(examples.label)]
     # In double precision, as the robot computes it: the trained weights are exact there.
     with torch.no_grad():
         scores = module.double()(torch.from_numpy(by_wheel(check.astype(np.float64))))
-    w1, b1, w2, b2, w3, b3 = weights
-    network = WindowNetwork(w1, b1, w2, b2, w3, b3, prior_of(examples.label))
-    return FittedWindow(network, check, scores.numpy())
+    return FittedWindow(WindowNetwork(*arrays), check, scores.numpy())

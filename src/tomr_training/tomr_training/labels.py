@@ -92,10 +92,10 @@ def deviates(truth: GroundTruth, twin: GroundTruth, noise: Noise) -> Flags:
     return np.asarray(moved.any(axis=1))
 
 
-def lasting(flags: Flags, ticks: int = LASTING) -> Flags:
-    """Where flags hold in each of the last so many ticks, (ticks, ...)."""
+def lasting(flags: Flags) -> Flags:
+    """Where flags hold in each of the last 0.2 s, (ticks, ...)."""
     held = flags.copy()
-    for back in range(1, ticks):
+    for back in range(1, LASTING):
         held[back:] &= flags[:-back]
         held[:back] = False
     return held

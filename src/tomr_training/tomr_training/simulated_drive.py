@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from attrs import field, frozen
+from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_fault_diag.residuals.frame import ResidualFrame
@@ -98,7 +98,7 @@ class LabelledDrive:
     frames: tuple[ResidualFrame, ...]
     truth: GroundTruth
     faulty: NDArray[np.bool_]  # whether the fault is in force, (n,)
-    first: int = field(default=0)  # tick of the first frame: that of row k is first + k
+    first: int  # tick of the first frame: that of row k is first + k
 
 
 def simulated_drive(chosen: Drive) -> LabelledDrive:

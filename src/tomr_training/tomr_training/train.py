@@ -3,9 +3,10 @@
 import argparse
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from attrs import asdict, evolve, frozen
@@ -17,6 +18,11 @@ from tomr_fault_diag.classifier.states import STATES
 from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
 from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.errors import InputError
+
+if TYPE_CHECKING:  # it takes seconds to import: --help does without
+    from tomr_training.planar.generate import LabelledTicks
+
+Ticks = Iterable["LabelledTicks"]
 
 _EPILOG = """\
 examples:
@@ -30,7 +36,7 @@ file, bit by bit, on the same machine. Needs torch: pip install -r requirements-
 
 _BANDS = {"calibrated": BandSettings(), "paper": PAPER_BANDS}
 Counts = NDArray[np.int64]
-Progress = Callable[[float], None]
+_CHUNK = 10_000  # examples that are validated at a time
 
 
 @frozen
@@ -79,19 +85,23 @@ def _train(arguments: Sequence[str] | None) -> int:
         raise InputError(
             f"{error.name} is missing: pip install -r requirements-train.txt"
         ) from None
-    trained = _KINDS[options.classifier](options)
+    from tomr_training.planar.generate import generate
+
+    between = options.first_seed + options.drives
+    seeds = range(options.first_seed, between), range(between, between + options.validation)
+    train, unseen = (generate(chosen) for chosen in seeds)
+    trained = _KINDS[options.classifier](options, train, unseen)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     arrays: dict[str, Any] = {name: a.astype(np.float32) for name, a in trained.arrays.items()}
     np.savez(options.out, **arrays)
-    between = options.first_seed + options.drives
     confusion = trained.confusion
     text = {
         "classifier": options.classifier,
         **trained.provenance,
         "drives": {
             "simulator": "planar dynamics of tomr_power_model",
-            "training_seeds": [options.first_seed, between - 1],
-            "validation_seeds": [between, between + options.validation - 1],
+            "training_seeds": [seeds[0][0], seeds[0][-1]],
+            "validation_seeds": [seeds[1][0], seeds[1][-1]],
         },
         "torch": torch.__version__,
         "states": [state.name for state in STATES],
@@ -106,29 +116,22 @@ def _train(arguments: Sequence[str] | None) -> int:
     return EXIT_OK
 
 
-def _seeds(options: argparse.Namespace) -> tuple[range, range]:
-    between = options.first_seed + options.drives
-    return range(options.first_seed, between), range(between, between + options.validation)
-
-
-def _window(options: argparse.Namespace) -> Trained:
+def _window(options: argparse.Namespace, train: Ticks, unseen: Ticks) -> Trained:
     from tomr_training.fit_window import WindowRecipe, examples_of, fit_window
-    from tomr_training.planar.generate import generate
+    from tomr_training.planar.generate import STATE_OF
 
     recipe = WindowRecipe()
     recipe = evolve(recipe, epochs=options.epochs or recipe.epochs)
-    train, unseen = (generate(seeds, f"{len(seeds)} drives") for seeds in _seeds(options))
     examples = examples_of(train, recipe)
     with _epochs(recipe.epochs) as progress:
         fitted = fit_window(examples, recipe, progress)
     check = examples_of(unseen, evolve(recipe, healthy=1.0, faulty=1.0))
-    confusion = np.zeros((len(STATES), len(STATES)), dtype=np.int64)
-    for start in range(0, len(check), 10_000):
-        rows = np.arange(start, min(start + 10_000, len(check)))
+    named = []
+    for start in range(0, len(check), _CHUNK):
+        rows = np.arange(start, min(start + _CHUNK, len(check)))
         scores = fitted.network.scores_of(check.windows(rows).astype(np.float64))
-        named = six_of(np.exp(scores - scores.max(axis=1, keepdims=True))).argmax(axis=1)
-        true = six_of(np.eye(scores.shape[1])[check.label[rows]]).argmax(axis=1)
-        np.add.at(confusion, (true, named), 1)
+        shares = np.exp(scores - scores.max(axis=1, keepdims=True))
+        named.append(six_of(shares).argmax(axis=1))
     provenance: dict[str, object] = {
         "recipe": asdict(recipe),
         "training_ticks": len(examples),
@@ -137,23 +140,20 @@ def _window(options: argparse.Namespace) -> Trained:
             "scores": fitted.check_scores.tolist(),
         },
     }
+    confusion = _confusion(STATE_OF[check.label], np.concatenate(named))
     return Trained(asdict(fitted.network), provenance, confusion)
 
 
-def _codes(options: argparse.Namespace) -> Trained:
+def _codes(options: argparse.Namespace, train: Ticks, unseen: Ticks) -> Trained:
     from tomr_training.fit_codes import Recipe, examples_of, fit
-    from tomr_training.planar.generate import generate
 
     bands = _BANDS[options.bands]
     recipe = Recipe()
     recipe = evolve(recipe, epochs=options.epochs or recipe.epochs)
-    train, unseen = (generate(seeds, f"{len(seeds)} drives") for seeds in _seeds(options))
     examples, check = examples_of(train, bands), examples_of(unseen, bands)
     with _epochs(recipe.epochs) as progress:
         fitted = fit(examples, recipe, progress)
     named = fitted.network.probabilities(check.codes.astype(np.float64)).argmax(axis=1)
-    confusion = np.zeros((len(STATES), len(STATES)), dtype=np.int64)
-    np.add.at(confusion, (check.labels.astype(np.int64), named), 1)
     provenance: dict[str, object] = {
         "network": "10-30-6, ReLU, softmax (Wang 2024, section 4)",
         "recipe": asdict(recipe),
@@ -164,30 +164,31 @@ def _codes(options: argparse.Namespace) -> Trained:
             "probabilities": fitted.check_probabilities.astype(float).tolist(),
         },
     }
-    return Trained(asdict(fitted.network), provenance, confusion)
+    return Trained(asdict(fitted.network), provenance, _confusion(check.labels, named))
 
 
-_KINDS: dict[str, Callable[[argparse.Namespace], Trained]] = {
+_KINDS: dict[str, Callable[[argparse.Namespace, Ticks, Ticks], Trained]] = {
     "window": _window,
     "wang2024": _codes,
 }
 
 
-class _epochs:
+def _confusion(true: NDArray[np.integer[Any]], named: NDArray[np.integer[Any]]) -> Counts:
+    found = np.zeros((len(STATES), len(STATES)), dtype=np.int64)
+    np.add.at(found, (true, named), 1)
+    return found
+
+
+@contextmanager
+def _epochs(count: int) -> Iterator[Callable[[float], None]]:
     """A progress bar over epochs that shows the loss."""
+    with tqdm(total=count, desc="epochs") as bar:
 
-    def __init__(self, count: int) -> None:
-        self._bar = tqdm(total=count, desc="epochs")
-
-    def __enter__(self) -> Progress:
         def progress(loss: float) -> None:
-            self._bar.set_postfix(loss=f"{loss:.4f}")
-            self._bar.update()
+            bar.set_postfix(loss=f"{loss:.4f}")
+            bar.update()
 
-        return progress
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.close()
+        yield progress
 
 
 def _print(confusion: Counts) -> None:

@@ -1,25 +1,28 @@
 """Drives by the thousand: what the classifiers learn from."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from tomr_fault_diag.classifier.belief import CONTROLS, ENCODERS, HYPOTHESES, six_of
 from tomr_power_model.robot import Robot, shipped_robot
-from tomr_training.drives import DEVIATION, Drive, bumps, random_drive
+from tomr_sim_bridge.missions.schema import PlannedFault
+from tomr_training.drives import DEVIATION, Drive, bumps, random_drive, wheel_of
 from tomr_training.labels import SLIPPING, Flags, GroundTruth, Noise, deviates
 from tomr_training.planar.plant import run_plant
 from tomr_training.planar.residuals import Compared, compare
 from tomr_training.planar.schedule import faulty_ticks
 from tomr_training.planar.sensors import Signals
 
-# True states, finer than those that are named: of a lost signal the wheel is known as well.
-NORMAL, SLIP, CONTROL, MOTOR = 0, 1, 2, 5
+# True states are the hypotheses, finer than what is named: the wheel of a lost signal is known.
+NORMAL, SLIP, CONTROL, MOTOR = 0, 1, CONTROLS.start, ENCODERS.start
+STATE_OF = six_of(np.eye(HYPOTHESES)).argmax(axis=1).astype(np.int8)  # that each is to be named
 IGNORED = -1  # aftermath of a fault, a healthy robot that slips
 
 _SETTLED = 10  # ticks without a difference after which a robot is as good as healthy
@@ -36,17 +39,16 @@ class LabelledTicks:
     labels: Labels  # (ticks,)
 
 
-def generate(seeds: range, title: str, kind: str | None = "any") -> Iterator[LabelledTicks]:
+def generate(seeds: range) -> Iterator[LabelledTicks]:
     """Drive once per seed, on all cores; the result depends on the seeds alone."""
-    work = partial(_simulated, kind)
-    work(seeds[0])  # so that what numba compiles is there before the processes are
+    _simulated(seeds[0])  # so that what numba compiles is there before the processes are
     with ProcessPoolExecutor(os.cpu_count()) as pool:
-        found = pool.map(work, seeds, chunksize=_CHUNK)
-        yield from tqdm(found, total=len(seeds), desc=title, unit="drive")
+        found = pool.map(_simulated, seeds, chunksize=_CHUNK)
+        yield from tqdm(found, total=len(seeds), desc=f"{len(seeds)} drives", unit="drive")
 
 
-def _simulated(kind: str | None, seed: int) -> LabelledTicks:
-    return simulate(training_drive(_reference(), seed, kind))
+def _simulated(seed: int) -> LabelledTicks:
+    return simulate(training_drive(_reference(), seed))
 
 
 @cache
@@ -54,13 +56,13 @@ def _reference() -> Robot:
     return shipped_robot("reference")
 
 
-def training_drive(reference: Robot, seed: int, kind: str | None = "any") -> Drive:
+def training_drive(reference: Robot, seed: int) -> Drive:
     """A random drive, every other one bumped before it starts: shoved, not faulty.
 
     Every other robot has drivers that are tuned a little off as well: a real driver's loop is
     never known as well as a simulated one's.
     """
-    drive = random_drive(reference, seed, kind)
+    drive = random_drive(reference, seed)
     random = np.random.default_rng([seed, 2])
     early = bumps(drive.believed, random, int(random.integers(0, 2)), 1.0)
     drive = evolve(drive, bumps=(*drive.bumps, *early))
@@ -97,18 +99,18 @@ def _labels(drive: Drive, truth: GroundTruth) -> Labels:
     shown = deviates(truth, twin, Noise.of(drive.plant))
     now = faulty_ticks(drive)
     for fault in drive.mission.faults:
-        labels[now] = class_of(fault.fault_id, fault.settings)
+        labels[now] = class_of(fault)
         after = ~now & (np.cumsum(now) == now.sum())
         labels[after & _recently(shown | now, _SETTLED)] = IGNORED
     return labels
 
 
-def class_of(fault_id: str, settings: Mapping[str, object]) -> int:
-    """True class of a fault."""
-    if fault_id == "floor_slippery":
+def class_of(fault: PlannedFault) -> int:
+    """True state while a fault is in force."""
+    wheel = wheel_of(fault)
+    if wheel is None:
         return SLIP
-    wheel = int(str(settings["wheel"])) - 1
-    return (CONTROL if fault_id == "control_signal_lost" else MOTOR) + wheel
+    return (CONTROL if fault.fault_id == "control_signal_lost" else MOTOR) + wheel
 
 
 def _recently(flags: Flags, ticks: int) -> Flags:

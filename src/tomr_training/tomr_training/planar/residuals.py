@@ -10,11 +10,12 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.binding import compiled
 from tomr_power_model.model.encoders import LONG_S
 from tomr_power_model.model.resting import FADES, MOVING
+from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.robot import WHEELS
 from tomr_training.drives import Drive
 from tomr_training.labels import spread
@@ -24,7 +25,7 @@ from tomr_training.planar.sensors import ENCODER_RATE, Signals
 
 Array = NDArray[np.float64]
 
-_WINDOW = 0.07  # s, of the fit to the encoders
+_WINDOW = ResidualSettings().encoder_window / NANOSECONDS  # s
 
 
 @frozen

@@ -9,7 +9,7 @@ from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.numbers import no_input, timing_of
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_sim_bridge.faults.floor_slippery import SLIPPERIEST
-from tomr_training.drives import Drive
+from tomr_training.drives import Drive, severity_of, wheel_of
 
 Array = NDArray[np.float64]
 
@@ -46,14 +46,13 @@ def disturbed(drive: Drive, robot: Robot) -> Array:
         push = slice(at.PUSH, at.PUSH + 3)
         inputs[rows(bump.start, bump.start + bump.duration), push] += [*bump.force, bump.moment]
     for fault in drive.mission.faults:
-        severity = float(str(fault.settings["severity"]))
+        severity, wheel = severity_of(fault), wheel_of(fault)
         when = rows(fault.start, drive.length if fault.end is None else fault.end)
-        if fault.fault_id == "floor_slippery":
+        if wheel is None:
             fall = min(SLIPPERIEST / drive.mission.floor_friction, 1.0) ** severity
             inputs[when, _column(at.FLOOR)] *= fall
             continue
         what = at.CONNECTED if fault.fault_id == "control_signal_lost" else at.COUNTS
-        wheel = int(str(fault.settings["wheel"])) - 1
         inputs[when, _column(what)[wheel]] *= 1.0 - severity
     return inputs
 
