@@ -2,11 +2,26 @@
 
 from collections.abc import Callable
 
-from attrs import evolve
+import numpy as np
+import pytest
+from attrs import asdict, evolve
 
+from tomr_power_model.robot import shipped_robot
 from tomr_sim_bridge.missions.schema import PlannedFault
-from tomr_training.drives import Drive
-from tomr_training.planar.generate import CONTROL, IGNORED, MOTOR, NORMAL, simulate
+from tomr_training.drives import Drive, random_drive
+from tomr_training.labels import SLIPPING, Noise, deviates
+from tomr_training.planar.generate import (
+    CONTROL,
+    IGNORED,
+    MOTOR,
+    NORMAL,
+    STATE_OF,
+    simulate,
+    training_drive,
+)
+from tomr_training.planar.plant import run_plant
+
+REFERENCE = shipped_robot("reference")
 
 
 def test_labels_follow_the_fault(chosen: Callable[..., Drive]) -> None:
@@ -20,3 +35,43 @@ def test_labels_follow_the_fault(chosen: Callable[..., Drive]) -> None:
     healthy = simulate(evolve(drive, bumps=()).healthy).labels
     assert set(healthy.tolist()) <= {NORMAL, IGNORED}
     assert len(healthy) == len(labels)
+
+
+def test_the_aftermath_is_ignored_while_it_shows(straight: Callable[..., Drive]) -> None:
+    """A wheel that starts again takes longer than the half second that is ignored anyhow."""
+    lost = PlannedFault("encoder_lost", 2.0, 3.0, {"severity": 1.0, "wheel": 2})
+    drive = straight(faults=(lost,))
+    truth, twin = run_plant(drive).truth, run_plant(drive.healthy).truth
+    last = int(np.flatnonzero(deviates(truth, twin, Noise.of(drive.plant)))[-1])
+    assert last > 60
+    labels = simulate(drive).labels
+    assert set(labels[60 : last + 11].tolist()) == {IGNORED}
+    assert labels[last + 11] == NORMAL
+
+
+def test_slipping_without_a_fault_is_ignored(straight: Callable[..., Drive]) -> None:
+    drive = straight(floor_friction=0.05)
+    slips = run_plant(drive).truth.slip.max(axis=1) > SLIPPING
+    assert slips.any()
+    labels = simulate(drive).labels
+    assert (labels[slips] == IGNORED).all()
+    assert (labels[~slips] == NORMAL).all()
+
+
+def test_every_other_robot_is_tuned_and_some_are_shoved_before_they_start() -> None:
+    shoved = 0
+    for seed in range(8):
+        drive, plain = training_drive(REFERENCE, seed), random_drive(REFERENCE, seed)
+        given, own = asdict(plain.plant.controller), asdict(drive.plant.controller)
+        changed = {key: own[key] / given[key] for key in own if own[key] != given[key]}
+        tuned = set() if seed % 2 else {"proportional", "integral", "acceleration_limit"}
+        assert set(changed) == tuned
+        assert list(changed.values()) == pytest.approx([1.0] * len(changed), abs=0.05)
+        early = drive.bumps[len(plain.bumps) :]
+        assert all(bump.start < 1.0 for bump in early)
+        shoved += bool(early)
+    assert 0 < shoved < 8
+
+
+def test_a_true_state_is_named_without_the_wheel_of_a_lost_signal() -> None:
+    assert STATE_OF.tolist() == [0, 1, 2, 2, 2, 3, 4, 5]

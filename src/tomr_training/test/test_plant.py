@@ -8,7 +8,7 @@ from attrs import evolve
 
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.robot import shipped_robot
-from tomr_sim_bridge.missions.schema import PlannedFault
+from tomr_sim_bridge.missions.schema import PlannedFault, TwistPhase
 from tomr_training.drives import Bump, Drive
 from tomr_training.planar.plant import run_believed, run_plant
 from tomr_training.planar.schedule import commanded
@@ -40,7 +40,10 @@ def test_traction_bounds_acceleration(straight: Straight) -> None:
 
 def test_a_bump_is_over_soon_and_shows(straight: Straight) -> None:
     bumped = run_plant(straight(bumps=(Bump(2.0, 0.1, (30.0, 0.0), 0.0),)))
-    change = np.abs(bumped.steps.power - run_plant(straight()).steps.power).max(axis=1)
+    calm = run_plant(straight())
+    # Pushed ahead, the robot is faster: wheel 2 turns forwards in this drive.
+    assert (bumped.steps.speed - calm.steps.speed)[405:420, 1].min() > 0.0
+    change = np.abs(bumped.steps.power - calm.steps.power).max(axis=1)
     assert change[400:430].max() > 2.0
     assert change[:400].max() == 0.0
     assert change[560:].max() < 0.5
@@ -90,3 +93,26 @@ def test_sensors_show_sag_and_scale(straight: Straight) -> None:
     assert sag == pytest.approx(0.5 * after.drawn[:, 3].mean(), rel=0.05)
     idle, scaled = ((seen.voltage * seen.drawn)[:, 0].mean() for seen in (before, after))
     assert scaled / idle == pytest.approx(1.1, abs=0.02)
+
+
+def test_drivers_feel_the_quanta_of_their_encoders(straight: Straight) -> None:
+    powers = []
+    for quantum in (1e-5, 8e-3):
+        sensors = evolve(REFERENCE.sensors, encoder_resolution=quantum)
+        drive = straight(robot=evolve(REFERENCE, sensors=sensors))
+        powers.append(run_plant(drive).steps.power[-200:, 1])
+    smooth, rough = (np.std(np.diff(power)) for power in powers)
+    assert rough > 10.0 * smooth
+
+
+def test_noise_of_power_is_of_rollers_and_of_monitors(straight: Straight) -> None:
+    """Rollers disturb what a motor draws by 3 %; a battery's monitor has twice a driver's noise."""
+    silent = {"current_noise": 0.0, "voltage_noise": 0.0, "encoder_resolution": 1e-6}
+    drive = straight(robot=evolve(REFERENCE, sensors=evolve(REFERENCE.sensors, **silent)))
+    seen = Signals.of(drive, run_plant(drive))
+    steady = (seen.voltage * seen.drawn)[-100:, 1] - 1.2  # W above standby
+    assert np.std(steady) / np.mean(steady) == pytest.approx(0.03, rel=0.3)
+    drive = straight(phases=(TwistPhase((0.0, 0.0, 0.0), 10.0),))
+    noise = np.std(Signals.of(drive, run_plant(drive)).drawn, axis=0)
+    np.testing.assert_allclose(noise[:3], REFERENCE.sensors.current_noise, rtol=0.15)
+    assert noise[3] == pytest.approx(2.0 * REFERENCE.sensors.current_noise, rel=0.15)
