@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message
@@ -13,9 +14,12 @@ from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STATES, UNKNOWN
+from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
+from tomr_fault_diag.residuals.settings import ResidualSettings
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.outgoing import Level
+from tomr_power_model.model.settings import ModelSettings
 from tomr_power_model.robot import shipped_robot
 
 MS = 1_000_000
@@ -54,6 +58,14 @@ def _run(*spells: tuple[tuple[int, ...], int]) -> list[Diagnosis]:
             if diagnosis is not None:
                 found.append(diagnosis)
     return found
+
+
+def test_defaults_of_parameters_are_those_of_settings() -> None:
+    """Nodes take the former, benches and training the latter."""
+    found = DiagnosisSettings.of({}, "test")
+    assert found.classifier == ClassifierSettings()
+    assert found.residuals == ResidualSettings()
+    assert evolve(found.model, model_values={}) == ModelSettings()
 
 
 def test_softmax_by_hand() -> None:

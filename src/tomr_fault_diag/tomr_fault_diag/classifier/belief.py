@@ -11,13 +11,14 @@ be told apart from normal in this motion has l = 0 and leaves the belief as it i
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_fault_diag.classifier.states import NORMAL, SLIP
+
 Array = NDArray[np.float64]
 
 # What the window network tells apart: normal, slip, lost signal of wheels 1-3, of encoders 1-3.
 HYPOTHESES = 8
 CONTROLS = slice(2, 5)
 ENCODERS = slice(5, 8)
-_NORMAL, _SLIP = 0, 1
 _CLIP = 24.0  # no window says more than so much against anything
 _ENDING = 1e-4  # likelihood that a fault ends within a tick ...
 _SLIP_ENDING = 5e-3  # ... and that a slippery place is left
@@ -37,7 +38,7 @@ class Belief:
     def clear(self) -> None:
         """Start afresh, believing that all is well."""
         self.shares: Array = np.zeros(HYPOTHESES)
-        self.shares[_NORMAL] = 1.0
+        self.shares[NORMAL] = 1.0
 
     def update(self, likelihoods: Array) -> Array:
         """Take the log-likelihoods (8,) of a window; returns the probabilities (8,)."""
@@ -50,9 +51,9 @@ class Belief:
 def _transitions(onset: float) -> Array:
     """P(j -> k), (8, 8)."""
     moves = np.full((HYPOTHESES, HYPOTHESES), _OTHER)
-    moves[_NORMAL] = onset
-    moves[:, _NORMAL] = _ENDING
-    moves[_SLIP, _NORMAL] = _SLIP_ENDING
+    moves[NORMAL] = onset
+    moves[:, NORMAL] = _ENDING
+    moves[SLIP, NORMAL] = _SLIP_ENDING
     np.fill_diagonal(moves, 0.0)
     np.fill_diagonal(moves, 1.0 - moves.sum(axis=1))
     return moves

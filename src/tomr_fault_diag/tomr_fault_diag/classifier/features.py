@@ -112,13 +112,3 @@ def _without_encoders(window: Array) -> Array:
 
 # What windows look like to a robot that lacks a sensor.
 BLIND = (_without_total, _without_motors, _without_encoders)
-
-__all__ = [
-    "BLIND",
-    "CHANNELS",
-    "INPUTS",
-    "WINDOW",
-    "by_wheel",
-    "channels",
-    "channels_of",
-]

@@ -6,7 +6,6 @@ enough of the likeliest for that to be named.
 
 import math
 from collections import deque
-from collections.abc import Callable
 from functools import lru_cache
 from typing import Protocol
 
@@ -52,20 +51,6 @@ class Judge(Protocol):
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         """Look at the newest frame, so long after the one before, and what it cannot show."""
         ...
-
-
-Maker = Callable[[str, ClassifierSettings], Judge]
-JUDGES: dict[str, Maker] = {}
-
-
-def judge(name: str) -> Callable[[Maker], Maker]:
-    """Register a maker; it gets the file of the weights (empty: the shipped ones) and settings."""
-
-    def register(maker: Maker) -> Maker:
-        JUDGES[name] = maker
-        return maker
-
-    return register
 
 
 class WindowJudge:
@@ -144,18 +129,8 @@ class CodeJudge:
         )
 
 
-@judge("window")
-def window_judge(weights: str, settings: ClassifierSettings) -> Judge:
-    """Ours."""
-    return WindowJudge(WindowNetwork.load(weights or None), settings)
-
-
-@judge("wang2024")
-def code_judge(weights: str, settings: ClassifierSettings) -> Judge:
-    """The paper's."""
-    return CodeJudge(Network.load(weights or None), settings)
-
-
 def make_judge(settings: ClassifierSettings) -> Judge:
     """The classifier that the settings ask for; raises InputError for weights that do not fit."""
-    return JUDGES[settings.classifier](settings.weights, settings)
+    if settings.classifier == "wang2024":
+        return CodeJudge(Network.load(settings.weights), settings)
+    return WindowJudge(WindowNetwork.load(settings.weights), settings)

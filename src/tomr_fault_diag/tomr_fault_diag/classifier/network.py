@@ -13,14 +13,13 @@ from tomr_fault_diag.residuals.frame import RESIDUALS
 
 Array = NDArray[np.float64]
 
-SHIPPED = "wang2024.npz"
 _SHAPES = {
     "hidden_weight": (30, RESIDUALS),
     "hidden_bias": (30,),
     "output_weight": (len(STATES), 30),
     "output_bias": (len(STATES),),
 }
-_STORED = Stored(SHIPPED, "a network", tuple(_SHAPES), lambda found: _SHAPES)
+_STORED = Stored("wang2024.npz", "a network", tuple(_SHAPES), lambda found: _SHAPES)
 
 
 @frozen

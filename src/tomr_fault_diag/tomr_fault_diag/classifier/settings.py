@@ -11,7 +11,6 @@ from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot.parameters import ParameterSpec
 
 _S = ParameterSpec
-CLASSIFIERS = ("window", "wang2024")
 
 
 def _live(
@@ -26,7 +25,7 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
         "window: continuous residuals of the last 0.4 s; wang2024: the paper's codes and network",
         "str",
         "window",
-        choices=CLASSIFIERS,
+        choices=("window", "wang2024"),
     ),
     _S("weights", "file of network weights; empty: the shipped ones", "str", ""),
     _S(

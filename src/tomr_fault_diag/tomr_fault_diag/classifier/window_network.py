@@ -22,7 +22,6 @@ from tomr_fault_diag.classifier.stored import Shapes, Stored
 
 Array = NDArray[np.float64]
 
-SHIPPED = "window.npz"
 _VIEWS = 4  # outputs of one view
 _NAMES = ("weight_1", "bias_1", "weight_2", "bias_2", "weight_3", "bias_3", "prior")
 
@@ -38,7 +37,7 @@ def _shapes(found: Mapping[str, Array]) -> Shapes:
 
 
 _STORED = Stored(
-    SHIPPED,
+    "window.npz",
     "the window network",
     _NAMES,
     _shapes,
