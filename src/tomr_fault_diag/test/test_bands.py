@@ -21,11 +21,23 @@ def _healthy(seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def test_the_share_asked_for_stays_within() -> None:
     residual, modelled, change = _healthy()
+    residual[:, 0] *= 3.0
+    residual[:, 4:7] *= 0.2
+    change[:, 4:7] *= 0.5
     bands = fit_bands(residual, modelled, change, within=0.99)
-    fresh = _healthy(1)
-    band = np.maximum(bands.power, bands.relative * fresh[1]) + bands.transient * fresh[2]
-    inside = (np.abs(fresh[0]) <= band)[:, 1:4].mean()
-    assert inside == pytest.approx(0.99, abs=0.004)
+    total = bands.power * bands.total_factor, bands.total_relative, 3.0 * bands.transient
+    motor = bands.power, bands.relative, bands.transient
+    speed = bands.speed, bands.speed_relative, bands.speed_transient
+    size, modelled, change = _healthy(1)
+    change[:, 4:7] *= 0.5
+    for columns, scale, (least, relative, transient) in (
+        (slice(0, 1), 3.0, total),
+        (slice(1, 4), 1.0, motor),
+        (slice(4, 7), 0.2, speed),
+    ):
+        band = np.maximum(least, relative * modelled[:, columns]) + transient * change[:, columns]
+        inside = np.abs(scale * size[:, columns]) <= band
+        assert inside.mean() == pytest.approx(0.99, abs=0.004)
     assert 0.05 < bands.transient < 0.5
 
 
