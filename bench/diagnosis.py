@@ -168,7 +168,7 @@ def score_faulty(drive: Drive, labelled: LabelledDrive, twin: GroundTruth, named
 
 def score_healthy(labelled: LabelledDrive, named: Codes) -> Outcome:
     """Count what was named in a drive without a fault."""
-    rises = np.flatnonzero(np.diff(np.concatenate([[NORMAL], named])) & (named != NORMAL))
+    rises = np.flatnonzero((np.diff(named, prepend=NORMAL) != 0) & (named != NORMAL))
     slips = np.abs(labelled.truth.slip).max(axis=1) > SLIPPING
     alarms, excused = [], 0
     for tick in rises:
