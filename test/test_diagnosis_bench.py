@@ -63,12 +63,15 @@ def test_a_named_fault_is_scored_by_delay_decisions_and_use_of_its_wheel() -> No
     assert found.healthy_seconds == pytest.approx(3.0)
 
 
-def test_a_fault_that_nobody_names_is_late_for_ever() -> None:
+@pytest.mark.parametrize(("tick", "delay"), [(149, 0.05 * 87), (150, np.inf)])
+def test_a_name_counts_until_half_a_second_after_the_fault_showed(tick: int, delay: float) -> None:
     labelled, twin = drives()
-    found = score_faulty(drive_with(LOST), labelled, twin, np.full(TICKS, NORMAL))
-    assert found.onsets[0].delay == np.inf
+    named = np.full(TICKS, NORMAL)
+    named[tick] = STATE
+    found = score_faulty(drive_with(LOST), labelled, twin, named)
+    assert found.onsets[0].delay == pytest.approx(delay)
     figures = report([found], [])
-    assert figures["delay_s"]["all"]["never_named"] == 1  # type: ignore[index]
+    assert figures["delay_s"]["all"]["never_named"] == int(np.isinf(delay))  # type: ignore[index]
 
 
 def test_slip_is_excused_where_a_wheel_slipped_just_before() -> None:
