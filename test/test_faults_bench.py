@@ -1,7 +1,9 @@
 """The benchmark on robots with and without faults: regimes, means over ticks, states, truth."""
 # ruff: noqa: E402 (bench/ is no package)
 
+import json
 import sys
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +14,12 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "bench"))
 
 from faults.cli import main
-from faults.closed_loop import MotorPower, Prediction
+from faults.closed_loop import MotorPower, Prediction, closed_loop
+from faults.diagnose import diagnose
 from faults.explain import measured
 from faults.play import Played, changes_of, play, scored_name
 from faults.power import PATHS, compared
+from faults.recordings import Recordings
 from faults.regimes import AT_REST, noise_of, regimes_of, rms, tick_means, tick_speeds, undisturbed
 from faults.truth import missed, ratios, true_value
 
@@ -117,7 +121,8 @@ def test_three_predictions_are_compared_on_the_same_ticks() -> None:
     ones = np.ones((100, 3))
     command = 0.3 * ones
     command[:10] = np.nan  # the nodes' first ticks: of no prediction's count
-    power = MotorPower(times, np.full(200, 2.0), 2.0 + 0.1 * np.tile([1.0, -3.0], 100))
+    measured = 2.0 + np.tile([0.05, -0.05], 100)
+    power = MotorPower(times, measured, measured + 0.1 * np.tile([1.0, -3.0], 100))
     encoders = np.arange(10**18, 10**18 + 101 * PERIOD_NS, PERIOD_NS, dtype=np.int64)
     predicted = Prediction((power,) * 3, encoders, np.zeros((101, 3)))
     played = Played((), stamps, PERIOD_NS, 2.0 * ones, command, -0.2 * ones)
@@ -127,6 +132,9 @@ def test_three_predictions_are_compared_on_the_same_ticks() -> None:
     assert found.sampled == pytest.approx(0.1 * np.sqrt(5.0))
     assert found.rate == pytest.approx(40.0)
     assert found.regimes[AT_REST].all()
+    assert found.sample_noise == pytest.approx([0.1 / np.sqrt(2.0)] * 3)
+    bumped = compared(played, predicted, [10**18 + 2 * 10**9])  # leaves out ticks 39 to 79
+    assert bumped.residual.shape[1] == 90 - 41
 
 
 def test_two_seconds_after_a_bump_are_left_out() -> None:
@@ -205,6 +213,35 @@ def test_the_cost_of_a_command_is_its_own(tmp_path: Path) -> None:
     assert (run.code, run.last) == (3, "luck")
     assert 80.0 < run.memory < 400.0
     assert 0.0 < run.cpu < 60.0
+
+
+def test_the_closed_loop_predicts_the_power_of_a_recording() -> None:
+    robot = Path(str(files("tomr_power_model") / "robots" / "reference.yaml"))
+    found = closed_loop(ROOT / "bags" / "square", robot, 14.0)
+    assert len(found.motors) == 3
+    for motor in found.motors:
+        assert motor.time_ns[-1] - motor.time_ns[0] == pytest.approx(14e9, abs=1e8)
+        assert rms(motor.residual) < 0.1 * rms(motor.measured)
+
+
+def test_a_set_of_recordings_is_diagnosed_and_scored_by_its_own_program(tmp_path: Path) -> None:
+    drives = tmp_path / "faults" / "practice" / "drives"
+    truth = tmp_path / "faults_truth"
+    for folder in (drives, drives.parent / "healthy_long", truth / "practice"):
+        folder.mkdir(parents=True)
+    (drives / "one").symlink_to(ROOT / "bags" / "square")
+    told = {"onset": None, "extended": "battery", "t0_ns": 7 * 10**9, "bumps": [{"t": 0.5}]}
+    (truth / "practice" / "one.json").write_text(json.dumps(told))
+    (tmp_path / "score_faults.py").write_text("import sys; print(*sys.argv[1:])")
+    recordings = Recordings(tmp_path, "practice")
+    (drive,) = recordings.drives("drives")
+    assert (drive.identity, drive.is_normal) == ("one", False)  # something else goes wrong in it
+    assert drive.bumps_ns == (7_500_000_000,)
+    out = tmp_path / "out"
+    printed = diagnose(recordings, Path("reference"), out)
+    assert printed.split() == [str(out), str(truth), "--json", str(out / "score.json")]
+    changes = json.loads((out / "practice" / "one.json").read_text())
+    assert changes[0][1:] == ["normal", None]
 
 
 @pytest.mark.parametrize("command", ["explain", "calibrate", "diagnose", "power"])
