@@ -122,6 +122,7 @@ def test_three_predictions_are_compared_on_the_same_ticks() -> None:
     command = 0.3 * ones
     command[:10] = np.nan  # the nodes' first ticks: of no prediction's count
     measured = 2.0 + np.tile([0.05, -0.05], 100)
+    measured[:18] += np.tile([0.1, -0.1], 9)  # rougher, in ticks that do not count
     power = MotorPower(times, measured, measured + 0.1 * np.tile([1.0, -3.0], 100))
     encoders = np.arange(10**18, 10**18 + 101 * PERIOD_NS, PERIOD_NS, dtype=np.int64)
     predicted = Prediction((power,) * 3, encoders, np.zeros((101, 3)))
@@ -221,6 +222,7 @@ def test_the_closed_loop_predicts_the_power_of_a_recording() -> None:
     assert len(found.motors) == 3
     for motor in found.motors:
         assert motor.time_ns[-1] - motor.time_ns[0] == pytest.approx(14e9, abs=1e8)
+        assert motor.measured[:20].mean() == pytest.approx(1.2, abs=0.1)  # W of standby
         assert rms(motor.residual) < 0.1 * rms(motor.measured)
 
 
