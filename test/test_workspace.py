@@ -96,6 +96,15 @@ def test_colcon_installs_command_where_ros2_run_looks(package: Path, command: st
     assert os.access(program, os.X_OK), f"{program} is missing: run `make setup`"
 
 
+def test_packages_are_taken_out_before_they_are_installed_anew() -> None:
+    """One by one pip would lose a command that has moved to a package that it installs earlier."""
+    changed = "src/tomr_training/setup.py"
+    steps = subprocess.run(
+        ["make", "-n", "-W", changed, "setup"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+    assert -1 < steps.find("pip uninstall") < steps.find(" -e src/")
+
+
 def test_command_runs_after_sourcing_the_workspace() -> None:
     program = "install/tomr_power_model/lib/tomr_power_model/power_model"
     run = subprocess.run(
