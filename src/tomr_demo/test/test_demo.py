@@ -19,8 +19,7 @@ from tomr_demo.view import PlainView, Scene, act_table, now_panel
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_fault_diag.residuals.messages import residual_message
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.bag import bag_header, bag_message
-from tomr_power_model.messages.to_bag import to_bag
+from tomr_power_model.messages.bag import bag_header, bag_message, to_bag
 from tomr_power_model.messages.types import DIAGNOSTICS
 from tomr_power_model.recordings import RecordingWriter
 from tomr_power_model.robot import shipped_robot
@@ -198,7 +197,7 @@ def recording(tmp_path: Path) -> Path:
                     )
             frame = ResidualFrame(at(moment), (Residual(4.0 if slips else 0.2, 1.0, 4.0),) * 10)
             message = residual_message(shipped_robot("reference"), frame)
-            writer.write("residuals", DIAGNOSTICS, to_bag(message), at(moment))
+            writer.write("residuals", DIAGNOSTICS, to_bag(message.plain), at(moment))
             truth = [("floor_slippery", {"active": float(slips), "severity": 0.8})]
             write_diagnostics(write, "ground_truth/faults", moment, truth)
             if tick % 20 == 0 or tick == 88:

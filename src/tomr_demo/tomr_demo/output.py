@@ -6,8 +6,9 @@ from pathlib import Path
 
 from attrs import frozen
 
-from tomr_demo.score import NANOSECONDS, Scoreboard
+from tomr_demo.score import Scoreboard
 from tomr_power_model.errors import InputError
+from tomr_power_model.messages.plain import NANOSECONDS
 
 _MARK = "Left behind by tomr_demo, whose next run replaces it."
 _README = f"""\

@@ -18,8 +18,8 @@ from tomr_fault_diag.classifier.states import (
     STATES,
     UNKNOWN,
 )
+from tomr_power_model.messages.plain import NANOSECONDS
 
-NANOSECONDS = 1_000_000_000
 TIME_TO_NAME = NANOSECONDS  # in which a fault has to be named
 TIME_TO_RECOVER = 3 * NANOSECONDS  # in which normal has to be named again
 

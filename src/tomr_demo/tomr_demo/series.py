@@ -7,13 +7,14 @@ import numpy as np
 from attrs import define, field, frozen
 from numpy.typing import NDArray
 
-from tomr_demo.score import DIAGNOSTICS, NANOSECONDS, TRUTH, Scoreboard
+from tomr_demo.score import DIAGNOSTICS, TRUTH, Scoreboard
 from tomr_fault_diag.residuals.frame import RESIDUALS, ResidualFrame, residual_names
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUAL_TOPIC
 from tomr_fault_diag.residuals.messages import frame_of
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.intake import Unusable
-from tomr_power_model.recordings import Recording, header_stamp_ns, resolve_topic
+from tomr_power_model.messages.intake import Unusable, header_stamp_ns
+from tomr_power_model.messages.plain import NANOSECONDS
+from tomr_power_model.recordings import Recording, resolve_topic
 
 Array = NDArray[np.float64]
 

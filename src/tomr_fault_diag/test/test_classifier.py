@@ -15,7 +15,7 @@ from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STATES, UNKNOWN
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.outgoing import Level
+from tomr_power_model.messages.plain import Level
 from tomr_power_model.robot import shipped_robot
 
 MS = 1_000_000
