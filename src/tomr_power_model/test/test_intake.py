@@ -5,9 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from attrs import evolve
 
+from tomr_power_model.drive.sources import PowerReading
 from tomr_power_model.messages.bag import bag_header, bag_message
-from tomr_power_model.messages.inputs import Complaints, model_inputs
+from tomr_power_model.messages.inputs import Complaints, measured_inputs, model_inputs
 from tomr_power_model.messages.intake import (
     Unusable,
     WheelFinder,
@@ -18,6 +20,7 @@ from tomr_power_model.messages.intake import (
 )
 from tomr_power_model.messages.readings import SupplyReading
 from tomr_power_model.model.predictor import PowerPredictor
+from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.robot import shipped_robot
 
 STAMP = 1_700_000_000_500_000_000
@@ -123,6 +126,26 @@ class TestInputsOfAStage:
         message = _joints(list(WHEELS), position=[1, 2, 3])
         message.header = bag_header(0)
         assert "no stamp" in str(self._take("joint_states", message))
+
+    def test_efforts_are_power_where_a_wheel_is_missing_and_never_from_an_old_message(self) -> None:
+        reference = shipped_robot("reference")
+        measurement = evolve(
+            reference.measurement, source="joint_effort", quantity="motor_current", total="none"
+        )
+        readings: list[PowerReading] = []
+        arrivals = iter((Arrival.TAKEN, Arrival.REPEATED, Arrival.RESTARTED))
+        (joints,) = measured_inputs(
+            evolve(reference, measurement=measurement),
+            lambda *_: next(arrivals),
+            lambda reading: readings.append(reading) or Arrival.TAKEN,  # type: ignore[func-returns-value]
+        )
+        message = _joints([WHEELS[0], WHEELS[2]], position=[1, 2], effort=[0.5, 0.7])
+        assert "wheel_2_joint" in str(joints.take(message, STAMP))
+        assert [(reading.wheel, reading.current) for reading in readings] == [(0, 0.5), (2, 0.7)]
+        assert "repeats" in str(joints.take(message, STAMP))
+        assert len(readings) == 2
+        assert "started afresh" in str(joints.take(message, STAMP))
+        assert len(readings) == 4
 
 
 def test_complaints_thin_out() -> None:
