@@ -153,18 +153,18 @@ def test_plain_lines_tell_each_change_once(capsys: pytest.CaptureFixture[str]) -
 
 def test_only_a_folder_of_an_earlier_demo_is_replaced(tmp_path: Path) -> None:
     first = make_output(tmp_path / "demo_output")
-    first.recording.mkdir()
-    (first.recording / "old.mcap").write_text("old")
-    (first.folder / "notes.txt").write_text("mine")
+    (first / "recording").mkdir()
+    (first / "recording" / "old.mcap").write_text("old")
+    (first / "notes.txt").write_text("mine")
     again = make_output(tmp_path / "demo_output")
-    assert again.folder == first.folder
-    assert not again.recording.exists()
-    assert (again.folder / "notes.txt").read_text() == "mine"
+    assert again == first
+    assert not (again / "recording").exists()
+    assert (again / "notes.txt").read_text() == "mine"
     other = tmp_path / "thesis"
     other.mkdir()
     (other / "README.txt").write_text("not to be lost")
-    assert make_output(other).folder == tmp_path / "thesis_2"
-    assert make_output(other).folder == tmp_path / "thesis_2"
+    assert make_output(other) == tmp_path / "thesis_2"
+    assert make_output(other) == tmp_path / "thesis_2"
     assert [entry.name for entry in other.iterdir()] == ["README.txt"]
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="--out"):
