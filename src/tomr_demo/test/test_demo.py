@@ -14,7 +14,7 @@ from rich.console import Console
 from tomr_demo import acts
 from tomr_demo.main import main
 from tomr_demo.output import make_output
-from tomr_demo.score import Named, Scoreboard
+from tomr_demo.score import TRUTH, Named, Scoreboard, truth_in
 from tomr_demo.view import PlainView, Scene, act_table, now_panel
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_fault_diag.residuals.messages import residual_message
@@ -23,6 +23,7 @@ from tomr_power_model.messages.bag import bag_header, bag_message, to_bag
 from tomr_power_model.messages.types import DIAGNOSTICS
 from tomr_power_model.recordings import RecordingWriter
 from tomr_power_model.robot import shipped_robot
+from tomr_sim_bridge.plant.simulation import Simulation
 
 START = 1_700_000_000_000_000_000
 
@@ -149,6 +150,16 @@ def test_plain_lines_tell_each_change_once(capsys: pytest.CaptureFixture[str]) -
         "1.40 s  /diagnostics: motor system fault 2, p 0.80, after 0.45 s",
         "total power: 70 W above",
     ]
+
+
+def test_truth_is_read_as_the_simulator_tells_it() -> None:
+    simulation = Simulation(shipped_robot("reference"))
+    simulation.set_fault("encoder_lost", wheel=3, severity=1.0)
+    told = [s.message for s in simulation.step_to(60_000_000) if f"/{s.topic}" == TRUTH]
+    assert [truth_in(to_bag(message)) for message in told[-1:]] == [("encoder_lost", 3)]
+    simulation.set_fault("encoder_lost")
+    told = [s.message for s in simulation.step_to(200_000_000) if f"/{s.topic}" == TRUTH]
+    assert truth_in(to_bag(told[-1])) == (None, 1)
 
 
 def test_only_a_folder_of_an_earlier_demo_is_replaced(tmp_path: Path) -> None:
