@@ -219,6 +219,18 @@ def test_launch_files_start_commands_that_exist() -> None:
     assert started <= known
 
 
+def test_launch_files_name_files_that_are_installed() -> None:
+    named = set()
+    for file in ROOT.glob("src/*/launch/*.launch.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            match node:
+                case ast.List([ast.Call(ast.Name("FindPackageShare"), [package]), *rest]):
+                    name, *parts = (ast.literal_eval(part) for part in (package, *rest))
+                    named.add(ROOT.joinpath("install", name, "share", name, *parts))
+    assert {file.name for file in named} == {"diagnosis.launch.py", "reference.yaml"}
+    assert all(file.is_file() for file in named)
+
+
 def test_shipped_robots_and_missions_are_read_alike_from_source_and_share() -> None:
     for package in PACKAGES:
         for file in package.glob(f"{package.name}/[rm]*/*.yaml"):
