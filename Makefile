@@ -34,7 +34,7 @@ PACKAGES := $(patsubst %/package.xml,%,$(wildcard src/*/package.xml))
 # What calls for another install: a change of these, or a file more or less of those. Sources,
 # launch files and data are linked, not copied.
 MANIFESTS := $(wildcard $(addprefix src/*/,package.xml setup.py setup.cfg resource/*))
-LINKED := $(sort $(wildcard src/*/launch/*.launch.py \
+LINKED := $(sort $(MANIFESTS) $(wildcard src/*/launch/*.launch.py \
     $(addprefix src/*/tomr_*/,robots/*.yaml missions/*.yaml weights/*)))
 
 .PHONY: help setup demo test lint format bench figures train bags clean FORCE
@@ -116,9 +116,13 @@ clean: ## remove all that was made: .venv, build, install, log, caches
 	@[ "$(LINKED)" = "$$(cat $@ 2>/dev/null)" ] || echo "$(LINKED)" > $@
 
 # Twice: pip puts the commands into .venv/bin for use without sourcing anything, colcon makes
-# install/ for `ros2 run` and `ros2 launch`. Both link to the sources.
+# install/ for `ros2 run` and `ros2 launch`. Both link to the sources. All packages are taken out
+# first: pip would replace them one by one, and a command that has moved from one to another would
+# go with the old package after it has come with the new one.
 .venv/workspace: .venv/dependencies .venv/linked $(MANIFESTS)
 	@echo "Building the workspace"
+	@$(BIN)/python -m pip list --disable-pip-version-check --editable --format=freeze | cut -d= -f1 \
+	    | xargs -r $(BIN)/python -m pip uninstall --quiet --yes
 	@$(BIN)/python -m pip install --disable-pip-version-check --quiet --no-deps --use-pep517 \
 	    --no-build-isolation --config-settings editable_mode=compat $(PACKAGES:%=-e %)
 	@rm -rf build install log

@@ -24,12 +24,11 @@ from tomr_power_model.calibrate_cli import main as tomr_calibrate
 from tomr_power_model.calibration.problem import modelled_power
 from tomr_power_model.calibration.samples import samples_of
 from tomr_power_model.drive.read import read_drive
-from tomr_power_model.messages.bag import bag_message
+from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import Robot, load_robot
 from tomr_sim_bridge.missions import drive, load_mission, start_mission
-from tomr_sim_bridge.plant.samples import build
 from tomr_training.drives import every_value
 
 Array = NDArray[np.float64]
@@ -84,7 +83,7 @@ def record(job: Job) -> None:
     with RecordingWriter(job.path) as writer:
         for samples in drive(mission, simulation, job.mission_seed):
             for sample in samples:
-                message = build(sample.message, bag_message)
+                message = to_bag(sample.message)
                 writer.write(sample.topic, sample.message.type_name, message, sample.stamp_ns)
 
 

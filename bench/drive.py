@@ -10,9 +10,8 @@ from attrs import frozen
 from tomr_fault_diag.diagnosis.offline import find_topics
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
-from tomr_power_model.messages.bag import jazzy_typestore
+from tomr_power_model.messages.bag import jazzy_typestore, to_bag
 from tomr_power_model.messages.outgoing import TYPES
-from tomr_power_model.messages.to_bag import to_bag
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import shipped_robot
@@ -118,7 +117,7 @@ def prepare(bag: Path, parameters: dict[str, object]) -> Drive:
 def _serialised(messages: Iterable[Any]) -> Iterator[Raw]:
     for message in messages:
         name = TYPES[type(message)]
-        data = jazzy_typestore().serialize_cdr(to_bag(message), name)
+        data = jazzy_typestore().serialize_cdr(to_bag(message.plain), name)
         yield Raw(message.topic, name, bytes(data), message.stamp_ns)
 
 

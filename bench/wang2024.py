@@ -28,14 +28,13 @@ from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, TOTAL, ResidualFrame
 from tomr_power_model.cli import run_main
 from tomr_power_model.dynamics.drives import WheelMotion
-from tomr_power_model.messages.bag import bag_message
+from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import Robot, load_robot
 from tomr_power_model.wang2024 import Coefficients, Samples, fit_wang2024
 from tomr_power_model.wang2024.recorded import read_samples
 from tomr_sim_bridge.missions import drive, load_mission, start_mission
-from tomr_sim_bridge.plant.samples import build
 from tomr_training.drives import every_value
 
 Array = NDArray[np.float64]
@@ -81,7 +80,7 @@ def record(planned: tuple[str, int], deviation: float, deviation_seed: int, fold
     with RecordingWriter(path) as writer:
         for samples in drive(mission, simulation, seed):
             for sample in samples:
-                message = build(sample.message, bag_message)
+                message = to_bag(sample.message)
                 writer.write(sample.topic, sample.message.type_name, message, sample.stamp_ns)
     return path
 

@@ -15,10 +15,9 @@ from rclpy.node import Node
 from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
-from tomr_power_model.messages.bag import jazzy_typestore
+from tomr_power_model.messages.bag import jazzy_typestore, to_bag
 from tomr_power_model.messages.outgoing import TYPES, DiagnosticMessage, JointMessage, SupplyMessage
 from tomr_power_model.messages.predictions import EXPECTED, prediction_topics
-from tomr_power_model.messages.to_bag import to_bag
 from tomr_power_model.nodes.stage_node import STAGE_QOS, message_class
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import shipped_robot
@@ -50,7 +49,7 @@ def _offline() -> dict[Key, Any]:
         for _, step in diagnose(recording, pipeline):
             for message in pipeline.messages(step):
                 name = TYPES[type(message)]
-                data = bytes(store.serialize_cdr(to_bag(message), name))
+                data = bytes(store.serialize_cdr(to_bag(message.plain), name))
                 found[message.topic, message.stamp_ns] = store.deserialize_cdr(data, name)
     return found
 

@@ -96,6 +96,15 @@ def test_colcon_installs_command_where_ros2_run_looks(package: Path, command: st
     assert os.access(program, os.X_OK), f"{program} is missing: run `make setup`"
 
 
+def test_packages_are_taken_out_before_they_are_installed_anew() -> None:
+    """One by one pip would lose a command that has moved to a package that it installs earlier."""
+    changed = "src/tomr_training/setup.py"
+    steps = subprocess.run(
+        ["make", "-n", "-W", changed, "setup"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+    assert -1 < steps.find("pip uninstall") < steps.find(" -e src/")
+
+
 def test_command_runs_after_sourcing_the_workspace() -> None:
     program = "install/tomr_power_model/lib/tomr_power_model/power_model"
     run = subprocess.run(
@@ -208,6 +217,18 @@ def test_launch_files_start_commands_that_exist() -> None:
     nodes = {"power_model", "power_residuals", "fault_classifier", "sim_bridge"}
     assert {command for _, command in started} == nodes
     assert started <= known
+
+
+def test_launch_files_name_files_that_are_installed() -> None:
+    named = set()
+    for file in ROOT.glob("src/*/launch/*.launch.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            match node:
+                case ast.List([ast.Call(ast.Name("FindPackageShare"), [package]), *rest]):
+                    name, *parts = (ast.literal_eval(part) for part in (package, *rest))
+                    named.add(ROOT.joinpath("install", name, "share", name, *parts))
+    assert {file.name for file in named} == {"diagnosis.launch.py", "reference.yaml"}
+    assert all(file.is_file() for file in named)
 
 
 def test_shipped_robots_and_missions_are_read_alike_from_source_and_share() -> None:

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from concealed.concealing import Hidden, beyond_effects, robot_of
+from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.robot import WHEELS
 from tomr_sim_bridge.missions.mission import Plan
 from tomr_sim_bridge.plant import moments
 from tomr_sim_bridge.plant.design import PlantDesign
 from tomr_sim_bridge.plant.effects import make_effects
-from tomr_sim_bridge.plant.samples import NANOSECONDS
 from tomr_sim_bridge.plant.simulation import Simulation
 
 Array = NDArray[np.float64]

@@ -33,7 +33,7 @@ from concealed.robots import (
     flat,
 )
 from concealed.sensing import SensorSet, drawn_sensors, write_recording
-from tomr_sim_bridge.plant.samples import NANOSECONDS
+from tomr_power_model.messages.plain import NANOSECONDS
 
 REAL_SECONDS, HOLDOUT_SECONDS = (60.0, 85.0), (42.0, 48.0)
 _FIRST_START_S, _LAST_START_S = 1_700_000_000, 1_730_000_000

@@ -12,10 +12,11 @@ from scipy.signal import lfilter
 
 from concealed.driving import BATTERY, Array, Track
 from concealed.robots import WHEEL_JOINTS, Family
-from tomr_power_model.messages.bag import bag_message
+from tomr_power_model.messages.bag import to_bag
+from tomr_power_model.messages.plain import NANOSECONDS, battery_state, joint_state
 from tomr_power_model.recordings import RecordingWriter
 from tomr_sim_bridge.plant import samples
-from tomr_sim_bridge.plant.samples import NANOSECONDS, Plain, Sample, build
+from tomr_sim_bridge.plant.samples import Sample
 
 ENCODER_RATE, POWER_RATE, IMU_RATE = 100.0, 50.0, 100.0  # Hz
 SUPPLIES = (*(name.removesuffix("_joint") + "/power" for name in WHEEL_JOINTS), "battery_state")
@@ -167,7 +168,7 @@ def write_recording(
     received.sort(key=lambda pair: pair[0])
     with RecordingWriter(path) as writer:
         for stamp, sample in received:
-            message = build(sample.message, bag_message)
+            message = to_bag(sample.message)
             writer.write(sample.topic, sample.message.type_name, message, stamp)
     return told
 
@@ -190,7 +191,9 @@ def _joint_states(
     rows = (values[clock.arrives] for values in (clock.stamped, angle, speed))
     for at, position, velocity in zip(*rows, strict=True):
         stamp = start_ns + round(at * NANOSECONDS)
-        message = samples.joint_state(stamp, WHEEL_JOINTS, position.tolist(), velocity.tolist(), [])
+        message = joint_state(
+            stamp, WHEEL_JOINTS, position=position.tolist(), velocity=velocity.tolist()
+        )
         yield Sample("joint_states", stamp, message)
 
 
@@ -198,7 +201,7 @@ def _power(topic: str, reading: Measured, start_ns: int) -> Iterator[Sample]:
     place = topic.removesuffix("/power").removesuffix("_state")
     for at, voltage, current in zip(reading.time, reading.voltage, reading.current, strict=True):
         stamp = start_ns + round(at * NANOSECONDS)
-        message: Plain = samples.battery_state(stamp, place, float(voltage), -float(current))
+        message = battery_state(stamp, float(voltage), -float(current), place)
         yield Sample(topic, stamp, message)
 
 

@@ -13,12 +13,12 @@ from tomr_fault_diag.diagnosis.pipeline import Pipeline, Step
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL, ResidualFrame
 from tomr_power_model.geometry.kinematics import wheels_to_twist
-from tomr_power_model.messages.bag import bag_message
+from tomr_power_model.messages.bag import to_bag
+from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.robot import Robot, load_robot
 from tomr_sim_bridge.missions import Mission, drive, start_mission
 from tomr_sim_bridge.missions.schema import CirclePhase, TwistPhase
-from tomr_sim_bridge.plant.samples import NANOSECONDS, build
 
 Array = NDArray[np.float64]
 
@@ -98,7 +98,7 @@ def driven(mission: Mission, robot: Robot, seed: int = 0) -> list[Heard]:
     count = round(mission.plan(robot, seed).duration * mission.command_rate)
     bar = tqdm(drive(mission, simulation, seed), "driving", count, leave=False, delay=_PATIENCE)
     return [
-        Heard(sample.topic, build(sample.message, bag_message), sample.stamp_ns)
+        Heard(sample.topic, to_bag(sample.message), sample.stamp_ns)
         for samples in bar
         for sample in samples
     ]

@@ -14,16 +14,16 @@ from rich.console import Console
 from tomr_demo import acts
 from tomr_demo.main import main
 from tomr_demo.output import make_output
-from tomr_demo.score import Named, Scoreboard
+from tomr_demo.score import TRUTH, Named, Scoreboard, truth_in
 from tomr_demo.view import PlainView, Scene, act_table, now_panel
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_fault_diag.residuals.messages import residual_message
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.bag import bag_header, bag_message
-from tomr_power_model.messages.to_bag import to_bag
+from tomr_power_model.messages.bag import bag_header, bag_message, to_bag
 from tomr_power_model.messages.types import DIAGNOSTICS
 from tomr_power_model.recordings import RecordingWriter
 from tomr_power_model.robot import shipped_robot
+from tomr_sim_bridge.plant.simulation import Simulation
 
 START = 1_700_000_000_000_000_000
 
@@ -152,20 +152,30 @@ def test_plain_lines_tell_each_change_once(capsys: pytest.CaptureFixture[str]) -
     ]
 
 
+def test_truth_is_read_as_the_simulator_tells_it() -> None:
+    simulation = Simulation(shipped_robot("reference"))
+    simulation.set_fault("encoder_lost", wheel=3, severity=1.0)
+    told = [s.message for s in simulation.step_to(60_000_000) if f"/{s.topic}" == TRUTH]
+    assert [truth_in(to_bag(message)) for message in told[-1:]] == [("encoder_lost", 3)]
+    simulation.set_fault("encoder_lost")
+    told = [s.message for s in simulation.step_to(200_000_000) if f"/{s.topic}" == TRUTH]
+    assert truth_in(to_bag(told[-1])) == (None, 1)
+
+
 def test_only_a_folder_of_an_earlier_demo_is_replaced(tmp_path: Path) -> None:
     first = make_output(tmp_path / "demo_output")
-    first.recording.mkdir()
-    (first.recording / "old.mcap").write_text("old")
-    (first.folder / "notes.txt").write_text("mine")
+    (first / "recording").mkdir()
+    (first / "recording" / "old.mcap").write_text("old")
+    (first / "notes.txt").write_text("mine")
     again = make_output(tmp_path / "demo_output")
-    assert again.folder == first.folder
-    assert not again.recording.exists()
-    assert (again.folder / "notes.txt").read_text() == "mine"
+    assert again == first
+    assert not (again / "recording").exists()
+    assert (again / "notes.txt").read_text() == "mine"
     other = tmp_path / "thesis"
     other.mkdir()
     (other / "README.txt").write_text("not to be lost")
-    assert make_output(other).folder == tmp_path / "thesis_2"
-    assert make_output(other).folder == tmp_path / "thesis_2"
+    assert make_output(other) == tmp_path / "thesis_2"
+    assert make_output(other) == tmp_path / "thesis_2"
     assert [entry.name for entry in other.iterdir()] == ["README.txt"]
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="--out"):
@@ -198,7 +208,7 @@ def recording(tmp_path: Path) -> Path:
                     )
             frame = ResidualFrame(at(moment), (Residual(4.0 if slips else 0.2, 1.0, 4.0),) * 10)
             message = residual_message(shipped_robot("reference"), frame)
-            writer.write("residuals", DIAGNOSTICS, to_bag(message), at(moment))
+            writer.write("residuals", DIAGNOSTICS, to_bag(message.plain), at(moment))
             truth = [("floor_slippery", {"active": float(slips), "severity": 0.8})]
             write_diagnostics(write, "ground_truth/faults", moment, truth)
             if tick % 20 == 0 or tick == 88:

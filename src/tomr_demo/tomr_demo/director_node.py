@@ -18,13 +18,13 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
 from tomr_demo.acts import twist_at
-from tomr_demo.score import NANOSECONDS
 from tomr_demo.topics import Topic
 from tomr_power_model.messages.bag import jazzy_typestore
-from tomr_power_model.nodes.stage_node import message_class
-from tomr_power_model.nodes.to_ros import ros_header
+from tomr_power_model.messages.plain import NANOSECONDS
+from tomr_power_model.nodes.stage_node import message_class, to_ros
 from tomr_power_model.recordings import RecordingWriter
 from tomr_power_model.robot.parameters import Value
+from tomr_sim_bridge.plant.samples import command_sample
 
 COMMAND_PERIOD = 0.05  # s
 QUEUE = 1000  # of messages, so that drawing a table loses none
@@ -123,13 +123,9 @@ class Director(Node):
         now = self.now_ns
         if not now:
             return
-        message = TwistStamped(header=ros_header(now))
-        message.header.frame_id = "base_link"
-        if self._drive_since is not None:
-            v_x, v_y, omega_z = twist_at((now - self._drive_since) / NANOSECONDS)
-            message.twist.linear.x, message.twist.linear.y = v_x, v_y
-            message.twist.angular.z = omega_z
-        self._cmd_vel.publish(message)
+        since = self._drive_since
+        twist = (0.0, 0.0, 0.0) if since is None else twist_at((now - since) / NANOSECONDS)
+        self._cmd_vel.publish(to_ros(command_sample(now, *twist).message))
 
 
 def begin_ros() -> None:

@@ -11,10 +11,11 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from tomr_demo.score import NANOSECONDS, Stretch
+from tomr_demo.score import Stretch
 from tomr_demo.series import Drive, Power
 from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STATES
 from tomr_power_model.errors import InputError
+from tomr_power_model.messages.plain import NANOSECONDS
 
 DPI = 130
 SIZE = (14.0, 11.5)  # inches

@@ -13,7 +13,15 @@ from rich.console import Console
 
 from tomr_demo.acts import ACTS, shortened
 from tomr_demo.figure import save_figure
-from tomr_demo.output import Output, make_output, write_result
+from tomr_demo.output import (
+    FIGURE,
+    LOGS,
+    RECORDING,
+    RESULT,
+    ROBOT,
+    make_output,
+    write_result,
+)
 from tomr_demo.processes import Children, DemoFailure, command_of, signals_noted
 from tomr_demo.series import load_drive
 from tomr_demo.topics import PROCESSES, all_topics
@@ -23,7 +31,6 @@ from tomr_power_model.errors import InputError
 from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import load_robot
 
-ROBOT = "reference"
 # A command acts this long [s] after its stamp, as in the real Robotino, so that the time it takes
 # on its way between busy processes plays no part.
 COMMAND_DELAY = 0.15
@@ -94,9 +101,9 @@ def _demo(arguments: Sequence[str] | None) -> int:
     # A simulated robot must not meet a real one on the network.
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     output = make_output(options.out or Path("demo_output"))
-    write_robot(output.robot)
+    write_robot(output / ROBOT)
     scene = _perform(output, options.weights, options.quick, console)
-    write_result(output.result, scene.board)
+    write_result(output / RESULT, scene.board)
     console.print(act_table(scene, console.width))
     passed = scene.board.passed
     verdict = (
@@ -106,26 +113,26 @@ def _demo(arguments: Sequence[str] | None) -> int:
     )
     console.print(verdict, style="bold green" if passed else "bold red")
     with console.status("drawing the time line"):
-        _draw(output.recording, output.figure)
-    for path in (output.recording, output.figure, output.result):
-        console.print(f"  {path}", highlight=False)
+        _draw(output / RECORDING, output / FIGURE)
+    for name in (RECORDING, FIGURE, RESULT):
+        console.print(f"  {output / name}", highlight=False)
     return EXIT_OK if passed else EXIT_MISMATCH
 
 
-def _perform(output: Output, weights: Path | None, quick: bool, console: Console) -> Scene:
+def _perform(output: Path, weights: Path | None, quick: bool, console: Console) -> Scene:
     """Run the processes and the play; returns its last scene."""
     # Takes a second to import, which neither --help nor --figure needs.
     from tomr_demo.play import Play
 
     acts = shortened(ACTS) if quick else ACTS
-    topics = all_topics(load_robot(output.robot))
-    with signals_noted() as signals, Children(output.logs) as children:
-        start_nodes(children, output.robot, weights)
+    topics = all_topics(load_robot(output / ROBOT))
+    with signals_noted() as signals, Children(output / LOGS) as children:
+        start_nodes(children, output / ROBOT, weights)
         with _ros(), view_on(console) as view:
             play = Play(topics, children, view, signals)
             try:
                 play.wait_until_ready()
-                with RecordingWriter(output.recording) as recording:
+                with RecordingWriter(output / RECORDING) as recording:
                     play.perform(acts, recording)
             finally:
                 play.close()
@@ -145,7 +152,7 @@ def _ros() -> Iterator[None]:
 
 def write_robot(path: Path) -> None:
     """Write the robot.yaml of the demo: the reference robot, which answers a little late."""
-    text = files("tomr_power_model").joinpath("robots", f"{ROBOT}.yaml").read_text()
+    text = files("tomr_power_model").joinpath("robots", "reference.yaml").read_text()
     document = yaml.safe_load(text)
     document["/**"]["ros__parameters"]["controller"]["delay"] = COMMAND_DELAY
     path.write_text(yaml.safe_dump(document, sort_keys=False))
@@ -170,7 +177,7 @@ def _draw_again(recording: Path, out: Path | None, console: Console) -> None:
     folder = recording.parent if out is None else out
     if not folder.is_dir():
         raise InputError(f"--out {folder}: no such folder")
-    figure = folder / "timeline.png"
+    figure = folder / FIGURE
     with console.status("drawing the time line"):
         _draw(recording, figure)
     console.print(f"{figure}", highlight=False)

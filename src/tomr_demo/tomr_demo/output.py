@@ -4,10 +4,9 @@ import json
 import shutil
 from pathlib import Path
 
-from attrs import frozen
-
-from tomr_demo.score import NANOSECONDS, Scoreboard
+from tomr_demo.score import Scoreboard
 from tomr_power_model.errors import InputError
+from tomr_power_model.messages.plain import NANOSECONDS
 
 _MARK = "Left behind by tomr_demo, whose next run replaces it."
 _README = f"""\
@@ -22,37 +21,11 @@ robot.yaml     the robot; diagnose its recording again without ROS:
                tomr_diagnose recording --robot robot.yaml
 logs/          what each process printed
 """
-_OWN = ("recording", "timeline.png", "result.json", "robot.yaml", "logs", "README.txt")
+RECORDING, FIGURE, RESULT = "recording", "timeline.png", "result.json"
+ROBOT, LOGS, README = "robot.yaml", "logs", "README.txt"
 
 
-@frozen
-class Output:
-    """Paths of what is left behind."""
-
-    folder: Path
-
-    @property
-    def recording(self) -> Path:
-        return self.folder / "recording"
-
-    @property
-    def figure(self) -> Path:
-        return self.folder / "timeline.png"
-
-    @property
-    def result(self) -> Path:
-        return self.folder / "result.json"
-
-    @property
-    def robot(self) -> Path:
-        return self.folder / "robot.yaml"
-
-    @property
-    def logs(self) -> Path:
-        return self.folder / "logs"
-
-
-def make_output(wanted: Path) -> Output:
+def make_output(wanted: Path) -> Path:
     """Make the folder, or clear it of an earlier demo; anything else there is left alone.
 
     A folder in use for something else is not touched: the next free of `<wanted>_2`, `<wanted>_3`
@@ -61,15 +34,15 @@ def make_output(wanted: Path) -> Output:
     try:
         folder = _free(wanted)
         folder.mkdir(parents=True, exist_ok=True)
-        for name in _OWN:
+        for name in (RECORDING, FIGURE, RESULT, ROBOT, LOGS, README):
             _remove(folder / name)
-        (folder / "README.txt").write_text(_README)
-        (folder / "logs").mkdir()
+        (folder / README).write_text(_README)
+        (folder / LOGS).mkdir()
     except OSError as error:
         raise InputError(
             f"--out {wanted}: cannot be written ({error.strerror}): name another folder"
         ) from None
-    return Output(folder)
+    return folder
 
 
 def _free(wanted: Path) -> Path:
@@ -84,7 +57,7 @@ def _is_free(folder: Path) -> bool:
     """Whether it is absent, an empty folder or one of an earlier demo."""
     if not folder.is_dir():
         return not folder.exists() and not folder.is_symlink()
-    readme = folder / "README.txt"
+    readme = folder / README
     if readme.is_file():
         return readme.read_text(errors="replace").startswith(_MARK)
     return not any(folder.iterdir())

@@ -9,7 +9,6 @@ from tomr_demo.director_node import Director
 from tomr_demo.processes import Children, DemoFailure
 from tomr_demo.score import (
     DIAGNOSTICS,
-    NANOSECONDS,
     NORMAL_STATE,
     Named,
     Scoreboard,
@@ -20,6 +19,7 @@ from tomr_demo.view import Scene, View
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_fault_diag.residuals.messages import frame_of
 from tomr_power_model.errors import InputError
+from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.recordings import RecordingWriter
 from tomr_power_model.robot.parameters import Value
 

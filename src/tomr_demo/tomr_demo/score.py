@@ -8,7 +8,6 @@ from typing import Any
 
 from attrs import define, field, frozen
 
-from tomr_demo.truth import truth_of
 from tomr_fault_diag.classifier.states import (
     CONTROL,
     MOTOR,
@@ -18,8 +17,8 @@ from tomr_fault_diag.classifier.states import (
     STATES,
     UNKNOWN,
 )
+from tomr_power_model.messages.plain import NANOSECONDS
 
-NANOSECONDS = 1_000_000_000
 TIME_TO_NAME = NANOSECONDS  # in which a fault has to be named
 TIME_TO_RECOVER = 3 * NANOSECONDS  # in which normal has to be named again
 
@@ -39,6 +38,16 @@ class Named:
     probability: float | None = None  # of that state
     evidence: tuple[str, ...] = ()
     since_ns: int = 0  # from when on the state holds
+
+
+def truth_in(message: Any) -> tuple[str | None, int]:
+    """Read id and wheel (1..3) of the fault in force out of ground_truth/faults."""
+    fault_id, wheel = None, 1
+    for status in message.status:
+        values = {item.key: float(item.value) for item in status.values}
+        if values.get("active", 0.0) > 0.0:
+            fault_id, wheel = status.name, int(values.get("wheel", 1.0))
+    return fault_id, wheel
 
 
 def named_in(message: Any, stamp_ns: int) -> Named | None:
@@ -190,15 +199,14 @@ class Scoreboard:
     def take(self, topic: str, message: Any, stamp_ns: int) -> None:
         """Take a message of /diagnostics or ground_truth/faults; others do not matter."""
         if topic == TRUTH:
-            truth = truth_of(message, stamp_ns)
-            self.truth(stamp_ns, truth.fault, truth.wheel + 1)
+            self.truth(stamp_ns, *truth_in(message))
         elif topic == DIAGNOSTICS:
             named = named_in(message, stamp_ns)
             if named is not None:
                 self.diagnosis(named)
 
-    def truth(self, stamp_ns: int, fault_id: str | None, wheel: int = 1) -> None:
-        """Note what is true: a fault's id and wheel (1..3), None while all is well."""
+    def truth(self, stamp_ns: int, fault_id: str | None, wheel: int) -> None:
+        """Note what is true: a fault's id, None while all is well, and its wheel (1..3)."""
         current = self.stretches[-1] if self.stretches else None
         place = None if fault_id in (None, "floor_slippery") else wheel
         if current is None or (current.fault_id, current.wheel) != (fault_id, place):

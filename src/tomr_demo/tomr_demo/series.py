@@ -7,20 +7,21 @@ import numpy as np
 from attrs import define, field, frozen
 from numpy.typing import NDArray
 
-from tomr_demo.score import DIAGNOSTICS, NANOSECONDS, TRUTH, Scoreboard
+from tomr_demo.score import DIAGNOSTICS, TRUTH, Scoreboard
 from tomr_fault_diag.residuals.frame import RESIDUALS, ResidualFrame, residual_names
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUAL_TOPIC
 from tomr_fault_diag.residuals.messages import frame_of
+from tomr_power_model.drive.sources import TOTAL_TOPIC
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.intake import Unusable
-from tomr_power_model.recordings import Recording, header_stamp_ns, resolve_topic
+from tomr_power_model.messages.intake import Unusable, header_stamp_ns
+from tomr_power_model.messages.plain import NANOSECONDS
+from tomr_power_model.messages.predictions import TOTAL as TOTAL_PREDICTED
+from tomr_power_model.recordings import Recording, resolve_topic
 
 Array = NDArray[np.float64]
 
 POWER = "/power"
 PREDICTED = "/power/predicted"
-TOTAL = "battery_state"
-TOTAL_PREDICTED = "battery_state/predicted"
 
 
 @frozen
@@ -79,7 +80,7 @@ def load_drive(recording: Recording) -> Drive:
     """
     wheels = wheels_of(recording)
     supplies = [(wheel, f"{wheel}{POWER}", f"{wheel}{PREDICTED}") for wheel in wheels]
-    supplies.append(("whole robot", TOTAL, TOTAL_PREDICTED))
+    supplies.append(("whole robot", TOTAL_TOPIC, TOTAL_PREDICTED))
     samples = {topic: _Samples() for _, *pair in supplies for topic in pair}
     takers: dict[str, Callable[[Any, int], None]] = {t: s.power for t, s in samples.items()}
     frames: list[ResidualFrame] = []

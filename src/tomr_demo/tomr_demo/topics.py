@@ -6,10 +6,15 @@ from tomr_demo.score import DIAGNOSTICS as DIAGNOSIS
 from tomr_demo.score import TRUTH
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
 from tomr_power_model.messages.predictions import EXPECTED, prediction_topics
-from tomr_power_model.messages.types import BATTERY, DIAGNOSTICS, IMU, JOINT_STATE, TWIST_STAMPED
+from tomr_power_model.messages.types import (
+    BATTERY,
+    DIAGNOSTICS,
+    IMU,
+    JOINT_STATE,
+    ODOMETRY,
+    TWIST_STAMPED,
+)
 from tomr_power_model.robot import Robot
-
-ODOMETRY = "nav_msgs/msg/Odometry"
 
 # The processes, in the order in which data passes through them, and the modules they run.
 PROCESSES = {

@@ -13,9 +13,10 @@ from rich.table import Table
 from rich.text import Text
 
 from tomr_demo.acts import Act
-from tomr_demo.score import NANOSECONDS, Named, Scoreboard, Stretch
+from tomr_demo.score import Named, Scoreboard, Stretch
 from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STATES
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL, ResidualFrame
+from tomr_power_model.messages.plain import NANOSECONDS
 
 PLAIN_WIDTH = 150  # of tables that go into a file
 _EVIDENCE_LINES = 3

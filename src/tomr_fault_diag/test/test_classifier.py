@@ -18,7 +18,7 @@ from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_fault_diag.residuals.settings import ResidualSettings
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.outgoing import Level
+from tomr_power_model.messages.plain import Level
 from tomr_power_model.model.settings import ModelSettings
 from tomr_power_model.robot import shipped_robot
 

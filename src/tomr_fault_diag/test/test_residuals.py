@@ -11,10 +11,9 @@ from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL, Res
 from tomr_fault_diag.residuals.messages import frame_of, residual_message
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
-from tomr_power_model.messages.bag import bag_header, bag_message
+from tomr_power_model.messages.bag import bag_header, bag_message, to_bag
 from tomr_power_model.messages.intake import Unusable
 from tomr_power_model.messages.readings import SupplyReading
-from tomr_power_model.messages.to_bag import to_bag
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.robot import Robot, shipped_robot
 
@@ -212,7 +211,7 @@ def test_a_frame_survives_its_message() -> None:
         for value, unit in zip(values, ["W", "A", "rad/s"] * 4, strict=False)
     )
     frame = ResidualFrame(BASE, residuals)
-    back = frame_of(to_bag(residual_message(robot, frame)), BASE)
+    back = frame_of(to_bag(residual_message(robot, frame).plain), BASE)
     assert back.codes == frame.codes
     for one, other in zip(back.residuals, frame.residuals, strict=True):
         assert (one.residual == other.residual) or (one.stale and other.stale)

@@ -27,7 +27,7 @@ from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NOT_OBSERVABLE, ST
 from tomr_fault_diag.classifier.window_network import WindowNetwork
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.outgoing import Level
+from tomr_power_model.messages.plain import Level
 from tomr_power_model.robot import shipped_robot
 
 MS = 1_000_000

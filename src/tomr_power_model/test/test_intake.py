@@ -2,12 +2,16 @@
 
 import math
 from typing import Any
+from unittest.mock import call, patch
 
 import numpy as np
 import pytest
+from attrs import evolve
+from rclpy.serialization import serialize_message
 
-from tomr_power_model.messages.bag import bag_header, bag_message
-from tomr_power_model.messages.inputs import Complaints, model_inputs
+from tomr_power_model.drive.sources import TOTAL, PowerReading
+from tomr_power_model.messages.bag import bag_header, bag_message, jazzy_typestore, to_bag
+from tomr_power_model.messages.inputs import Complaints, measured_inputs, model_inputs
 from tomr_power_model.messages.intake import (
     Unusable,
     WheelFinder,
@@ -16,8 +20,18 @@ from tomr_power_model.messages.intake import (
     stamp_of,
     twist_of,
 )
+from tomr_power_model.messages.outgoing import (
+    TYPES,
+    DiagnosticMessage,
+    JointMessage,
+    Outgoing,
+    SupplyMessage,
+)
+from tomr_power_model.messages.plain import Level, Status, battery_state
 from tomr_power_model.messages.readings import SupplyReading
 from tomr_power_model.model.predictor import PowerPredictor
+from tomr_power_model.model.ticks import Arrival
+from tomr_power_model.nodes.stage_node import to_ros
 from tomr_power_model.robot import shipped_robot
 
 STAMP = 1_700_000_000_500_000_000
@@ -124,6 +138,37 @@ class TestInputsOfAStage:
         message.header = bag_header(0)
         assert "no stamp" in str(self._take("joint_states", message))
 
+    def test_stamps_of_power_reach_the_model(self) -> None:
+        robot = shipped_robot("reference")
+        predictor = PowerPredictor(robot)
+        inputs = model_inputs(robot, predictor, "geometry_msgs/msg/TwistStamped")
+        message = to_bag(battery_state(STAMP, 24.0, -1.0))
+        with patch.object(predictor, "measured", return_value=Arrival.REPEATED) as measured:
+            for topic in ("wheel_3/power", "battery_state"):
+                taken = next(item.take for item in inputs if item.topic == topic)(message, 0)
+                assert "repeats" in str(taken)
+        assert measured.call_args_list == [call(2, STAMP), call(TOTAL, STAMP)]
+
+    def test_efforts_are_power_where_a_wheel_is_missing_and_never_from_an_old_message(self) -> None:
+        reference = shipped_robot("reference")
+        measurement = evolve(
+            reference.measurement, source="joint_effort", quantity="motor_current", total="none"
+        )
+        readings: list[PowerReading] = []
+        arrivals = iter((Arrival.TAKEN, Arrival.REPEATED, Arrival.RESTARTED))
+        (joints,) = measured_inputs(
+            evolve(reference, measurement=measurement),
+            lambda *_: next(arrivals),
+            lambda reading: readings.append(reading) or Arrival.TAKEN,  # type: ignore[func-returns-value]
+        )
+        message = _joints([WHEELS[0], WHEELS[2]], position=[1, 2], effort=[0.5, 0.7])
+        assert "wheel_2_joint" in str(joints.take(message, STAMP))
+        assert [(reading.wheel, reading.current) for reading in readings] == [(0, 0.5), (2, 0.7)]
+        assert "repeats" in str(joints.take(message, STAMP))
+        assert len(readings) == 2
+        assert "started afresh" in str(joints.take(message, STAMP))
+        assert len(readings) == 4
+
 
 def test_complaints_thin_out() -> None:
     complaints = Complaints()
@@ -131,6 +176,40 @@ def test_complaints_thin_out() -> None:
     said = [number for number, line in enumerate(lines, start=1) if line]
     assert said == [1, 10, 100, 1000]
     assert lines[99] == "topic: odd (100 times)"
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        SupplyMessage("wheel_1/power/predicted", STAMP, SupplyReading(24.0, -0.5)),
+        JointMessage(
+            "predicted/joint_states", STAMP, WHEELS, (1.0, 2.0, 3.0), (0.1, 0.2, math.nan)
+        ),
+        DiagnosticMessage(
+            "residuals", STAMP, (Status("a", Level.ERROR, "b", (("key", "value"),), "c"),)
+        ),
+    ],
+    ids=lambda message: type(message).__name__,
+)
+def test_what_is_published_is_the_same_as_what_is_recorded(message: Outgoing) -> None:
+    store, name = jazzy_typestore(), TYPES[type(message)]
+    recorded = bytes(store.serialize_cdr(to_bag(message.plain), name))
+    data = serialize_message(to_ros(message.plain))
+    # Written anew, because ROS leaves anything in the gaps between fields and after the last.
+    published = store.deserialize_cdr(data[: len(recorded)], name)
+    assert bytes(store.serialize_cdr(published, name)) == recorded
+    assert stamp_of(to_bag(message.plain), 0) == STAMP
+
+
+def test_levels_and_unknowns_are_those_of_the_message_definitions() -> None:
+    statuses = tuple(Status(level.name, level, "") for level in Level)
+    message = to_bag(DiagnosticMessage("residuals", STAMP, statuses).plain)
+    assert [status.level for status in message.status] == [0, 1, 2, 3]
+    supply = to_bag(battery_state(STAMP, 24.0, -1.0, "wheel_1"))
+    unknown = (supply.temperature, supply.charge, supply.capacity, supply.design_capacity)
+    assert all(map(math.isnan, (*unknown, supply.percentage)))
+    assert (supply.voltage, supply.current, supply.location) == (24.0, -1.0, "wheel_1")
+    assert supply.present
 
 
 def test_readings_round_as_the_message_does() -> None:

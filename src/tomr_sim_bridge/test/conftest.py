@@ -10,8 +10,9 @@ import yaml
 from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.robot import Robot, robot_from_parameters
-from tomr_sim_bridge.plant.samples import NANOSECONDS, Sample
+from tomr_sim_bridge.plant.samples import Sample
 from tomr_sim_bridge.plant.simulation import Simulation
 
 REFERENCE = "reference.yaml"

@@ -28,7 +28,7 @@ def test_control_signal_lost_leaves_the_motor_without_current(
     assert np.abs(run.joints()[-1, 0]) < 1.0  # friction stops the wheel
     # wheel 1 stands, the others turn at 4 rad/s: -(4 + 4) * 0.05 / (3 * 0.2)
     assert run.twist()[-5:, 2].mean() == pytest.approx(-0.667, rel=0.03)
-    simulation.faults.clear("control_signal_lost")
+    simulation.set_fault("control_signal_lost")
     assert drive(simulation, 2.0, skip=1.5).joints()[:, 0].mean() == pytest.approx(-8.0, abs=0.05)
 
 

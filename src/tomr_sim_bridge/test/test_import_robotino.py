@@ -12,7 +12,8 @@ import pytest
 
 from tomr_power_model.cli import run_main
 from tomr_power_model.geometry.kinematics import twist_to_wheels
-from tomr_power_model.recordings import header_stamp_ns, open_recording
+from tomr_power_model.messages.intake import header_stamp_ns
+from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import shipped_robot
 from tomr_sim_bridge.cli.import_robotino import import_robotino
 from tomr_sim_bridge.importers.robotino import EPOCH_NS, body_twist, camera_pose
@@ -89,6 +90,7 @@ def test_a_drive_by_hand(dataset: Path, tmp_path: Path, storage: str) -> None:
     power = [bag[f"/wheel_{wheel}/power"][1] for wheel in (1, 2, 3)]
     assert [message.current for message in power] == pytest.approx([-1.5, -0.1, -0.75])
     assert all(math.isnan(message.voltage) and message.present for message in power)
+    assert {message.power_supply_status for message in power} == {2}  # discharging
     twist = bag["/cmd_vel"][1].twist
     assert (twist.linear.x, twist.linear.y, twist.angular.z) == (0.3, 0.0, 0.0)
     odometry = bag["/ground_truth/odom"][1]

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.recordings import Recording, require_topic
 from tomr_power_model.robot.parameters import ParameterSpec
 
-NANOSECONDS = 1_000_000_000
 GROUND_TRUTH = "ground_truth"
 # What the suite or ROS itself publishes while a recording is replayed; never played back unasked.
 _OUTPUTS = frozenset(

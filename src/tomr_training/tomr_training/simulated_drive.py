@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
-from tomr_power_model.messages.bag import bag_message
+from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.messages.inputs import model_inputs
+from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.messages.types import TWIST_STAMPED
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_sim_bridge.missions.drive import drive
 from tomr_sim_bridge.plant import moments
-from tomr_sim_bridge.plant.samples import NANOSECONDS, Sample, build
+from tomr_sim_bridge.plant.samples import Sample
 from tomr_sim_bridge.plant.simulation import Simulation
 from tomr_training.drives import Bump, Drive
 from tomr_training.labels import GroundTruth
@@ -116,7 +117,7 @@ def simulated_drive(chosen: Drive) -> LabelledDrive:
     for sample in _samples(chosen, simulation):
         if sample.topic not in takers:
             continue
-        message = build(sample.message, bag_message)
+        message = to_bag(sample.message)
         for take in takers[sample.topic]:
             take(message, sample.stamp_ns)
         for prediction in predictor.due():

@@ -4,7 +4,8 @@ from tomr_fault_diag.classifier.stage import Diagnosis
 from tomr_fault_diag.classifier.states import NORMAL, NOT_OBSERVABLE, STATES, UNKNOWN
 from tomr_fault_diag.residuals.frame import residual_names
 from tomr_fault_diag.residuals.messages import sentence
-from tomr_power_model.messages.outgoing import DiagnosticMessage, Status
+from tomr_power_model.messages.outgoing import DiagnosticMessage
+from tomr_power_model.messages.plain import Status
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.robot import Robot
 

@@ -2,7 +2,7 @@
 
 from attrs import frozen
 
-from tomr_power_model.messages.outgoing import Level
+from tomr_power_model.messages.plain import Level
 
 
 @frozen

@@ -15,8 +15,8 @@ from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import PARAMETERS, DiagnosisSettings, parse_assignments
 from tomr_fault_diag.diagnosis.summary import Summariser, Summary
 from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK, run_main
+from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.messages.outgoing import TYPES
-from tomr_power_model.messages.to_bag import to_bag
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.recordings import Recording, RecordingWriter, open_recording
 from tomr_power_model.robot import load_robot, read_node_sections, shipped_robots
@@ -94,7 +94,7 @@ def _run(recording: Recording, pipeline: Pipeline, arguments: argparse.Namespace
             if writer is not None:
                 for message in pipeline.messages(step):
                     writer.write(
-                        message.topic, TYPES[type(message)], to_bag(message), message.stamp_ns
+                        message.topic, TYPES[type(message)], to_bag(message.plain), message.stamp_ns
                     )
     return summariser.summary()
 

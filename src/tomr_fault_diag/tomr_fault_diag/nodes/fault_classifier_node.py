@@ -23,7 +23,6 @@ class FaultClassifierNode(StageNode):
 
     def __init__(self) -> None:
         super().__init__("fault_classifier", CLASSIFIER_PARAMETERS)
-        self._robot = self.robot_described()
         self._classifier = FaultClassifier(make_judge(ClassifierSettings.of(self.values)))
         self.offer(TOPIC, DiagnosticMessage)
         self.listen([Input(RESIDUALS, DIAGNOSTICS, guarded(self._take))], self._advance, STAGE_QOS)

@@ -35,7 +35,6 @@ class PowerResidualsNode(StageNode):
 
     def __init__(self) -> None:
         super().__init__("power_residuals", PARAMETERS)
-        self._robot = self.robot_described()
         self._stage = ResidualStage(self._robot, ResidualSettings.of(self.values))
         self._assembler = PredictionAssembler(self._robot)
         self.offer(TOPIC, DiagnosticMessage)

@@ -11,7 +11,8 @@ from tomr_fault_diag.residuals.frame import (
     residual_names,
 )
 from tomr_power_model.messages.intake import Unusable
-from tomr_power_model.messages.outgoing import DiagnosticMessage, Level, Status
+from tomr_power_model.messages.outgoing import DiagnosticMessage
+from tomr_power_model.messages.plain import Level, Status
 from tomr_power_model.robot import Robot
 
 TOPIC = "residuals"

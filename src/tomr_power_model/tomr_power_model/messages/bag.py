@@ -12,7 +12,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-NANOSECONDS = 1_000_000_000
+from tomr_power_model.messages.plain import Plain, build, header
 
 _NUMBERS = frozenset(f"{kind}{bits}" for kind in ("int", "uint") for bits in (8, 16, 32, 64))
 _NUMBERS |= {"float32", "float64", "bool"}
@@ -67,15 +67,14 @@ def bag_message(type_name: str, **fields: object) -> Any:
         ) from None
 
 
-def bag_stamp(stamp_ns: int) -> Any:
-    """Return a builtin_interfaces/msg/Time of `stamp_ns` [ns]."""
-    seconds, nanoseconds = divmod(int(stamp_ns), NANOSECONDS)
-    return bag_message("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
+def to_bag(plain: Plain) -> Any:
+    """Return a plain message in the form that a recording takes."""
+    return build(plain, bag_message)
 
 
 def bag_header(stamp_ns: int, frame_id: str = "") -> Any:
     """Return a std_msgs/msg/Header with a stamp of `stamp_ns` [ns]."""
-    return bag_message("std_msgs/msg/Header", stamp=bag_stamp(stamp_ns), frame_id=frame_id)
+    return to_bag(header(int(stamp_ns), frame_id))
 
 
 @cache

@@ -39,9 +39,7 @@ class Input:
     other_types: tuple[str, ...] = ()
 
 
-def guarded(
-    take: Callable[[Any, int], Arrival | str | None],
-) -> Callable[[Any, int], str | None]:
+def guarded(take: Take) -> Callable[[Any, int], str | None]:
     """Turn an unusable message or stamp into a complaint: no message may stop a stage."""
 
     def taken(message: Any, receive_ns: int) -> str | None:
@@ -51,12 +49,12 @@ def guarded(
             return f"{error}; the message is ignored"
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             return f"malformed ({error}); the message is ignored"
-        return complaint(arrival)
+        return _complaint(arrival)
 
     return taken
 
 
-def complaint(arrival: Arrival | str | None) -> str | None:
+def _complaint(arrival: Arrival | str | None) -> str | None:
     """What to say of a stamp, None if nothing."""
     if arrival is None or arrival is Arrival.TAKEN:
         return None
@@ -97,7 +95,7 @@ def measured_inputs(
     wheels: WheelFinder | None = None,
 ) -> tuple[Input, ...]:
     """Inputs of a stage that takes encoders and power; `wheels` may be shared with another one."""
-    take: Take = encoder_taker(robot, encoders, wheels)
+    take = _encoders(wheels or WheelFinder(robot.wheel_names), encoders)
     inputs = []
     for source in (*motor_topics(robot), *total_topics(robot)):
         if source.topic == ENCODER_TOPIC:
@@ -125,20 +123,15 @@ def _with_power(
 
     def take(message: Any, receive_ns: int) -> Arrival | str | None:
         arrival = encoders(message, receive_ns)
-        if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
+        if arrival not in (Arrival.UNSTAMPED, Arrival.REPEATED):
             also(message, receive_ns)
         return arrival
 
     return take
 
 
-def encoder_taker(
-    robot: Robot,
-    take: Callable[[int, Triple, Triple], Arrival],
-    shared: WheelFinder | None = None,
-) -> Callable[[Any, int], Arrival | str]:
+def _encoders(wheels: WheelFinder, take: Callable[[int, Triple, Triple], Arrival]) -> Take:
     """Reads the wheels out of joint_states for a stage's `encoders`; tells of missing wheels."""
-    wheels = shared or WheelFinder(robot.wheel_names)
 
     def encoders(message: Any, receive_ns: int) -> Arrival | str:
         found = wheels.read(message)

@@ -1,19 +1,16 @@
-"""Messages that the suite publishes, as plain records: one form for ROS, another for recordings."""
-
-from enum import IntEnum
+"""Messages that the suite publishes, as records."""
 
 from attrs import frozen
 
+from tomr_power_model.messages.plain import (
+    Plain,
+    Status,
+    battery_state,
+    diagnostics,
+    joint_state,
+)
 from tomr_power_model.messages.readings import SupplyReading
-
-
-class Level(IntEnum):
-    """Levels of diagnostic_msgs/DiagnosticStatus."""
-
-    OK = 0
-    WARN = 1
-    ERROR = 2
-    STALE = 3
+from tomr_power_model.messages.types import BATTERY, DIAGNOSTICS, JOINT_STATE
 
 
 @frozen
@@ -23,6 +20,10 @@ class SupplyMessage:
     topic: str
     stamp_ns: int
     reading: SupplyReading
+
+    @property
+    def plain(self) -> Plain:
+        return battery_state(self.stamp_ns, self.reading.voltage, self.reading.current)
 
 
 @frozen
@@ -35,16 +36,9 @@ class JointMessage:
     velocity: tuple[float, ...]  # rad/s
     effort: tuple[float, ...]  # N m
 
-
-@frozen
-class Status:
-    """A diagnostic_msgs/DiagnosticStatus."""
-
-    name: str
-    level: Level
-    message: str
-    values: tuple[tuple[str, str], ...] = ()
-    hardware_id: str = ""
+    @property
+    def plain(self) -> Plain:
+        return joint_state(self.stamp_ns, self.names, velocity=self.velocity, effort=self.effort)
 
 
 @frozen
@@ -55,11 +49,15 @@ class DiagnosticMessage:
     stamp_ns: int
     statuses: tuple[Status, ...]
 
+    @property
+    def plain(self) -> Plain:
+        return diagnostics(self.stamp_ns, self.statuses)
+
 
 Outgoing = SupplyMessage | JointMessage | DiagnosticMessage
 
 TYPES: dict[type[Outgoing], str] = {
-    SupplyMessage: "sensor_msgs/msg/BatteryState",
-    JointMessage: "sensor_msgs/msg/JointState",
-    DiagnosticMessage: "diagnostic_msgs/msg/DiagnosticArray",
+    SupplyMessage: BATTERY,
+    JointMessage: JOINT_STATE,
+    DiagnosticMessage: DIAGNOSTICS,
 }

@@ -20,7 +20,6 @@ class PowerModelNode(StageNode):
 
     def __init__(self) -> None:
         super().__init__("power_model", PARAMETERS)
-        self._robot = self.robot_described()
         self._predictor = PowerPredictor(self._robot, ModelSettings.of(self.values))
         for topic in prediction_topics(self._robot):
             self.offer(topic, JointMessage if topic == EXPECTED else SupplyMessage)

@@ -3,6 +3,7 @@
 import signal
 import sys
 from collections.abc import Callable, Iterable
+from functools import cache
 from importlib import import_module
 from typing import Any
 
@@ -18,9 +19,9 @@ from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_OK
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.inputs import Complaints, Input
 from tomr_power_model.messages.outgoing import TYPES, Outgoing
+from tomr_power_model.messages.plain import Plain, build
 from tomr_power_model.messages.types import TWIST, TWIST_STAMPED
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
-from tomr_power_model.nodes.to_ros import to_ros
 from tomr_power_model.robot.parameters import ParameterSpec, Value
 
 # Sensors are best effort: a late sample is worth less than the next one. The depth bridges the
@@ -40,10 +41,16 @@ CMD_VEL_TYPE = ParameterSpec(
 TWIST_TYPES = {"twist_stamped": TWIST_STAMPED, "twist": TWIST}
 
 
+@cache
 def message_class(type_name: str) -> Any:
     """The Python class of a message type such as sensor_msgs/msg/JointState."""
     package, _, name = type_name.split("/")
     return getattr(import_module(f"{package}.msg"), name)
+
+
+def to_ros(plain: Plain) -> Any:
+    """A plain message in the form that rclpy takes."""
+    return build(plain, lambda type_name, **fields: message_class(type_name)(**fields))
 
 
 class StageNode(Node):
@@ -52,12 +59,9 @@ class StageNode(Node):
     def __init__(self, name: str, specs: Iterable[ParameterSpec]) -> None:
         super().__init__(name, automatically_declare_parameters_from_overrides=True)
         self.values: dict[str, Value] = declare_specs(self, specs)
+        self._robot = declare_robot(self)
         self._complaints = Complaints()
         self._outlets: dict[str, Any] = {}
-
-    def robot_described(self) -> Any:
-        """The robot of this node's parameters."""
-        return declare_robot(self)
 
     def listen(
         self, inputs: Iterable[Input], advance: Callable[[], None], qos: QoSProfile = SENSOR_QOS
@@ -90,18 +94,18 @@ class StageNode(Node):
         if line is not None:
             self.get_logger().warning(line)
 
-    def offer(self, topic: str, kind: type[Outgoing], qos: QoSProfile = STAGE_QOS) -> None:
+    def offer(self, topic: str, kind: type[Outgoing]) -> None:
         """Prepare a topic to publish on."""
         self._outlets[topic] = self.create_publisher(
             message_class(TYPES[kind]),
             topic,
-            qos,
+            STAGE_QOS,
             event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
         )
 
     def send(self, message: Outgoing) -> None:
         """Publish a record on its topic."""
-        self._outlets[message.topic].publish(to_ros(message))
+        self._outlets[message.topic].publish(to_ros(message.plain))
 
 
 class StopRequest:

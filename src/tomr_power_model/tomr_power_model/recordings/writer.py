@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import TracebackType
 from typing import Literal, Self
 
 from rosbags.interfaces import Connection
@@ -72,12 +71,7 @@ class RecordingWriter:
             ) from error
         return self
 
-    def __exit__(
-        self,
-        error_type: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, error_type: type[BaseException] | None, *_: object) -> None:
         if error_type is not None:
             self._writer.set_custom_data("incomplete", error_type.__name__)
         self._writer.close()

@@ -9,7 +9,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.bag import bag_message
+from tomr_power_model.messages.bag import to_bag
+from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.recordings import RecordingWriter
 from tomr_power_model.robot import Robot, load_robot, shipped_robots
 from tomr_sim_bridge.missions import (
@@ -20,7 +21,6 @@ from tomr_sim_bridge.missions import (
     start_mission,
 )
 from tomr_sim_bridge.plant.picture import save_picture
-from tomr_sim_bridge.plant.samples import NANOSECONDS, build
 
 START_NS = 1_700_000_000 * NANOSECONDS  # a fixed date, so that equal runs give equal recordings
 
@@ -101,7 +101,7 @@ def _record(
         task = bar.add_task(mission.name, total=duration)
         for samples in drive(mission, simulation, seed):
             for sample in samples:
-                message = build(sample.message, bag_message)
+                message = to_bag(sample.message)
                 writer.write(sample.topic, sample.message.type_name, message, sample.stamp_ns)
             count += len(samples)
             bar.update(task, completed=(simulation.stamp_ns - START_NS) / NANOSECONDS)

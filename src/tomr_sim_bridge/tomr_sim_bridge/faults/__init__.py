@@ -2,19 +2,15 @@
 
 from tomr_sim_bridge.faults import control_signal_lost, encoder_lost, floor_slippery
 from tomr_sim_bridge.faults.base import (
-    Fault,
     FaultActions,
     all_parameters,
     check_settings,
     fault_ids,
-    fault_kind,
-    register,
     split_name,
 )
 from tomr_sim_bridge.faults.board import FaultBoard, FaultState
 
 __all__ = [
-    "Fault",
     "FaultActions",
     "FaultBoard",
     "FaultState",
@@ -23,8 +19,6 @@ __all__ = [
     "control_signal_lost",
     "encoder_lost",
     "fault_ids",
-    "fault_kind",
     "floor_slippery",
-    "register",
     "split_name",
 ]

@@ -32,17 +32,13 @@ class FaultBoard:
         self._faults = {name: self._make(name, {}) for name in fault_ids()}
         self._bearing = dict.fromkeys(self._faults, False)
 
-    def set(self, fault_id: str, values: Mapping[str, object], place: str = "fault") -> None:
+    def set(self, fault_id: str, values: Mapping[str, object]) -> None:
         """Set a fault; settings not named return to their defaults.
 
         Raises InputError for an unknown fault or setting, or a value out of range.
         """
-        self._faults[fault_id] = self._make(fault_id, values, place)
+        self._faults[fault_id] = self._make(fault_id, values)
         self._bearing[fault_id] = False
-
-    def clear(self, fault_id: str) -> None:
-        """Switch a fault off."""
-        self.set(fault_id, {})
 
     def actions(self, contact: Vector, friction: Vector) -> FaultActions | None:
         """What the faults do to the plant now, None while all are off.
@@ -74,5 +70,5 @@ class FaultBoard:
         ]
 
     @staticmethod
-    def _make(fault_id: str, values: Mapping[str, object], place: str = "fault") -> Fault:
-        return fault_kind(fault_id, place)(check_settings(fault_id, values, place))
+    def _make(fault_id: str, values: Mapping[str, object]) -> Fault:
+        return fault_kind(fault_id, "fault")(check_settings(fault_id, values, "fault"))

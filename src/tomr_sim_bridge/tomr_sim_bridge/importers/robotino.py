@@ -23,15 +23,18 @@ What its columns mean, checked on 432 floor drives and three bench runs:
 """
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.messages.bag import bag_header, bag_message
+from tomr_power_model.messages.bag import to_bag
+from tomr_power_model.messages.plain import Plain, battery_state, joint_state
 from tomr_power_model.recordings import RecordingWriter
 from tomr_sim_bridge.importers.tables import Table, read_table
+from tomr_sim_bridge.plant.samples import command_sample, odometry
 
 Array = NDArray[np.float64]
 
@@ -64,11 +67,6 @@ UNITS = {
     **dict.fromkeys(CURRENT, "A"),
     **FLOOR_UNITS,
 }
-
-BATTERY_STATE = "sensor_msgs/msg/BatteryState"
-JOINT_STATE = "sensor_msgs/msg/JointState"
-ODOMETRY = "nav_msgs/msg/Odometry"
-TWIST_STAMPED = "geometry_msgs/msg/TwistStamped"
 
 
 @frozen
@@ -154,16 +152,31 @@ def write_run(run: Run, path: Path, storage: str) -> None:
     """
     with RecordingWriter(path, storage) as writer:
         for index, stamp_ns in enumerate(run.stamps_ns):
-            if run.drive is None:
-                command = _joint_state(stamp_ns, None, run.wheel_command[index])
-                writer.write("wheel_command", JOINT_STATE, command, stamp_ns)
-            else:
-                _write_drive(writer, run.drive, index, stamp_ns)
-            position = None if run.position is None else run.position[index]
-            state = _joint_state(stamp_ns, position, run.velocity[index])
-            writer.write("joint_states", JOINT_STATE, state, stamp_ns)
-            for topic, current in zip(POWER_TOPICS, run.current[index], strict=True):
-                writer.write(topic, BATTERY_STATE, _power(stamp_ns, float(current)), stamp_ns)
+            for topic, message in _messages(run, index, stamp_ns):
+                writer.write(topic, message.type_name, to_bag(message), stamp_ns)
+
+
+def _messages(run: Run, index: int, stamp_ns: int) -> Iterator[tuple[str, Plain]]:
+    """Topics and messages of one sample."""
+    if run.drive is None:
+        command = run.wheel_command[index].tolist()
+        yield "wheel_command", joint_state(stamp_ns, JOINTS, velocity=command)
+    else:
+        yield "cmd_vel", command_sample(stamp_ns, *run.drive.command[index].tolist()).message
+        x, y, yaw = run.drive.pose[index].tolist()
+        seen = run.drive.twist[index].tolist()
+        yield "ground_truth/odom", odometry(stamp_ns, "map", (x, y, yaw), seen)
+    position = () if run.position is None else run.position[index].tolist()
+    velocity = run.velocity[index].tolist()
+    yield "joint_states", joint_state(stamp_ns, JOINTS, position=position, velocity=velocity)
+    for topic, current in zip(POWER_TOPICS, run.current[index].tolist(), strict=True):
+        yield topic, _power(stamp_ns, current)
+
+
+def _power(stamp_ns: int, current: float) -> Plain:
+    message = battery_state(stamp_ns, math.nan, -current)
+    discharging = 2  # POWER_SUPPLY_STATUS_DISCHARGING
+    return Plain(message.type_name, {**message.fields, "power_supply_status": discharging})
 
 
 def _drive(table: Table) -> Drive:
@@ -175,50 +188,3 @@ def _drive(table: Table) -> Drive:
 
 def _at_wheel(motor_speeds: Array) -> Array:
     return motor_speeds * (-1.0 / GEAR_RATIO)
-
-
-def _write_drive(writer: RecordingWriter, drive: Drive, index: int, stamp_ns: int) -> None:
-    command = bag_message(
-        TWIST_STAMPED,
-        header=bag_header(stamp_ns, "base_link"),
-        twist=_twist(drive.command[index]),
-    )
-    writer.write("cmd_vel", TWIST_STAMPED, command, stamp_ns)
-    x, y, yaw = (float(value) for value in drive.pose[index])
-    odometry = bag_message(ODOMETRY, header=bag_header(stamp_ns, "map"), child_frame_id="base_link")
-    odometry.pose.pose.position.x = x
-    odometry.pose.pose.position.y = y
-    odometry.pose.pose.orientation.z = math.sin(yaw / 2.0)
-    odometry.pose.pose.orientation.w = math.cos(yaw / 2.0)
-    odometry.twist.twist = _twist(drive.twist[index])
-    writer.write("ground_truth/odom", ODOMETRY, odometry, stamp_ns)
-
-
-def _twist(values: Array) -> object:
-    twist = bag_message("geometry_msgs/msg/Twist")
-    twist.linear.x, twist.linear.y, twist.angular.z = (float(value) for value in values)
-    return twist
-
-
-def _joint_state(stamp_ns: int, position: Array | None, velocity: Array) -> object:
-    return bag_message(
-        JOINT_STATE,
-        header=bag_header(stamp_ns),
-        name=JOINTS,
-        position=() if position is None else position,
-        velocity=velocity,
-    )
-
-
-def _power(stamp_ns: int, current: float) -> object:
-    unmeasured = dict.fromkeys(
-        ("voltage", "temperature", "charge", "capacity", "design_capacity", "percentage"), math.nan
-    )
-    return bag_message(
-        BATTERY_STATE,
-        header=bag_header(stamp_ns),
-        current=-current,
-        power_supply_status=2,  # POWER_SUPPLY_STATUS_DISCHARGING
-        present=True,
-        **unmeasured,
-    )

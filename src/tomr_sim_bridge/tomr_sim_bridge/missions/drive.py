@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator
 
+from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.robot import Robot
 from tomr_sim_bridge.missions.mission import Mission
-from tomr_sim_bridge.plant.samples import NANOSECONDS, Sample, command_sample
+from tomr_sim_bridge.plant.samples import Sample, command_sample
 from tomr_sim_bridge.plant.simulation import Simulation
 
 

@@ -20,12 +20,12 @@ from rosgraph_msgs.msg import Clock
 
 from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.errors import InputError
+from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.nodes.command_line import node_arguments
 from tomr_power_model.nodes.robot_parameters import declare_specs
 from tomr_power_model.nodes.stage_node import StopRequest, message_class
 from tomr_power_model.recordings import Recording, open_recording
 from tomr_sim_bridge.replay import (
-    NANOSECONDS,
     REPLAY_PARAMETERS,
     PlaybackClock,
     first_stamp_ns,

@@ -1,6 +1,5 @@
 """Node `sim_bridge`: the simulated robot on the topics of a real one, with /clock."""
 
-import math
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -13,6 +12,9 @@ from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from tomr_power_model.cli import run_main
+from tomr_power_model.messages import plain
+from tomr_power_model.messages.intake import Unusable, stamp_of, twist_of
+from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.nodes.command_line import node_arguments
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
 from tomr_power_model.nodes.stage_node import (
@@ -22,11 +24,11 @@ from tomr_power_model.nodes.stage_node import (
     TWIST_TYPES,
     message_class,
     run_node,
+    to_ros,
 )
-from tomr_power_model.recordings import header_stamp_ns
 from tomr_power_model.robot.parameters import ParameterSpec, Value
 from tomr_sim_bridge.faults import all_parameters, split_name
-from tomr_sim_bridge.plant.samples import NANOSECONDS, Plain, Sample, build
+from tomr_sim_bridge.plant.samples import Sample
 from tomr_sim_bridge.plant.simulation import Simulation
 
 DESCRIPTION = """\
@@ -88,11 +90,6 @@ PARAMETERS = (
 FAULT_PARAMETERS = {name: attrs.evolve(spec, name=name) for name, spec in all_parameters().items()}
 
 
-def ros_message(type_name: str, **fields: Any) -> Any:
-    """Make a ROS message of a type such as sensor_msgs/msg/JointState."""
-    return message_class(type_name)(**fields)
-
-
 class SimBridge(Node):
     """Runs the plant in real time, or at a multiple of it, and publishes what it measures."""
 
@@ -137,7 +134,7 @@ class SimBridge(Node):
                 self._publish(sample)
             if reached == target or time.monotonic_ns() - now > LONGEST_RUN_NS:
                 break
-        self._clock_outlet.publish(ClockMessage(clock=_time(simulation.stamp_ns)))
+        self._clock_outlet.publish(ClockMessage(clock=to_ros(plain.time(simulation.stamp_ns))))
 
     def _reachable(self, now: int) -> int:
         """Where the plant is to be, but no long way on: it would pass commands still under way."""
@@ -166,20 +163,20 @@ class SimBridge(Node):
                 STAGE_QOS if truth else SENSOR_QOS,
             )
             self._topics[sample.topic] = outlet
-        outlet.publish(build(sample.message, ros_message))
+        outlet.publish(to_ros(sample.message))
 
     def _command(self, message: Any) -> None:
-        twist = getattr(message, "twist", message)
-        wanted = (float(twist.linear.x), float(twist.linear.y), float(twist.angular.z))
-        if not all(math.isfinite(value) for value in wanted):
+        try:
+            wanted = twist_of(message)
+        except Unusable as error:
             self.get_logger().warning(
-                f"cmd_vel: {wanted} is not finite: ignored, the last command is kept",
+                f"cmd_vel: {error}: ignored, the last command is kept",
                 throttle_duration_sec=WARN_PERIOD,
             )
             return
         # In force from its stamp on, plus controller.delay, however long it was on its way.
         now = self._simulation.stamp_ns
-        stamp = header_stamp_ns(message) or now
+        stamp = stamp_of(message, now, fallback=True)
         is_foreign = abs(stamp - now) > FOREIGN_NS
         self._simulation.command(*wanted, stamp_ns=now if is_foreign else stamp)
 
@@ -207,13 +204,6 @@ def _number(values: dict[str, Value], name: str) -> float:
     if isinstance(value, str | tuple):
         raise TypeError(f"{name} is no number")
     return float(value)
-
-
-def _time(stamp_ns: int) -> Any:
-    seconds, rest = divmod(stamp_ns, NANOSECONDS)
-    return build(
-        Plain("builtin_interfaces/msg/Time", {"sec": seconds, "nanosec": rest}), ros_message
-    )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

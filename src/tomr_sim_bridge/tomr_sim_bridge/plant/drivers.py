@@ -11,10 +11,9 @@ from collections import deque
 
 import numpy as np
 
+from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_sim_bridge.plant.wheels import Vector, rolling_rows
-
-NANOSECONDS = 1_000_000_000
 
 
 class WheelDrivers:

@@ -10,11 +10,12 @@ from collections.abc import Callable
 import numpy as np
 from attrs import frozen
 
+from tomr_power_model.messages.plain import NANOSECONDS, battery_state
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_sim_bridge.plant import moments, samples
 from tomr_sim_bridge.plant.design import PlantDesign
 from tomr_sim_bridge.plant.moments import Memory
-from tomr_sim_bridge.plant.samples import NANOSECONDS, Sample
+from tomr_sim_bridge.plant.samples import Sample
 from tomr_sim_bridge.plant.wheels import Vector
 
 WINDOW_NS = 5_000_000  # average over this time before the stamp
@@ -55,7 +56,7 @@ class PowerMonitor:
             total = self._digitise(
                 float(change[moments.VOLTAGE]), float(change[moments.TOTAL_CURRENT]), _TOTAL_NOISE
             )
-            message = samples.battery_state(stamp, "battery", total.voltage, -total.drawn)
+            message = battery_state(stamp, total.voltage, -total.drawn, "battery")
             found.append(Sample("battery_state", stamp, message))
         return found
 
@@ -95,7 +96,7 @@ class PowerMonitor:
             Sample(
                 f"{topic}/power",
                 stamp,
-                samples.battery_state(stamp, topic, reading.voltage, -reading.drawn),
+                battery_state(stamp, reading.voltage, -reading.drawn, topic),
             )
             for topic, reading in zip(self._robot.wheel_topics, readings, strict=True)
         ]

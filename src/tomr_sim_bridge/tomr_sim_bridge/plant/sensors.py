@@ -5,13 +5,20 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from tomr_power_model.messages.plain import (
+    NANOSECONDS,
+    Level,
+    Status,
+    diagnostics,
+    joint_state,
+)
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_sim_bridge.faults import FaultState
 from tomr_sim_bridge.plant import moments, samples
 from tomr_sim_bridge.plant.design import PlantDesign
 from tomr_sim_bridge.plant.moments import Memory
 from tomr_sim_bridge.plant.power_monitor import PowerMonitor
-from tomr_sim_bridge.plant.samples import NANOSECONDS, Sample
+from tomr_sim_bridge.plant.samples import Sample
 from tomr_sim_bridge.plant.wheels import Vector, rolling_rows
 
 FAULT_RATE = 20.0  # Hz of ground_truth/faults
@@ -106,8 +113,12 @@ class Sensors:
         speed = (angle - angle_before) / elapsed if elapsed > 0 else np.zeros(WHEELS)
         speed = quantise(speed, self._robot.sensors.velocity_resolution)
         self._last_encoder = (stamp, angle)
-        message = samples.joint_state(
-            stamp, self._robot.wheel_names, angle.tolist(), speed.tolist(), self._power.efforts
+        message = joint_state(
+            stamp,
+            self._robot.wheel_names,
+            position=angle.tolist(),
+            velocity=speed.tolist(),
+            effort=self._power.efforts,
         )
         return [Sample("joint_states", stamp, message)]
 
@@ -159,8 +170,9 @@ class Sensors:
             if fault.wheel is not None:
                 values["wheel"] = fault.wheel + 1.0
             message = "in force" if fault.active else "not in force"
-            statuses.append((fault.fault_id, message, {**values, **slipping}))
-        return Sample("ground_truth/faults", stamp, samples.diagnostics(stamp, statuses))
+            texts = tuple((key, f"{value:.6g}") for key, value in (values | slipping).items())
+            statuses.append(Status(fault.fault_id, Level.OK, message, texts, "simulator"))
+        return Sample("ground_truth/faults", stamp, diagnostics(stamp, statuses))
 
 
 def _into_body(vector: Vector, yaw: float) -> Vector:

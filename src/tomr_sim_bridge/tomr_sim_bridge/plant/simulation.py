@@ -6,11 +6,12 @@ from collections.abc import Sequence
 import numpy as np
 from attrs import define, frozen
 
+from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_sim_bridge.faults import FaultActions, FaultBoard
 from tomr_sim_bridge.plant import moments
 from tomr_sim_bridge.plant.design import PlantDesign
-from tomr_sim_bridge.plant.drivers import NANOSECONDS, WheelDrivers
+from tomr_sim_bridge.plant.drivers import WheelDrivers
 from tomr_sim_bridge.plant.effects import DriverPower, PlantEffect, WheelLoads, make_effects
 from tomr_sim_bridge.plant.engine import OPEN_CIRCUIT, Engine
 from tomr_sim_bridge.plant.moments import Memory, Moment
