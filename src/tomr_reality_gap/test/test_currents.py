@@ -172,6 +172,8 @@ def test_a_concealed_friction_and_a_late_command_are_named(tmp_path: Path, robot
     assert found.score is not None
     assert found.score.quantity == "motor current [A]"
     assert found.score.nrmse_after < 0.5 * found.score.nrmse_before
+    fitted, held = found.comparisons
+    assert held.sigma == fitted.sigma  # the sensors', not what is left of each drive
 
 
 def test_the_rollers_of_the_real_robot_drag_on_its_floor(tmp_path: Path) -> None:

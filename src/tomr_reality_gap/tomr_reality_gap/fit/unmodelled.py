@@ -15,6 +15,7 @@ from tomr_reality_gap.explanation import Shape
 from tomr_reality_gap.fit.basis_responses import BasisResponses
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.jacobian import Jacobian
+from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 from tomr_reality_gap.mismatch.probes import Family, Motion
 
@@ -142,35 +143,42 @@ def _shape(family: Family, wheel: str, weights: Array, covariance: Array) -> Sha
     return Shape(family.variable, wheel, at, curve, curve - half, curve + half)
 
 
-def still_needed(
+def gains(
     rest: Remainder,
     jacobian: Jacobian,
-    unmodelled: Unmodelled,
     changes: Sequence[Array],
-) -> list[bool]:
-    """Whether each named finding is needed once the unmodelled effect's torques are there.
+    unmodelled: Unmodelled | None = None,
+) -> list[float]:
+    """Log evidence that each named finding brings, all else fitted anew without it.
 
     Args:
         rest: what the model with all findings leaves.
         jacobian: derivatives at it.
-        unmodelled: the effect without a name.
         changes: what each of its findings adds to the values, (n,).
+        unmodelled: an effect without a name whose torques are there as well.
     """
-    both = np.concatenate([rest.base, unmodelled.columns], axis=1)
+    both = rest.base
+    if unmodelled is not None:
+        both = np.concatenate([both, unmodelled.columns], axis=1)
     everything = list(range(both.shape[1]))
     gram = Gram.of(both, rest.residual)
-    whole = _likelihood(gram, everything)
-    least = max(_NEEDED, SIMULATOR.beside_unmodelled * unmodelled.evidence)
-    needed, robot = [], rest.dataset.simulations[0].robot
-    for part, change, hypothesis in zip(
-        jacobian.own, changes, jacobian.model.hypotheses, strict=True
-    ):
+    whole, found = _likelihood(gram, everything), []
+    for part, change in zip(jacobian.own, changes, strict=True):
         others = [row for row in everything if not part.start <= row < part.stop]
         lacking = rest.residual + change * rest.weight
         other = Gram(gram.matrix, both.T @ lacking, float(lacking @ lacking))
-        gain = whole - _likelihood(other, others)
-        needed.append(gain > least and not _contradicts(unmodelled, hypothesis, robot))
-    return needed
+        found.append(whole - _likelihood(other, others))
+    return found
+
+
+def still_needed(model: Model, gained: Sequence[float], unmodelled: Unmodelled) -> list[bool]:
+    """Whether each finding of a model is needed, from what it brings beside the unmodelled one."""
+    least = max(_NEEDED, SIMULATOR.beside_unmodelled * unmodelled.evidence)
+    robot = model.described.robot
+    return [
+        gain > least and not _contradicts(unmodelled, hypothesis, robot)
+        for gain, hypothesis in zip(gained, model.hypotheses, strict=True)
+    ]
 
 
 def _contradicts(unmodelled: Unmodelled, hypothesis: Hypothesis, robot: Robot) -> bool:

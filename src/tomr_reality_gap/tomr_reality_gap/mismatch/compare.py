@@ -1,6 +1,7 @@
 """Measured against simulated, before and after, and what that amounts to."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,13 +36,26 @@ def simulated(
 
 
 def comparison(
-    simulation: RecordingSimulation, values: Array, run: Run, is_held_out: bool
+    simulation: RecordingSimulation,
+    values: Array,
+    run: Run,
+    *,
+    is_held_out: bool,
+    noise: Mapping[str, float] = MappingProxyType({}),
 ) -> Comparison:
-    """One recording, simulated before and after, (2, n); `run` is of `simulation.run` after."""
+    """One recording, simulated before and after, (2, n).
+
+    Args:
+        simulation: of the recording.
+        values: of all its channels, before and after.
+        run: of `simulation.run` after.
+        is_held_out: whether nothing was fitted to it.
+        noise: standard deviation by channel; of others it is taken from what is left after.
+    """
     rows = rows_of(simulation.channels)
-    residual = np.concatenate([channel.value for channel in simulation.channels]) - values[1]
     sigma = tuple(
-        np.full(part.stop - part.start, robust_scale(residual[part]) + 1e-9) for part in rows
+        noise.get(channel.name, robust_scale(channel.value - values[1, part]) + 1e-9)
+        for channel, part in zip(simulation.channels, rows, strict=True)
     )
     return Comparison(
         name=simulation.recorded.name,

@@ -7,6 +7,7 @@ from importlib.resources import files
 import numpy as np
 from attrs import frozen
 from jinja2 import Environment, StrictUndefined
+from numpy.typing import NDArray
 
 from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.explanation import Comparison, Explanation, Finding
@@ -25,6 +26,7 @@ _MOST_DRIVES = 4  # with a picture each
 _MOST_MAPS = 6
 
 Tick = Callable[[], None]
+Array = NDArray[np.float64]
 
 
 @frozen
@@ -87,13 +89,10 @@ def _spread(channel: Channel) -> float:
     return math.nan if channel.kind == "voltage" else float(np.std(channel.value))
 
 
-def _pair(
-    value: figures.Array, one: Comparison, number: int, scale: float | figures.Array
-) -> tuple[float, float]:
-    """RMS of (measured - simulated) / scale, before and after; NaN where the scale is 0."""
-    scale = np.where(np.asarray(scale) > 0.0, scale, np.nan)
+def _pair(value: Array, one: Comparison, number: int, scale: float) -> tuple[float, float]:
+    """RMS of measured - simulated over a scale, before and after; NaN where the scale is 0."""
     before, after = (
-        float(np.sqrt(np.mean(((value - simulated[number]) / scale) ** 2)))
+        float(np.sqrt(np.mean((value - simulated[number]) ** 2))) / (scale or math.nan)
         for simulated in (one.before, one.after)
     )
     return before, after
