@@ -51,6 +51,12 @@ def _recorded(robot: Robot) -> Drive:
     )
 
 
+def as_recorded(made: RecordingSimulation, value: np.ndarray) -> RecordingSimulation:
+    """The same recording with other values measured."""
+    parts = zip(made.channels, rows_of(made.channels), strict=True)
+    return evolve(made, channels=tuple(evolve(item, value=value[part]) for item, part in parts))
+
+
 @pytest.fixture
 def simulation() -> RecordingSimulation:
     robot = shipped_robot("reference")
@@ -124,9 +130,7 @@ def test_the_drivers_sum_is_found_whatever_is_described(
     robot = simulation.robot
     real = evolve(robot, controller=evolve(robot.controller, integrator=way))
     value = evolve(simulation, robot=real).predict([real])[0]
-    parts = zip(simulation.channels, rows_of(simulation.channels), strict=True)
-    channels = tuple(evolve(channel, value=value[part]) for channel, part in parts)
-    assert integrator_of(evolve(simulation, channels=channels)) == way
+    assert integrator_of(as_recorded(simulation, value)) == way
 
 
 def test_a_process_among_others_simulates_on_one_core(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,6 +20,8 @@ from tomr_sim_bridge.importers.dataset import choose, default_dataset, import_fi
 from tomr_sim_bridge.importers.robotino import Drive as RobotinoDrive
 from tomr_sim_bridge.importers.robotino import Run, write_run
 
+from .test_alignment import as_recorded
+
 QUANTUM = 1.0 / 39.0  # A
 START_NS = 1_672_531_200_000_000_000
 
@@ -109,10 +111,7 @@ def test_delay_and_loop_are_seen_in_wheel_speeds(robotino: Robot, integral: floa
     controller = evolve(robotino.controller, delay=0.1, integral=integral)
     value = simulation.predict([evolve(robotino, controller=controller)])[0]
     value = value + 0.05 * np.random.default_rng(1).standard_normal(len(value))
-    channels = tuple(
-        evolve(channel, value=value[part])
-        for channel, part in zip(simulation.channels, rows_of(simulation.channels), strict=True)
-    )
+    channels = as_recorded(simulation, value).channels
     right = RecordingSimulation.of(
         simulation.recorded, evolve(robotino, controller=controller), channels
     )

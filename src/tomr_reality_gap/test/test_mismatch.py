@@ -19,7 +19,7 @@ from tomr_reality_gap.mismatch.orders import ripple_orders
 from tomr_reality_gap.mismatch.probes import motion_of
 
 from .test_alignment import _recorded as recorded_drive
-from .test_alignment import simulation  # noqa: F401 -- the fixture
+from .test_alignment import as_recorded, simulation  # noqa: F401 -- the fixture
 from .test_forward_selection import searched
 
 POWER_TIME = np.arange(0.02, 60.0, 0.02)
@@ -77,7 +77,7 @@ def test_what_has_no_name_is_found_with_its_wheel_and_variable(
     assert first.family.variable == "wheel speed [rad/s]"
     assert first.wheels == (2,)
     assert first.evidence > max(20.0, others[0].evidence + 100.0)
-    peak = first.shapes[0].at[np.argmax(first.shapes[0].value)]
+    peak = first.shape.at[np.argmax(first.shape.value)]
     assert peak == pytest.approx(4.0, abs=1.0)
 
 
@@ -88,12 +88,8 @@ def test_what_the_users_simulation_resists_more_is_taken_off(
     robot = simulation.robot
     creeps = ({"coefficient": 0.01},) * 3
     theirs = evolve(robot, physics={**robot.physics, "contact.rolling_resistance": creeps})
-    value = simulation.predict([robot, theirs])
-    channels = tuple(
-        evolve(channel, value=value[1, part])
-        for channel, part in zip(simulation.channels, rows_of(simulation.channels), strict=True)
-    )
-    more = discrepancy_torques([evolve(simulation, channels=channels)], robot, 0.3)
+    recorded = as_recorded(simulation, simulation.predict([theirs])[0])
+    more = discrepancy_torques([recorded], robot, 0.3)
     assert more is not None
     turned = evolve(
         simulation,
@@ -105,7 +101,7 @@ def test_what_the_users_simulation_resists_more_is_taken_off(
     powers = np.concatenate(
         [
             np.arange(p.start, p.stop)
-            for c, p in zip(channels, rows_of(channels), strict=True)
+            for c, p in zip(turned.channels, rows_of(turned.channels), strict=True)
             if c.kind == "power"
         ]
     )
@@ -118,20 +114,9 @@ def test_a_simulation_like_ours_is_left_alone(
 ) -> None:
     random = np.random.default_rng(2)
     value = simulation.predict([simulation.robot])[0]
-    channels = tuple(
-        evolve(c, value=value[part] + 0.05 * random.standard_normal(len(c.time)))
-        for c, part in zip(simulation.channels, rows_of(simulation.channels), strict=True)
-    )
-    theirs = [evolve(simulation, channels=channels)]
+    value += 0.05 * random.standard_normal(len(value))
+    theirs = [as_recorded(simulation, value)]
     assert discrepancy_torques(theirs, simulation.robot, 0.3) is None
-
-
-def _as_recorded(made: RecordingSimulation, value: np.ndarray) -> RecordingSimulation:
-    channels = tuple(
-        evolve(channel, value=value[part])
-        for channel, part in zip(made.channels, rows_of(made.channels), strict=True)
-    )
-    return evolve(made, channels=channels)
 
 
 def test_what_the_users_simulation_shows_of_a_finding_is_taken_off(
@@ -146,7 +131,7 @@ def test_what_the_users_simulation_shows_of_a_finding_is_taken_off(
 
     dataset, found = searched(simulation, resisting(0.02), ("friction.asymmetric",))
     for shown, left in ((0.005, 1), (0.02, 0)):
-        simulation = _as_recorded(simulation, resisting(shown))
+        simulation = as_recorded(simulation, resisting(shown))
         baseline = SimulatorBaseline.of([simulation], dataset, found.noise, robot)
         kept, theirs = beyond_baseline(dataset, found, baseline)
         assert len(kept.best.model.hypotheses) == left

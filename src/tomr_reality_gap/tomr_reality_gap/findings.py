@@ -62,7 +62,7 @@ class Findings:
             rivals=(),
             confidence=0.9,
             evidence=effect.evidence,
-            shape=effect.shapes[0],
+            shape=effect.shape,
         )
 
     def _energy(self, value: Array) -> float:

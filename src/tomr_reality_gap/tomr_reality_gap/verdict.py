@@ -182,7 +182,7 @@ def _sentence(findings: Sequence[Finding]) -> str:
     for item in findings:
         where = ", ".join(item.where).replace("_", " ")
         if item.effect == "unknown":
-            variable = item.shape.variable if item.shape else "?"
+            variable = item.shape.variable.partition(" [")[0] if item.shape else "?"
             parts.append(f"an effect without a name ({where}, depending on {variable})")
             continue
         sizes = ", ".join(

@@ -76,7 +76,7 @@ class Unmodelled:
     evidence: float  # log, against nothing but the named model, of all wheels that have it
     wheels: tuple[int, ...]
     columns: Array  # of its basis functions at those wheels, whitened, (n, k)
-    shapes: tuple[Shape, ...]
+    shape: Shape  # at the first of those wheels
     weights: tuple[Array, ...]  # of the basis functions at those wheels [N m], (k,) each
 
     def torque(self, motion: Motion) -> Array:
@@ -104,27 +104,18 @@ def _fitted(rest: Remainder, basis: BasisResponses, family: Family, response: Ar
     count, first = response.shape[1], len(rest.gram.vector)
     parts = [_only(response * rest.weight[:, None], rows) for rows in basis.rows]
     alone = rest.solved(()).evidence
-    gains = [rest.solved((part,)).evidence - alone for part in parts]
-    least = max(_WHEEL_SHARE * max(gains), _NEEDED)
-    wheels = tuple(wheel for wheel in range(WHEELS) if gains[wheel] > least)
-    wheels = wheels or (int(np.argmax(gains)),)
+    by_wheel = [rest.solved((part,)).evidence - alone for part in parts]
+    least = max(_WHEEL_SHARE * max(by_wheel), _NEEDED)
+    wheels = tuple(wheel for wheel in range(WHEELS) if by_wheel[wheel] > least)
+    wheels = wheels or (int(np.argmax(by_wheel)),)
     chosen = [parts[wheel] for wheel in wheels]
     whole = rest.solved(chosen)
-    covariances = whole.covariance
-    names, shapes, weights = rest.dataset.simulations[0].robot.wheel_names, [], []
-    for place, wheel in enumerate(wheels):
-        rows = first + place * count + np.arange(count)
-        weights.append(basis.size * whole.mean[rows])
-        covariance = basis.size**2 * covariances[np.ix_(rows, rows)]
-        shapes.append(_shape(family, names[wheel], weights[-1], covariance))
-    return Unmodelled(
-        family,
-        whole.evidence - alone,
-        wheels,
-        np.concatenate(chosen, axis=1),
-        tuple(shapes),
-        tuple(weights),
-    )
+    weights = tuple(basis.size * part for part in np.split(whole.mean[first:], len(wheels)))
+    rows = slice(first, first + count)
+    name = rest.dataset.simulations[0].robot.wheel_names[wheels[0]]
+    shape = _shape(family, name, weights[0], basis.size**2 * whole.covariance[rows, rows])
+    columns = np.concatenate(chosen, axis=1)
+    return Unmodelled(family, whole.evidence - alone, wheels, columns, shape, weights)
 
 
 def _only(columns: Array, rows: NDArray[np.intp]) -> Array:

@@ -24,6 +24,8 @@ from tomr_reality_gap.report.words import (
 
 _MOST_DRIVES = 4  # with a picture each
 _MOST_MAPS = 6
+_MOST_CHANNELS = 3  # named beside a finding
+_LEAST_SHARE = 0.01
 
 Tick = Callable[[], None]
 Array = NDArray[np.float64]
@@ -44,11 +46,9 @@ class ChannelLine:
 
 def report_page(explanation: Explanation, robot: str, tick: Tick = lambda: None) -> str:
     """The page as HTML; `robot` names its description, `tick` is called after each picture."""
-    template = _environment().from_string(
-        files("tomr_reality_gap.report").joinpath("report.html.j2").read_text(encoding="utf-8")
-    )
     found = bool(explanation.findings)
-    return template.render(
+    return rendered(
+        "report/report.html.j2",
         explanation=explanation,
         robot=robot,
         found=found,
@@ -98,12 +98,14 @@ def _pair(value: Array, one: Comparison, number: int, scale: float) -> tuple[flo
     return before, after
 
 
-def _environment() -> Environment:
+def rendered(template: str, **values: object) -> str:
+    """A page of this package from its template and what that shows."""
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     environment.filters.update(
         number=number_words, percent=percent_words, effect=effect_words, place=place_words
     )
-    return environment
+    text = files("tomr_reality_gap").joinpath(template).read_text(encoding="utf-8")
+    return environment.from_string(text).render(values)
 
 
 def _row(finding: Finding) -> Mapping[str, object]:
@@ -114,8 +116,14 @@ def _row(finding: Finding) -> Mapping[str, object]:
         "parameters": [
             (name, estimate_words(estimate)) for name, estimate in finding.parameters.items()
         ],
-        "channels": sorted(finding.located.channels.items(), key=lambda item: -item[1])[:3],
+        "channels": _main_channels(finding.located.channels),
     }
+
+
+def _main_channels(shares: Mapping[str, float]) -> list[tuple[str, float]]:
+    """The few channels that hold a percent or more, the largest share first."""
+    shown = [item for item in shares.items() if item[1] >= _LEAST_SHARE]
+    return sorted(shown, key=lambda item: -item[1])[:_MOST_CHANNELS]
 
 
 def _drives(explanation: Explanation) -> list[Comparison]:
