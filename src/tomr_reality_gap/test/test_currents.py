@@ -99,9 +99,15 @@ def test_short_recordings_side_by_side_are_each_by_itself(robotino: Robot) -> No
 
 def test_a_later_robot_is_the_same_robot_later(robotino: Robot) -> None:
     simulation = _forward(robotino, _to_and_fro(0.3, 0.2))
-    controller = evolve(robotino.controller, delay=robotino.controller.delay + 0.0234)
-    value = simulation.predict([evolve(robotino, controller=controller)])[0]
-    np.testing.assert_allclose(value, simulation.predict([robotino], later=[0.0234])[1], atol=0.05)
+
+    def late(delay: float) -> Robot:
+        controller = evolve(robotino.controller, delay=robotino.controller.delay + delay)
+        return evolve(robotino, controller=controller)
+
+    value = simulation.predict([late(0.0234)])[0]
+    for first, rest in ((0.0, 0.0234), (0.0017, 0.0217)):
+        found = simulation.predict([late(first)], later=[rest])[1]
+        np.testing.assert_allclose(value, found, atol=0.05)
 
 
 @pytest.mark.parametrize("integral", [0.0, 157.0])

@@ -14,6 +14,7 @@ from tomr_reality_gap.fit.jacobian import linearise
 from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
 from tomr_reality_gap.fit.simulator_discrepancy import discrepancy_torques
 from tomr_reality_gap.fit.unmodelled import Remainder, unmodelled_effects
+from tomr_reality_gap.mismatch.compare import simulated
 from tomr_reality_gap.mismatch.locate import located
 from tomr_reality_gap.mismatch.orders import ripple_orders
 from tomr_reality_gap.mismatch.probes import motion_of
@@ -73,12 +74,24 @@ def test_what_has_no_name_is_found_with_its_wheel_and_variable(
     dataset, found = searched(simulation, next(simulation.respond(robot, torque)), ())
     jacobian = linearise(dataset, found.best.model, ())
     rest = Remainder.of(dataset, found.best.value, jacobian, found.noise)
-    first, *others = unmodelled_effects(rest, basis_responses(dataset, robot, 0.3))
+    basis = basis_responses(dataset, robot, 0.3)
+    first, *others = unmodelled_effects(rest, basis)
     assert first.family.variable == "wheel speed [rad/s]"
     assert first.wheels == (2,)
     assert first.evidence > max(20.0, others[0].evidence + 100.0)
     peak = first.shape.at[np.argmax(first.shape.value)]
     assert peak == pytest.approx(4.0, abs=1.0)
+    # A simulation of the user's that has the same is no other than reality in this.
+    plain, resisting = simulation.predict([robot])[0], next(simulation.respond(robot, torque))
+    for theirs, expected in ((resisting, True), (plain, False)):
+        recorded = [as_recorded(simulation, theirs)]
+        baseline = SimulatorBaseline.of(recorded, dataset, found.noise, robot)
+        assert baseline is not None
+        assert baseline.shows(first, found.best.model, basis) is expected
+    # It is laid on any drive beside what is named.
+    values, _ = simulated(simulation, robot, robot, first.torque)
+    left = [(item - resisting).std() for item in values]
+    assert left[1] < 0.5 * left[0]
 
 
 def test_what_the_users_simulation_resists_more_is_taken_off(
