@@ -32,7 +32,7 @@ from tqdm import tqdm
 from tomr_power_model.calibration.fitted import fitted_text
 from tomr_power_model.cli import run_main
 from tomr_power_model.drive.read import read_drive
-from tomr_power_model.model.scores import accuracy
+from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.robot import Robot, load_robot, read_description
 from tomr_reality_gap.alignment.channels import channels_of
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
@@ -148,7 +148,7 @@ def figures_of(comparisons: Sequence[Comparison]) -> dict[str, dict[str, float]]
         real, model, mean = np.concatenate(measured), np.concatenate(simulated), np.array(means)
         left = float(np.square(mean[:, 0] - mean[:, 1]).sum())
         found[title] = {
-            "nrmse": float(np.sqrt(np.mean((real - model) ** 2)) / real.std()),
+            "nrmse": nrmse(real, model),
             "accuracy": accuracy(real, model),
             "r2_mean": 1.0 - left / float(np.square(mean[:, 0] - mean[:, 0].mean()).sum()),
         }

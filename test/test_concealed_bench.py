@@ -16,12 +16,13 @@ sys.path.append(str(ROOT / "bench"))
 
 from concealed import cli, make, oracle
 from concealed.beyond import OUTSIDE
-from concealed.catalogue import BODY, SIZES, Case, Concealed, catalogue, known_effects
+from concealed.catalogue import BODY, SIZES, Case, Concealed, catalogue
 from concealed.claims import Report, Truth, report_of, truth_of
 from concealed.concealing import Hidden, hidden_of, real_parameters
 from concealed.concealing import truth_of as told
 from concealed.drives import STYLES, random_plan
 from concealed.driving import STEP, Track
+from concealed.recipes import RECIPES
 from concealed.robots import described, drawn_deviations, flat
 from concealed.run import run_all
 from concealed.score import (
@@ -110,7 +111,7 @@ def test_cases_are_named_once_and_their_folders_say_nothing() -> None:
     assert 10 <= sum(case.quick for case in cases) <= 15
     assert set(identities).isdisjoint(case.identity(2) for case in cases)
     concealed = {item.effect for case in cases for item in case.effects}
-    assert {name for name in concealed if not name.startswith("parameter.")} == set(known_effects())
+    assert {name for name in concealed if not name.startswith("parameter.")} == {*RECIPES, *OUTSIDE}
 
 
 @pytest.mark.parametrize("seed", range(3))

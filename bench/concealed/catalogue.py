@@ -6,7 +6,6 @@ from typing import Literal
 
 from attrs import evolve, frozen
 
-from concealed.beyond import OUTSIDE
 from concealed.recipes import RECIPES
 from tomr_power_model.effects import EFFECTS
 
@@ -219,8 +218,3 @@ def catalogue() -> tuple[Case, ...]:
     """All cases in the order in which they are made: the small group, then all groups mixed."""
     cases = [evolve(case, quick=case.name in _QUICK) for case in _all_cases()]
     return tuple(sorted(cases, key=lambda case: (not case.quick, case.identity(0))))
-
-
-def known_effects() -> tuple[str, ...]:
-    """Everything that can be concealed, except wrong parameters."""
-    return (*RECIPES, *OUTSIDE)

@@ -20,8 +20,8 @@ from concealed.robots import (
 )
 from concealed.scales import Scales
 from tomr_power_model.effects import EFFECTS
+from tomr_power_model.estimation.parameter import unit_of
 from tomr_power_model.robot import Robot, robot_from_parameters
-from tomr_power_model.robot.tables import ROBOT_PARAMETERS
 from tomr_sim_bridge.plant.effects import PlantEffect
 
 
@@ -141,16 +141,8 @@ def _wrong_value(item: Hidden, nominal: Nested, deviations: Deviations) -> dict[
     factor = deviations.get(key, 1.0)
     if isinstance(factor, list):
         factor = float(np.mean([factor[wheel] for wheel in item.wheels]))
-    unit = _unit(key)
+    unit = unit_of(key)
     return {
         "value": {"value": node * factor * (1.0 + item.size), "unit": unit},
         "nominal": {"value": node, "unit": unit},
     }
-
-
-def _unit(key: str) -> str:
-    for spec in ROBOT_PARAMETERS:
-        if spec.name == key:
-            return spec.unit
-    effect = next(name for name in EFFECTS if key.startswith(f"physics.{name}."))
-    return EFFECTS[effect].parameters[key.removeprefix(f"physics.{effect}.")].unit

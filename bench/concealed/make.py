@@ -37,7 +37,6 @@ from tomr_power_model.messages.plain import NANOSECONDS
 
 REAL_SECONDS, HOLDOUT_SECONDS = (60.0, 85.0), (42.0, 48.0)
 _FIRST_START_S, _LAST_START_S = 1_700_000_000, 1_730_000_000
-_IDEAL = SensorSet()
 _LARGEST_BALANCE = 20.0  # times an effect may be scaled to cancel another
 
 
@@ -188,7 +187,6 @@ def _described(case: Case, job: Job, robot: _Robot, hidden: Sequence[Hidden]) ->
         "family": robot.family,
         "null": not hidden,
         "total_only": case.total_only,
-        "barely_excited": False,
         "effects": truth_of(hidden, robot.nominal, robot.deviations),
         "nominal": robot.nominal,
         "deviations": robot.deviations,

@@ -188,9 +188,7 @@ def _within(key: str, value: float) -> float:
 
 def description_text(case: Case, nominal: Nested) -> str:
     """robot.yaml."""
-    written: dict[str, Any] = {
-        group: dict(values) for group, values in nominal.items() if group != "sensors"
-    }
+    written: dict[str, Any] = dict(nominal)
     if case.total_only and case.says_so:
         written["measurement"] = {"source": "total_only"}
     return yaml.safe_dump(

@@ -40,7 +40,7 @@ def comparison(name: str, held_out: bool, seed: int) -> Comparison:
         channels.append(Channel(f"{topic}/power", "power", wheel, "W", time, span, value))
         before.append(modelled)
     after = [item + EXTRA * shows * (wheel == 1) for wheel, item in enumerate(before)]
-    sigma = tuple(np.full(len(time), NOISE) for _ in channels)
+    sigma = (NOISE,) * len(channels)
     return Comparison(
         name, held_out, tuple(channels), tuple(before), tuple(after), sigma, speed, time
     )
@@ -55,7 +55,6 @@ def finding() -> Finding:
             "speed": Estimate(0.8, 0.55, 1.35, "rad/s"),
         },
         located=Located(0.83, "|omega| < 2 rad/s", (SHOWS,), {"wheel_2/power": 1.0}),
-        holdout=Score(0.21, 0.04, 0.88, 0.96),
         rivals=(Rival("friction.coulomb", ("wheel_2_joint",), -1.7, "drive slowly for 30 s"),),
         confidence=0.972,
         evidence=321.4,

@@ -51,6 +51,12 @@ def _recorded(robot: Robot) -> Drive:
     )
 
 
+def as_recorded(made: RecordingSimulation, value: np.ndarray) -> RecordingSimulation:
+    """The same recording with other values measured."""
+    parts = zip(made.channels, rows_of(made.channels), strict=True)
+    return evolve(made, channels=tuple(evolve(item, value=value[part]) for item, part in parts))
+
+
 @pytest.fixture
 def simulation() -> RecordingSimulation:
     robot = shipped_robot("reference")
@@ -117,6 +123,79 @@ def test_flaws_of_a_sensor_change_what_it_reports_and_nothing_else(
         np.testing.assert_allclose(values[1, part], factor * values[0, part], rtol=1e-6, atol=1e-9)
 
 
+def test_a_recording_that_begins_in_motion_goes_on_from_its_earlier_commands(
+    simulation: RecordingSimulation,
+) -> None:
+    """0.14 s after the start: from rest or at full speed it would be elsewhere."""
+    begin, drive = 5.14, simulation.recorded
+    later, powers = drive.encoder_time >= begin, drive.power_time > begin
+    cut = evolve(
+        drive,
+        encoder_time=drive.encoder_time[later] - begin,
+        position=drive.position[later],
+        velocity=drive.velocity[later],
+        power_time=drive.power_time[powers] - begin,
+        power=drive.power[powers],
+        command_time=drive.command_time - begin,
+        total_time=np.empty(0),
+        total=np.empty(0),
+        total_voltage=np.empty(0),
+    )
+    made = RecordingSimulation.of(cut, simulation.robot, channels_of(cut, simulation.robot))
+    whole, part = (item.predict([simulation.robot])[0] for item in (simulation, made))
+    wanted = next(c.time > begin + 1e-6 for c in simulation.channels if c.name == "wheel_1/power")
+    expected = whole[: len(wanted)][wanted][:10]
+    assert np.ptp(expected) > 0.5
+    np.testing.assert_allclose(part[:10], expected, atol=0.05)
+
+
+def _power_change(made: RecordingSimulation, effect: str, values: dict[str, float]) -> np.ndarray:
+    """What an effect adds to the motors' power."""
+    robot = made.robot
+    physics = {**robot.physics, effect: (values,) * 3}
+    change = np.subtract(*made.predict([evolve(robot, physics=physics), robot]))
+    return change[: 3 * len(made.recorded.power_time)]
+
+
+def test_angles_and_headings_are_those_that_were_measured(simulation: RecordingSimulation) -> None:
+    """A ripple half a period farther on is turned over, a slope for who has turned round, too."""
+    drive, robot = simulation.recorded, simulation.robot
+    ripple = {"torque": 0.05, "order": 6.0, "phase": 0.0}
+    farther = evolve(drive, position=drive.position + np.pi / 6.0)
+    half_turn = np.pi * twist_to_wheels(robot)[:, 2]
+    around = evolve(
+        drive, position=drive.position + half_turn * (drive.encoder_time > 1.0)[:, None]
+    )
+    for effect, values, other in (
+        ("drivetrain.torque_ripple", ripple, farther),
+        ("body.slope", {"angle": 0.03, "azimuth": 0.5}, around),
+    ):
+        moved = evolve(simulation, recorded=other)
+        found = [_power_change(item, effect, values) for item in (simulation, moved)]
+        assert np.corrcoef(*found)[0, 1] < -0.5
+        assert min(change.std() for change in found) > 0.05
+
+
+def test_torques_resist_beside_those_of_the_users_simulation(
+    simulation: RecordingSimulation,
+) -> None:
+    torque = np.full((simulation.timeline.count, 3), 0.02)
+    robot, nothing = simulation.robot, np.zeros((1, *torque.shape))
+    theirs = evolve(simulation, resisting=torque)
+    expected = next(simulation.respond(robot, torque[None]))
+    np.testing.assert_array_equal(next(theirs.respond(robot, nothing)), expected)
+    np.testing.assert_array_equal(theirs.predict([robot])[0], expected)
+    assert np.abs(expected - simulation.predict([robot])[0]).max() > 0.01
+
+
+def test_power_is_a_mean_over_the_window_of_its_sensor(simulation: RecordingSimulation) -> None:
+    sensors = evolve(simulation.robot.sensors, power_window=0.02)
+    channels = channels_of(simulation.recorded, evolve(simulation.robot, sensors=sensors))
+    spans = {c.kind: c.span for c in channels}
+    for kind in ("power", "total", "voltage"):
+        np.testing.assert_array_equal(spans[kind], 0.02)
+
+
 @pytest.mark.parametrize("way", ["backward", "forward"])
 def test_the_drivers_sum_is_found_whatever_is_described(
     simulation: RecordingSimulation, way: str
@@ -124,9 +203,7 @@ def test_the_drivers_sum_is_found_whatever_is_described(
     robot = simulation.robot
     real = evolve(robot, controller=evolve(robot.controller, integrator=way))
     value = evolve(simulation, robot=real).predict([real])[0]
-    parts = zip(simulation.channels, rows_of(simulation.channels), strict=True)
-    channels = tuple(evolve(channel, value=value[part]) for channel, part in parts)
-    assert integrator_of(evolve(simulation, channels=channels)) == way
+    assert integrator_of(as_recorded(simulation, value)) == way
 
 
 def test_a_process_among_others_simulates_on_one_core(monkeypatch: pytest.MonkeyPatch) -> None:

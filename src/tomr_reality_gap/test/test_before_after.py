@@ -1,11 +1,14 @@
 """Scores and maps before and after, and where a change shows, on numbers worked by hand."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from attrs import evolve
 
 from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.explanation import Comparison
+from tomr_reality_gap.mismatch.compare import comparison as compared
 from tomr_reality_gap.mismatch.compare import score_of
 from tomr_reality_gap.mismatch.locate import located, maps_of
 
@@ -55,6 +58,20 @@ def test_score_is_of_the_motors_and_pooled_over_recordings() -> None:
     assert both.nrmse_before == pytest.approx(1.0)
     assert both.nrmse_after == pytest.approx(np.sqrt((0.3**2 + 0.1**2) / 2.0))
     assert score_of([]) is None
+
+
+def test_what_is_left_is_held_against_the_noise_and_not_against_itself() -> None:
+    """Off by 0.5 W with a noise of 0.1 W; of a channel that was not fitted no noise is known."""
+    power, other = _channel("power", [1.0, 3.0]), _channel("yaw", [0.3, 0.3])
+    simulation = SimpleNamespace(
+        channels=(power, other),
+        recorded=SimpleNamespace(name="made"),
+        timeline=SimpleNamespace(middle=power.time),
+    )
+    values = np.array([[0.0, 0.0, 0.0, 0.0], [0.5, 2.5, 0.1, 0.1]])
+    run = SimpleNamespace(speed=np.zeros((2, 3)))
+    found = compared(simulation, values, run, is_held_out=True, noise={"power": 0.1})  # type: ignore[arg-type]
+    assert found.sigma == pytest.approx((0.1, 0.2 * 1.4826), rel=1e-3)
 
 
 def _power(count: int) -> Channel:

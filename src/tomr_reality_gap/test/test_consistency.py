@@ -23,10 +23,9 @@ def _made(
     matrix = random.standard_normal((ROWS * len(off), 4))  # and one sensor nuisance
     offsets = np.repeat([[part / 0.01 for part in parts] for parts in off], ROWS, axis=0)
     value = (matrix[:, :3] * offsets).sum(axis=1) + noise * random.standard_normal(len(matrix))
-    channel = SimpleNamespace(time=np.zeros(ROWS))
     simulations = tuple(
         SimpleNamespace(
-            channels=(channel,), recorded=SimpleNamespace(name=f"tour{number}", duration=duration)
+            size=ROWS, recorded=SimpleNamespace(name=f"tour{number}", duration=duration)
         )
         for number in range(len(off))
     )

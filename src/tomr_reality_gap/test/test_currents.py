@@ -20,6 +20,8 @@ from tomr_sim_bridge.importers.dataset import choose, default_dataset, import_fi
 from tomr_sim_bridge.importers.robotino import Drive as RobotinoDrive
 from tomr_sim_bridge.importers.robotino import Run, write_run
 
+from .test_alignment import as_recorded
+
 QUANTUM = 1.0 / 39.0  # A
 START_NS = 1_672_531_200_000_000_000
 
@@ -97,9 +99,15 @@ def test_short_recordings_side_by_side_are_each_by_itself(robotino: Robot) -> No
 
 def test_a_later_robot_is_the_same_robot_later(robotino: Robot) -> None:
     simulation = _forward(robotino, _to_and_fro(0.3, 0.2))
-    controller = evolve(robotino.controller, delay=robotino.controller.delay + 0.0234)
-    value = simulation.predict([evolve(robotino, controller=controller)])[0]
-    np.testing.assert_allclose(value, simulation.predict([robotino], later=[0.0234])[1], atol=0.05)
+
+    def late(delay: float) -> Robot:
+        controller = evolve(robotino.controller, delay=robotino.controller.delay + delay)
+        return evolve(robotino, controller=controller)
+
+    value = simulation.predict([late(0.0234)])[0]
+    for first, rest in ((0.0, 0.0234), (0.0017, 0.0217)):
+        found = simulation.predict([late(first)], later=[rest])[1]
+        np.testing.assert_allclose(value, found, atol=0.05)
 
 
 @pytest.mark.parametrize("integral", [0.0, 157.0])
@@ -109,10 +117,7 @@ def test_delay_and_loop_are_seen_in_wheel_speeds(robotino: Robot, integral: floa
     controller = evolve(robotino.controller, delay=0.1, integral=integral)
     value = simulation.predict([evolve(robotino, controller=controller)])[0]
     value = value + 0.05 * np.random.default_rng(1).standard_normal(len(value))
-    channels = tuple(
-        evolve(channel, value=value[part])
-        for channel, part in zip(simulation.channels, rows_of(simulation.channels), strict=True)
-    )
+    channels = as_recorded(simulation, value).channels
     right = RecordingSimulation.of(
         simulation.recorded, evolve(robotino, controller=controller), channels
     )
@@ -172,6 +177,8 @@ def test_a_concealed_friction_and_a_late_command_are_named(tmp_path: Path, robot
     assert found.score is not None
     assert found.score.quantity == "motor current [A]"
     assert found.score.nrmse_after < 0.5 * found.score.nrmse_before
+    fitted, held = found.comparisons
+    assert held.sigma == fitted.sigma  # the sensors', not what is left of each drive
 
 
 def test_the_rollers_of_the_real_robot_drag_on_its_floor(tmp_path: Path) -> None:

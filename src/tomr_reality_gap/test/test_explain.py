@@ -1,13 +1,20 @@
 """Bad input of an explanation, and what goes into robot_explained.yaml."""
 
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import load_robot
+from tomr_reality_gap import prepared
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.explain import explain
 from tomr_reality_gap.request import Request
+
+from .test_alignment import simulation  # noqa: F401 -- the fixture
 
 BAGS = Path(__file__).parents[3] / "bags"
 SQUARE, CIRCLE = BAGS / "square", BAGS / "circle_encoder_lost"
@@ -35,3 +42,26 @@ def test_wheels_that_stand_elsewhere_belong_to_another_robot() -> None:
     """The wheels have the names of the description, and answer to other headings."""
     with pytest.raises(InputError, match=r"this robot\.yaml belongs to another robot"):
         explain(Request("robotino_v2", (SQUARE,)))
+
+
+@pytest.mark.parametrize(
+    ("topics", "total_only"),
+    [({"battery_state"}, True), ({"battery_state", "wheel_2/power"}, False), (set(), False)],
+)
+def test_power_of_the_whole_robot_counts_where_no_motor_is_measured(
+    topics: set[str], total_only: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(prepared, "open_recording", nullcontext)
+    monkeypatch.setattr(prepared, "resolve_topic", lambda _, topic: topic in topics)
+    values = prepared._described(Request("reference", (Path("tour"),)))
+    assert (values.get("measurement.source") == "total_only") is total_only
+
+
+def test_what_the_users_simulation_resists_resists_in_every_recording(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    robot = simulation.robot
+    creeping = SimpleNamespace(torque=lambda motion: 0.01 * motion.sign)
+    found = prepared._with(creeping, simulation, robot)  # type: ignore[arg-type]
+    expected = 0.01 * np.tanh(simulation.run(robot).speed / 0.1)
+    np.testing.assert_allclose(found.resisting, expected)

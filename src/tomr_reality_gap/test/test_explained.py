@@ -6,15 +6,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
-from tomr_power_model.estimation.parameter import ParameterisedRobot, per_wheel
+from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, per_wheel
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import Robot, load_robot, read_description
-from tomr_reality_gap.described import described
+from tomr_reality_gap.described import described, for_users
 from tomr_reality_gap.fit.model import Model
+from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 from tomr_sim_bridge.plant.simulation import Simulation
 
 WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
@@ -119,6 +121,28 @@ def test_all_effects_at_once_cost_the_same_in_nodes_and_simulator(tmp_path: Path
     before = predicted(load_robot("reference"), twist, 3.0)
     np.testing.assert_allclose(simulated(robot, twist, 3.0), expected, rtol=0.06)
     assert expected.sum() > 1.5 * before.sum()
+
+
+def test_what_all_wheels_share_is_written_once(tmp_path: Path) -> None:
+    explained(tmp_path, {"friction.quadratic": {"coefficient": 5e-4}})
+    values = read_description(tmp_path / "robot_explained.yaml")
+    assert values["physics.friction.quadratic.coefficient"] == 5e-4
+    assert not [key for key in values if "wheel_1_joint" in key]
+    explained(tmp_path, {"friction.quadratic": {"coefficient": 5e-4}}, wheels=1)
+    values = read_description(tmp_path / "robot_explained.yaml")
+    assert values["physics.friction.quadratic.wheel_1_joint.coefficient"] == 5e-4
+
+
+def test_the_users_simulation_is_not_given_twice_what_it_shows() -> None:
+    """Of 0.04 that was found it has 0.015 by itself; another finding was dropped."""
+    model = Model(ParameterisedRobot({}, "made"), (), ())
+    for name in ("friction.viscous", "friction.coulomb"):
+        model = model.joined(Hypothesis(name, ("all_wheels",), (Parameter("size", (), "", 1.0),)))
+    model = evolve(model, offsets=((0.03,), (0.04,)))
+    best = SimpleNamespace(model=model)
+    analysis = SimpleNamespace(found=SimpleNamespace(best=best), shared=((0.01,), (0.015,)))
+    kept = for_users(analysis, model.without(0))
+    assert [offsets[0] for offsets in kept.offsets] == pytest.approx([0.025])
 
 
 def test_what_one_of_them_cannot_do_is_said_in_one_line(tmp_path: Path) -> None:

@@ -10,10 +10,15 @@ from tomr_power_model.robot import Robot, read_description
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.basis_responses import basis_responses
 from tomr_reality_gap.fit.dataset import Dataset
-from tomr_reality_gap.fit.forward_selection import Selection, forward_selection
+from tomr_reality_gap.fit.forward_selection import (
+    Selection,
+    _is_large_enough,
+    finding_cost,
+    forward_selection,
+)
 from tomr_reality_gap.fit.jacobian import Jacobian
 from tomr_reality_gap.fit.model import Model
-from tomr_reality_gap.fit.refine import state_at
+from tomr_reality_gap.fit.refine import FittedModel, state_at
 from tomr_reality_gap.fit.screening import joint_candidates
 from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
@@ -178,3 +183,26 @@ def test_delays_of_power_sensors_are_tried_far_from_none(
     assert 0.0 in alternatives
     assert max(alternatives) > 0.05
     assert min(alternatives) < -0.01
+
+
+def test_a_finding_costs_more_among_many_samples_and_beside_large_ones() -> None:
+    assert finding_cost(1000) == 20.0
+    assert finding_cost(100_000) == pytest.approx(300.0)
+    assert finding_cost(1000, 5000.0) == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize(
+    ("size", "least", "expected"), [(3.1, 0.0, True), (2.9, 0.0, False), (3.1, 3.2, False)]
+)
+def test_an_addition_must_be_larger_than_noise_and_than_sampling_shows(
+    size: float, least: float, expected: bool
+) -> None:
+    """Standard deviations of 0.5 and 1; the first was there before."""
+    known, added = (
+        Hypothesis(name, ("body",), (Parameter("size", (name,), "", 1.0),), least=least)
+        for name in ("known", "added")
+    )
+    model = Model(ParameterisedRobot({}, "made"), (), (), (known, added), ((0.0,), (size,)))
+    none = np.empty(0)
+    fitted = FittedModel(model, 0.0, 0.0, none, np.diag([0.25, 1.0]), none)
+    assert _is_large_enough(fitted, 1) is expected

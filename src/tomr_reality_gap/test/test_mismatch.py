@@ -14,12 +14,13 @@ from tomr_reality_gap.fit.jacobian import linearise
 from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
 from tomr_reality_gap.fit.simulator_discrepancy import discrepancy_torques
 from tomr_reality_gap.fit.unmodelled import Remainder, unmodelled_effects
+from tomr_reality_gap.mismatch.compare import simulated
 from tomr_reality_gap.mismatch.locate import located
 from tomr_reality_gap.mismatch.orders import ripple_orders
 from tomr_reality_gap.mismatch.probes import motion_of
 
 from .test_alignment import _recorded as recorded_drive
-from .test_alignment import simulation  # noqa: F401 -- the fixture
+from .test_alignment import as_recorded, simulation  # noqa: F401 -- the fixture
 from .test_forward_selection import searched
 
 POWER_TIME = np.arange(0.02, 60.0, 0.02)
@@ -73,12 +74,24 @@ def test_what_has_no_name_is_found_with_its_wheel_and_variable(
     dataset, found = searched(simulation, next(simulation.respond(robot, torque)), ())
     jacobian = linearise(dataset, found.best.model, ())
     rest = Remainder.of(dataset, found.best.value, jacobian, found.noise)
-    first, *others = unmodelled_effects(rest, basis_responses(dataset, robot, 0.3))
+    basis = basis_responses(dataset, robot, 0.3)
+    first, *others = unmodelled_effects(rest, basis)
     assert first.family.variable == "wheel speed [rad/s]"
     assert first.wheels == (2,)
     assert first.evidence > max(20.0, others[0].evidence + 100.0)
-    peak = first.shapes[0].at[np.argmax(first.shapes[0].value)]
+    peak = first.shape.at[np.argmax(first.shape.value)]
     assert peak == pytest.approx(4.0, abs=1.0)
+    # A simulation of the user's that has the same is no other than reality in this.
+    plain, resisting = simulation.predict([robot])[0], next(simulation.respond(robot, torque))
+    for theirs, expected in ((resisting, True), (plain, False)):
+        recorded = [as_recorded(simulation, theirs)]
+        baseline = SimulatorBaseline.of(recorded, dataset, found.noise, robot)
+        assert baseline is not None
+        assert baseline.shows(first, found.best.model, basis) is expected
+    # It is laid on any drive beside what is named.
+    values, _ = simulated(simulation, robot, robot, first.torque)
+    left = [(item - resisting).std() for item in values]
+    assert left[1] < 0.5 * left[0]
 
 
 def test_what_the_users_simulation_resists_more_is_taken_off(
@@ -88,12 +101,8 @@ def test_what_the_users_simulation_resists_more_is_taken_off(
     robot = simulation.robot
     creeps = ({"coefficient": 0.01},) * 3
     theirs = evolve(robot, physics={**robot.physics, "contact.rolling_resistance": creeps})
-    value = simulation.predict([robot, theirs])
-    channels = tuple(
-        evolve(channel, value=value[1, part])
-        for channel, part in zip(simulation.channels, rows_of(simulation.channels), strict=True)
-    )
-    more = discrepancy_torques([evolve(simulation, channels=channels)], robot, 0.3)
+    recorded = as_recorded(simulation, simulation.predict([theirs])[0])
+    more = discrepancy_torques([recorded], robot, 0.3)
     assert more is not None
     turned = evolve(
         simulation,
@@ -105,7 +114,7 @@ def test_what_the_users_simulation_resists_more_is_taken_off(
     powers = np.concatenate(
         [
             np.arange(p.start, p.stop)
-            for c, p in zip(channels, rows_of(channels), strict=True)
+            for c, p in zip(turned.channels, rows_of(turned.channels), strict=True)
             if c.kind == "power"
         ]
     )
@@ -118,20 +127,9 @@ def test_a_simulation_like_ours_is_left_alone(
 ) -> None:
     random = np.random.default_rng(2)
     value = simulation.predict([simulation.robot])[0]
-    channels = tuple(
-        evolve(c, value=value[part] + 0.05 * random.standard_normal(len(c.time)))
-        for c, part in zip(simulation.channels, rows_of(simulation.channels), strict=True)
-    )
-    theirs = [evolve(simulation, channels=channels)]
+    value += 0.05 * random.standard_normal(len(value))
+    theirs = [as_recorded(simulation, value)]
     assert discrepancy_torques(theirs, simulation.robot, 0.3) is None
-
-
-def _as_recorded(made: RecordingSimulation, value: np.ndarray) -> RecordingSimulation:
-    channels = tuple(
-        evolve(channel, value=value[part])
-        for channel, part in zip(made.channels, rows_of(made.channels), strict=True)
-    )
-    return evolve(made, channels=channels)
 
 
 def test_what_the_users_simulation_shows_of_a_finding_is_taken_off(
@@ -146,7 +144,7 @@ def test_what_the_users_simulation_shows_of_a_finding_is_taken_off(
 
     dataset, found = searched(simulation, resisting(0.02), ("friction.asymmetric",))
     for shown, left in ((0.005, 1), (0.02, 0)):
-        simulation = _as_recorded(simulation, resisting(shown))
+        simulation = as_recorded(simulation, resisting(shown))
         baseline = SimulatorBaseline.of([simulation], dataset, found.noise, robot)
         kept, theirs = beyond_baseline(dataset, found, baseline)
         assert len(kept.best.model.hypotheses) == left

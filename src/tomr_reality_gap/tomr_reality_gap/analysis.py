@@ -19,7 +19,7 @@ from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 
 Array = NDArray[np.float64]
 
-_LISTED = 12  # detection limits that are reported
+_LISTED = 24  # detection limits that are reported
 
 
 @frozen
@@ -79,4 +79,4 @@ def detection_limits(analysis: AnalysisResult) -> tuple[tuple[str, str, str], ..
         for size, item, first in found.values()
         if item.where[0] in ("all_wheels", "body", "supply")
     ]
-    return tuple(rows[: 2 * _LISTED])
+    return tuple(rows[:_LISTED])

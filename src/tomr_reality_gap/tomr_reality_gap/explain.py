@@ -1,6 +1,6 @@
 """From recordings to an explanation: align, compare, name, model, show."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from attrs import evolve
@@ -21,11 +21,11 @@ from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_ba
 from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
 from tomr_reality_gap.mismatch.orders import ripple_orders
 from tomr_reality_gap.prepared import Prepared, prepared
+from tomr_reality_gap.progress import Progress
 from tomr_reality_gap.request import Request
 from tomr_reality_gap.verdict import explanation_of
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 
 def explain(request: Request, progress: Progress = lambda stage, part: None) -> Explanation:

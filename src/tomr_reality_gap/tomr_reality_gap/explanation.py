@@ -76,10 +76,9 @@ class Finding:
     where: tuple[str, ...]
     parameters: Mapping[str, Estimate]
     located: Located
-    holdout: Score | None
     rivals: tuple[Rival, ...]
     confidence: float
-    evidence: float  # log Bayes factor against leaving it out
+    evidence: float  # log Bayes factor against leaving it out, all else fitted anew
     shape: Shape | None = None  # of `unknown`
 
 
@@ -92,7 +91,7 @@ class Comparison:
     channels: tuple[Channel, ...]
     before: tuple[Array, ...]  # simulated as described, at each channel's times
     after: tuple[Array, ...]  # simulated as explained
-    sigma: tuple[Array, ...]  # noise of each sample
+    sigma: tuple[float, ...]  # standard deviation of each channel's noise
     speed: Array  # simulated wheel speeds [rad/s] of the explained robot, (t, 3)
     time: Array  # s, (t,)
 

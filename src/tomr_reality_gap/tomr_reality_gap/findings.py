@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tomr_power_model.calibration.priors import drive_for
 from tomr_power_model.estimation.parameter import bounds_of, neutral_of
 from tomr_reality_gap.analysis import AnalysisResult
-from tomr_reality_gap.explanation import Estimate, Finding, Rival, Score
+from tomr_reality_gap.explanation import Estimate, Finding, Rival
 from tomr_reality_gap.fit.refine import FittedModel
 from tomr_reality_gap.fit.unmodelled import Unmodelled, names
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
@@ -31,7 +31,7 @@ class Findings:
     """Makes the findings of one analysis."""
 
     analysis: AnalysisResult
-    score: Score | None  # on held-out data
+    gained: Sequence[float]  # log evidence that each of the model's hypotheses brings
     variables: Mapping[str, Array]  # at all samples, by name
 
     def named(self, needed: Sequence[bool], doubted: bool) -> list[Finding]:
@@ -59,11 +59,10 @@ class Findings:
             where=names(effect.wheels, analysis.robot),
             parameters={},
             located=located(channels, change / weight, weight, share, variables=self.variables),
-            holdout=self.score,
             rivals=(),
             confidence=0.9,
             evidence=effect.evidence,
-            shape=effect.shapes[0],
+            shape=effect.shape,
         )
 
     def _energy(self, value: Array) -> float:
@@ -76,21 +75,20 @@ class Findings:
         hypothesis = found.best.model.hypotheses[number]
         change = analysis.simulated[1] - analysis.simulated[2 + number]
         group = found.alternatives[number] if number < len(found.alternatives) else ()
-        odds = log_odds_of(number, group)
+        odds = log_odds_of(hypothesis, group)
         channels, weight = analysis.dataset.channels, found.noise.weight
         return Finding(
             effect=hypothesis.effect,
             where=hypothesis.where,
             parameters=self._parameters(number),
             located=located(channels, change, weight, share, variables=self.variables),
-            holdout=self.score,
             rivals=tuple(
                 Rival(other.effect, other.where, min(odd, 0.0), drive_for(_key_of(other)))
                 for odd, other in sorted(odds, key=lambda pair: -pair[0])
                 if is_rival(odd)
             ),
             confidence=min(most, confidence_of([odd for odd, _ in odds])),
-            evidence=found.best.evidence - found.without.evidence,
+            evidence=self.gained[number],
         )
 
     def _parameters(self, number: int) -> dict[str, Estimate]:
@@ -122,12 +120,16 @@ class Findings:
         return found
 
 
-def log_odds_of(number: int, group: Sequence[FittedModel]) -> list[tuple[float, Hypothesis]]:
-    """Others in the place of a finding with their log odds; the first is the finding itself."""
+def log_odds_of(found: Hypothesis, group: Sequence[FittedModel]) -> list[tuple[float, Hypothesis]]:
+    """Others in the place of a finding with their log odds; the first has the finding itself.
+
+    The group may be of more findings than were kept in the end.
+    """
     odds = {}
     for item in group[1:]:
-        other = item.model.hypotheses[number]
-        if other.name != group[0].model.hypotheses[number].name:
+        place = [known.name for known in group[0].model.hypotheses].index(found.name)
+        other = item.model.hypotheses[place]
+        if other.name != found.name:
             odds[other.name] = (item.evidence - group[0].evidence, other)
     return list(odds.values())
 

@@ -57,7 +57,7 @@ def prepared(request: Request) -> Prepared:
     check_excitation(real, robot)
     refuse(found for item in (*real, *held) for found in sensor_faults(item, robot))
     sim = _read_all((request.sim,), request, robot) if request.sim else ()
-    _check_same_commands(real, sim, robot)
+    _check_same_commands(real, sim)
     values[INTEGRATOR] = integrator_of(_simulation((*sim, *real)[0], robot))
     robot = robot_from_parameters(values, place)
     base = per_wheel(values, robot.wheel_names, place)
@@ -151,7 +151,7 @@ def integrator_of(simulation: RecordingSimulation) -> str:
     return min(ways, key=errors.__getitem__)
 
 
-def _check_same_commands(real: tuple[Drive, ...], sim: tuple[Drive, ...], robot: Robot) -> None:
+def _check_same_commands(real: tuple[Drive, ...], sim: tuple[Drive, ...]) -> None:
     """A simulation must have been driven with the commands of a real recording."""
     for item in sim:
         moved = np.nanmax(np.abs(item.position - item.position[:1]), initial=0.0)

@@ -20,6 +20,7 @@ from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.unmodelled import (
     Remainder,
     Unmodelled,
+    gains,
     still_needed,
     unmodelled_effects,
 )
@@ -40,10 +41,11 @@ def explanation_of(
     rest = Remainder.of(dataset, found.best.value, jacobian, found.noise)
     left = unmodelled_effects(rest, analysis.basis)
     effect = left[0] if _is_there(analysis, left) else None
-    needed, after = [True] * len(jacobian.own), analysis.simulated[1]
+    after = analysis.simulated[1]
+    gained = gains(rest, jacobian, [after - item for item in analysis.simulated[2:]], effect)
+    needed = [True] * len(gained)
     if effect is not None:
-        changes = [after - without for without in analysis.simulated[2:]]
-        needed = still_needed(rest, jacobian, effect, changes)
+        needed = still_needed(found.best.model, gained, effect)
     model = found.best.model.kept(needed)
     if effect is not None and not all(needed):
         after = dataset.predict([model.described.robot])[0]
@@ -53,25 +55,24 @@ def explanation_of(
     if doubted and effect is None and left:
         effect = left[0]  # even if no family of torques explains much of it
     comparisons = _comparisons(analysis, model, effect, after, held)
-    score = score_of([item for item in comparisons if item.held_out])
     variables = _variables(analysis)
-    maker = Findings(analysis, score, variables)
+    maker = Findings(analysis, gained, variables)
     findings = maker.named(needed, doubted)
     findings += [maker.unmodelled(effect)] if effect is not None else []
     fitted = [item for item in comparisons if not item.held_out]
     explained = np.concatenate([values for item in fitted for values in item.after])
-    before, rest = dataset.value - analysis.simulated[0], dataset.value - explained
+    before, left_over = dataset.value - analysis.simulated[0], dataset.value - explained
     return Explanation(
         verdict="mismatch" if findings else "match",
         sentence=_sentence(findings),
         findings=tuple(findings),
         unexplained_share=unexplained(_residuals(analysis, explained))[0] if findings else 0.0,
         comparisons=comparisons,
-        maps=maps_of(dataset.channels, before, rest, found.noise.sigma, variables=variables),
+        maps=maps_of(dataset.channels, before, left_over, found.noise.sigma, variables=variables),
         alignment=_alignment(analysis),
         detection_limits=detection_limits(analysis) if not findings else (),
         whiteness=_whiteness(analysis),
-        score=score,
+        score=score_of([item for item in comparisons if item.held_out]),
         explained=described(analysis, for_users(analysis, model)) if model.hypotheses else "",
         suggested=suggested(findings),
         notes=notes,
@@ -98,16 +99,26 @@ def _comparisons(
     """All recordings before and after, with what the effect without a name amounts to."""
     described, explained = analysis.base.robot, model.described.robot
     besides = effect.torque if effect is not None else None
-    found, at = [], 0
+    found, at, noise = [], 0, _noise(analysis)
     for item, run in zip(analysis.dataset.simulations, analysis.runs, strict=True):
-        part = slice(at, at := at + sum(len(channel.time) for channel in item.channels))
+        part = slice(at, at := at + item.size)
         values: Array = np.stack([analysis.simulated[0][part], after[part]])
         if besides is not None:
             values, run = simulated(item, described, explained, besides)
-        found.append(comparison(item, values, run, False))
+        found.append(comparison(item, values, run, is_held_out=False, noise=noise))
     for item in held:
-        found.append(comparison(item, *simulated(item, described, explained, besides), True))
+        values, run = simulated(item, described, explained, besides)
+        found.append(comparison(item, values, run, is_held_out=True, noise=noise))
     return tuple(found)
+
+
+def _noise(analysis: AnalysisResult) -> dict[str, float]:
+    """Usual standard deviation of each channel's noise, as the fit found it, by its name."""
+    channels, sigma = analysis.dataset.channels, analysis.found.noise.sigma
+    parts: dict[str, list[Array]] = {}
+    for channel, part in zip(channels, rows_of(channels), strict=True):
+        parts.setdefault(channel.name, []).append(sigma[part])
+    return {name: float(np.median(np.concatenate(rows))) for name, rows in parts.items()}
 
 
 def _residuals(analysis: AnalysisResult, after: Array) -> list[Residuals]:
@@ -171,7 +182,7 @@ def _sentence(findings: Sequence[Finding]) -> str:
     for item in findings:
         where = ", ".join(item.where).replace("_", " ")
         if item.effect == "unknown":
-            variable = item.shape.variable if item.shape else "?"
+            variable = item.shape.variable.partition(" [")[0] if item.shape else "?"
             parts.append(f"an effect without a name ({where}, depending on {variable})")
             continue
         sizes = ", ".join(

@@ -7,7 +7,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.dynamics import layout as at
-from tomr_power_model.dynamics.numbers import laid_out
+from tomr_power_model.dynamics.numbers import laid_out, wheel_records
 from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.robot import Robot
 
@@ -30,7 +30,7 @@ class Body:
     def of(cls, robot: Robot) -> Self:
         """Of a description."""
         p = laid_out(vehicle_of(robot))
-        wheels = p[at.HEADER : int(p[at.COUPLING])].reshape(-1, int(p[at.STRIDE]))
+        wheels = wheel_records(p)
         return cls(
             to_twist=wheels[:, at.TO_TWIST : at.TO_TWIST + 3].T,
             along=wheels[:, at.ALONG : at.ALONG + 3],

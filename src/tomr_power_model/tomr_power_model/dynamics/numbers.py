@@ -108,6 +108,11 @@ def _rows(wheel: WheelPlace, radius: float) -> tuple[Array, Array, float]:
     return row(held) / (radius * share), row(free), radius * share
 
 
+def wheel_records(p: Array) -> Array:
+    """The part of a layout that has one row for each wheel, a view, (n, stride)."""
+    return p[at.HEADER : int(p[at.COUPLING])].reshape(-1, int(p[at.STRIDE]))
+
+
 def laid_out(vehicle: Vehicle) -> Array:
     """All numbers of a vehicle as `layout` has them."""
     n, effects = vehicle.count, plant_numbers(vehicle)
@@ -119,7 +124,7 @@ def laid_out(vehicle: Vehicle) -> Array:
     p[at.STRIDE], p[at.COUPLING], p[at.TRACTION] = stride, first, first + 4 * n * n
     _controller(p, vehicle, timing)
     _body(p, vehicle, effects)
-    records = p[at.HEADER : first].reshape(n, stride)
+    records = wheel_records(p)
     _motors(records, vehicle, effects, timing)
     _wheels(records, vehicle, effects, geometry)
     _laws(records, vehicle)

@@ -3,7 +3,7 @@
 from typing import Literal
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.drive.record import Drive
@@ -33,56 +33,39 @@ class Channel:
     value: Array  # (n,)
     quantum: float = 0.0  # of a value, where it is coarse
 
+    def at(self, rows: NDArray[np.bool_]) -> "Channel":
+        """Some of its values."""
+        return evolve(self, time=self.time[rows], span=self.span[rows], value=self.value[rows])
+
 
 def channels_of(recorded: Drive, robot: Robot) -> tuple[Channel, ...]:
     """All channels of a recording that hold anything."""
-    window = robot.sensors.power_window
-    found = [*_powers(recorded, robot, window), *_speeds(recorded, robot)]
+    found = [*_powers(recorded, robot), *_speeds(recorded, robot)]
     if len(recorded.yaw_time) > 1:
         found.append(_blocks(recorded))
-    return tuple(channel for channel in found if len(channel.time))
+    known = (channel.at(np.isfinite(channel.value)) for channel in found)
+    return tuple(channel for channel in known if len(channel.time))
 
 
-def _known(
-    name: str,
-    kind: Kind,
-    wheel: int | None,
-    unit: str,
-    time: Array,
-    window: float,
-    value: Array,
-    quantum: float = 0.0,
-) -> Channel:
-    rows = np.isfinite(value)
-    span = np.full(int(rows.sum()), window)
-    return Channel(name, kind, wheel, unit, time[rows], span, value[rows], quantum)
-
-
-def _powers(recorded: Drive, robot: Robot, window: float) -> list[Channel]:
+def _powers(recorded: Drive, robot: Robot) -> list[Channel]:
     kind: Kind = "power"
     unit, quantum = "W", 0.0
     if robot.measurement.quantity == "motor_current":
         kind, unit, quantum = "current", "A", robot.sensors.current_resolution
-    found = [
-        _known(
-            f"{topic}/{kind}",
-            kind,
-            wheel,
-            unit,
-            recorded.power_time,
-            window,
-            recorded.power[:, wheel],
-            quantum,
-        )
-        for wheel, topic in enumerate(robot.wheel_topics)
-    ]
-    total = recorded.total_time, window, recorded.total
-    found.append(_known("battery_state", "total", None, "W", *total))
+    window = robot.sensors.power_window
+    time, total = recorded.power_time, recorded.total_time
+    span, total_span = np.full(len(time), window), np.full(len(total), window)
     volts = recorded.total_voltage
-    found.append(
-        _known("battery_state voltage", "voltage", None, "V", recorded.total_time, window, volts)
-    )
-    return found
+    return [
+        *(
+            Channel(f"{topic}/{kind}", kind, wheel, unit, time, span, power, quantum)
+            for wheel, (topic, power) in enumerate(
+                zip(robot.wheel_topics, recorded.power.T, strict=True)
+            )
+        ),
+        Channel("battery_state", "total", None, "W", total, total_span, recorded.total),
+        Channel("battery_state voltage", "voltage", None, "V", total, total_span, volts),
+    ]
 
 
 def _blocks(recorded: Drive) -> Channel:
@@ -117,9 +100,6 @@ def _speeds(recorded: Drive, robot: Robot) -> list[Channel]:
             speed = np.diff(angle)[rows] / span[rows]
             found.append(Channel(name, "speed", wheel, "rad/s", time[1:][rows], span[rows], speed))
         else:
-            found.append(
-                _known(
-                    name, "speed", wheel, "rad/s", time, 0.0, recorded.velocity[:, wheel], quantum
-                )
-            )
+            span, speed = np.zeros(len(time)), recorded.velocity[:, wheel]
+            found.append(Channel(name, "speed", wheel, "rad/s", time, span, speed, quantum))
     return found

@@ -82,6 +82,4 @@ def _scaled(value: Array, simulated: Array) -> Array:
 
 def _early(channel: Channel) -> Channel:
     """Without the end, of which a simulation that comes sooner knows nothing."""
-    rows = channel.time < channel.time[-1] + _LATER[0]
-    time, span, value = channel.time[rows], channel.span[rows], channel.value[rows]
-    return evolve(channel, time=time, span=span, value=value)
+    return channel.at(channel.time < channel.time[-1] + _LATER[0])

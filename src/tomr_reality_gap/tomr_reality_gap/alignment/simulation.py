@@ -6,7 +6,7 @@ tooth off, and what depends on them would be in the wrong place.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +17,7 @@ from tomr_power_model.drive.motion import turned_angle
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.dynamics import batch
 from tomr_power_model.dynamics import layout as at
-from tomr_power_model.dynamics.numbers import laid_out, no_input, timing_of
+from tomr_power_model.dynamics.numbers import laid_out, no_input, timing_of, wheel_records
 from tomr_power_model.dynamics.simulation import Excitation, Readout, Variant, drive, predict
 from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.geometry.kinematics import wheels_to_twist
@@ -203,8 +203,7 @@ class RecordingSimulation:
         Commands are held for whole driver periods; by the rest of its delay all is read earlier.
         """
         numbers = laid_out(vehicle_of(robot))
-        records = numbers[at.HEADER : int(numbers[at.COUPLING])].reshape(WHEELS, -1)
-        records[:, at.ASK : at.ASK + 3] = self._asked
+        wheel_records(numbers)[:, at.ASK : at.ASK + 3] = self._asked
         numbers[at.YAW_STEP] = numbers[at.LINEAR_STEP] / self.robot.robot_radius
         delay = robot.controller.delay - self.robot.controller.delay
         late = round(delay / self.timeline.period)
@@ -214,9 +213,7 @@ class RecordingSimulation:
     @cached_property
     def _asked(self) -> Array:
         """Wheel speeds per twist as the drivers believe, (n, 3)."""
-        numbers = laid_out(vehicle_of(self.robot))
-        records = numbers[at.HEADER : int(numbers[at.COUPLING])].reshape(WHEELS, -1)
-        return records[:, at.ASK : at.ASK + 3]
+        return wheel_records(laid_out(vehicle_of(self.robot)))[:, at.ASK : at.ASK + 3]
 
 
 def predict_all(
@@ -227,22 +224,11 @@ def predict_all(
 ) -> Array:
     """As `RecordingSimulation.predict`, of recordings one after another, (v + l, n)."""
     found = np.empty((len(robots) + len(later), sum(item.size for item in simulations)))
-    _filled(found, [item.predicted(robots, tick, later) for item in simulations])
-    return found
+    return filled(found, [item.predicted(robots, tick, later) for item in simulations])
 
 
-def respond_all(
-    simulations: Sequence[RecordingSimulation], robot: Robot, torques: Sequence[Array]
-) -> Array:
-    """Rows of `RecordingSimulation.respond`, of recordings one after another, (v, n)."""
-    found = np.empty((len(torques[0]), sum(item.size for item in simulations)))
-    _filled(
-        found, [item.respond(robot, one) for item, one in zip(simulations, torques, strict=True)]
-    )
-    return found
-
-
-def _filled(found: Array, parts: Sequence[Iterator[Array]]) -> None:
+def filled(found: Array, parts: Iterable[Iterator[Array]]) -> Array:
+    """An array filled with the rows of recordings, one recording beside the other."""
     first = 0
     for part in parts:
         last = first
@@ -250,6 +236,7 @@ def _filled(found: Array, parts: Sequence[Iterator[Array]]) -> None:
             last = first + len(values)
             found[row, first:last] = values
         first = last
+    return found
 
 
 def _times(recorded: Drive) -> list[Array]:
@@ -273,8 +260,4 @@ def _phase(times: Array, period: float) -> float:
 
 def _inside(channel: Channel, start: float, end: float) -> Channel:
     """Without what was measured before the encoders began or after all else had ended."""
-    rows = (channel.time - channel.span >= start) & (channel.time <= end)
-    if rows.all():
-        return channel
-    time, span, value = channel.time[rows], channel.span[rows], channel.value[rows]
-    return evolve(channel, time=time, span=span, value=value)
+    return channel.at((channel.time - channel.span >= start) & (channel.time <= end))

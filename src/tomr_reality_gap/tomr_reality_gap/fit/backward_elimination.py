@@ -3,10 +3,11 @@
 import numpy as np
 from attrs import evolve
 
+from tomr_reality_gap.alignment.simulation import Tick
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection, finding_cost
 from tomr_reality_gap.fit.model import Model
-from tomr_reality_gap.fit.refine import FittedModel, Tick, refine
+from tomr_reality_gap.fit.refine import FittedModel, refine
 
 _STAND_INS = 4  # alternatives that are tried for each finding
 _SWAPS = 3  # at most

@@ -55,9 +55,8 @@ def check_same_robot(dataset: Dataset, last: Round) -> None:
 def _estimates(dataset: Dataset, last: Round, number: int) -> dict[str, _Estimate]:
     """What one recording says by itself about the parameters that last."""
     jacobian, weight = last.jacobian, last.noise.weight
-    sizes = [sum(len(channel.time) for channel in item.channels) for item in dataset.simulations]
-    first = sum(sizes[:number])
-    rows = slice(first, first + sizes[number])
+    first = sum(item.size for item in dataset.simulations[:number])
+    rows = slice(first, first + dataset.simulations[number].size)
     kept = jacobian.kept
     matrix = jacobian.matrix[rows, :kept].astype(np.float64)
     matrix[:, jacobian.nuisance] *= _BEYOND

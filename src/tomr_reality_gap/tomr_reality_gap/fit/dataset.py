@@ -11,8 +11,8 @@ from tomr_reality_gap.alignment.channels import DRAWN_KINDS, Channel
 from tomr_reality_gap.alignment.simulation import (
     RecordingSimulation,
     Tick,
+    filled,
     predict_all,
-    respond_all,
 )
 
 Array = NDArray[np.float64]
@@ -71,7 +71,9 @@ class Dataset:
 
     def respond(self, robot: Robot, torques: Sequence[Array]) -> Array:
         """As `RecordingSimulation.respond`, torques one array (v, count, 3) per recording."""
-        return respond_all(self.simulations, robot, torques)
+        found = np.empty((len(torques[0]), len(self.value)))
+        pairs = zip(self.simulations, torques, strict=True)
+        return filled(found, (item.respond(robot, torque) for item, torque in pairs))
 
     def sensor_nuisances(self, value: Array, time_derivative: Array) -> Array:
         """Derivatives by what the sensors may be off, in units of prior_stds, (n, k).
@@ -87,8 +89,7 @@ class Dataset:
             columns.append(column)
 
         for item in self.simulations:
-            size = sum(len(channel.time) for channel in item.channels)
-            add(slice(row, row + size), -_DELAY_STD * time_derivative)
+            add(slice(row, row + item.size), -_DELAY_STD * time_derivative)
             for channel in item.channels:
                 part = slice(row, row := row + len(channel.time))
                 if channel.kind in DRAWN_KINDS:

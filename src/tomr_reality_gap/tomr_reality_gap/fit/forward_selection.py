@@ -15,11 +15,12 @@ from attrs import evolve, field, frozen
 
 from tomr_power_model.estimation.discrepancy import SIMULATOR
 from tomr_power_model.estimation.noise import Local, Noise, noise_of
+from tomr_reality_gap.alignment.simulation import Tick
 from tomr_reality_gap.fit.basis_responses import BasisResponses
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.jacobian import Jacobian, linearise
 from tomr_reality_gap.fit.model import Model
-from tomr_reality_gap.fit.refine import FittedModel, State, Tick, refine
+from tomr_reality_gap.fit.refine import FittedModel, State, refine
 from tomr_reality_gap.fit.screening import Screened, screen
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 

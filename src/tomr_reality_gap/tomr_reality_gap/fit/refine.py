@@ -1,6 +1,6 @@
 """Models of the recordings brought to their best offsets with the simulator."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from attrs import frozen
@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from tomr_power_model.estimation.gauss_newton import Linearisation, Start, maximise
 from tomr_power_model.estimation.noise import Noise
 from tomr_power_model.estimation.parameter import bounds, prior_stds
+from tomr_reality_gap.alignment.simulation import Tick
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.jacobian import Jacobian
 from tomr_reality_gap.fit.model import Model
 
 Array = NDArray[np.float64]
-Tick = Callable[[int], None]
 State = tuple[Model, Array]  # a model, and its sensor nuisances [prior standard deviations]
 
 _LARGEST_STEP = 4.0  # prior standard deviations

@@ -14,13 +14,13 @@ from tomr_power_model.estimation.linear_gaussian import Gram, Matrix, solve
 from tomr_power_model.estimation.noise import Noise, rows_of
 from tomr_power_model.estimation.parameter import prior_stds
 from tomr_power_model.robot import Robot
-from tomr_reality_gap.alignment.simulation import RecordingSimulation
+from tomr_reality_gap.alignment.simulation import RecordingSimulation, Tick
 from tomr_reality_gap.fit.basis_responses import BasisResponses, own_rows
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection
 from tomr_reality_gap.fit.jacobian import linearise
 from tomr_reality_gap.fit.model import Model
-from tomr_reality_gap.fit.refine import Tick, refine
+from tomr_reality_gap.fit.refine import refine
 from tomr_reality_gap.fit.unmodelled import Unmodelled
 from tomr_reality_gap.mismatch.probes import motion_of
 
@@ -75,9 +75,8 @@ class SimulatorBaseline:
 
     def shows(self, unmodelled: Unmodelled, model: Model, basis: BasisResponses) -> bool:
         """Whether half of an effect without a name, or more, is in the simulation too."""
-        robot, places = self.described, [family.variable for family in basis.families]
+        robot, family = self.described, unmodelled.family
         motions = [motion_of(item, robot, item.run(robot)) for item in self.dataset.simulations]
-        family = basis.families[places.index(unmodelled.family.variable)]
         torques = [family.torques(motion) * basis.size for motion in motions]
         response = (self.dataset.respond(robot, torques) - self.dataset.predict([robot])[0]).T
         parts = []
@@ -125,5 +124,4 @@ def beyond_baseline(
         states = [(model.without(worst), found.best.sensors)]
         best = refine(dataset, states, last.jacobian, found.noise, tick=tick)[0]
         groups = found.alternatives
-        kept = groups if best.model.hypotheses else ()
-        found = evolve(found, best=best, alternatives=(*kept[:worst], *kept[worst + 1 :]))
+        found = evolve(found, best=best, alternatives=(*groups[:worst], *groups[worst + 1 :]))

@@ -15,6 +15,7 @@ from tomr_reality_gap.explanation import Shape
 from tomr_reality_gap.fit.basis_responses import BasisResponses
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.jacobian import Jacobian
+from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 from tomr_reality_gap.mismatch.probes import Family, Motion
 
@@ -75,7 +76,7 @@ class Unmodelled:
     evidence: float  # log, against nothing but the named model, of all wheels that have it
     wheels: tuple[int, ...]
     columns: Array  # of its basis functions at those wheels, whitened, (n, k)
-    shapes: tuple[Shape, ...]
+    shape: Shape  # at the first of those wheels
     weights: tuple[Array, ...]  # of the basis functions at those wheels [N m], (k,) each
 
     def torque(self, motion: Motion) -> Array:
@@ -103,27 +104,18 @@ def _fitted(rest: Remainder, basis: BasisResponses, family: Family, response: Ar
     count, first = response.shape[1], len(rest.gram.vector)
     parts = [_only(response * rest.weight[:, None], rows) for rows in basis.rows]
     alone = rest.solved(()).evidence
-    gains = [rest.solved((part,)).evidence - alone for part in parts]
-    least = max(_WHEEL_SHARE * max(gains), _NEEDED)
-    wheels = tuple(wheel for wheel in range(WHEELS) if gains[wheel] > least)
-    wheels = wheels or (int(np.argmax(gains)),)
+    by_wheel = [rest.solved((part,)).evidence - alone for part in parts]
+    least = max(_WHEEL_SHARE * max(by_wheel), _NEEDED)
+    wheels = tuple(wheel for wheel in range(WHEELS) if by_wheel[wheel] > least)
+    wheels = wheels or (int(np.argmax(by_wheel)),)
     chosen = [parts[wheel] for wheel in wheels]
     whole = rest.solved(chosen)
-    covariances = whole.covariance
-    names, shapes, weights = rest.dataset.simulations[0].robot.wheel_names, [], []
-    for place, wheel in enumerate(wheels):
-        rows = first + place * count + np.arange(count)
-        weights.append(basis.size * whole.mean[rows])
-        covariance = basis.size**2 * covariances[np.ix_(rows, rows)]
-        shapes.append(_shape(family, names[wheel], weights[-1], covariance))
-    return Unmodelled(
-        family,
-        whole.evidence - alone,
-        wheels,
-        np.concatenate(chosen, axis=1),
-        tuple(shapes),
-        tuple(weights),
-    )
+    weights = tuple(basis.size * part for part in np.split(whole.mean[first:], len(wheels)))
+    rows = slice(first, first + count)
+    name = rest.dataset.simulations[0].robot.wheel_names[wheels[0]]
+    shape = _shape(family, name, weights[0], basis.size**2 * whole.covariance[rows, rows])
+    columns = np.concatenate(chosen, axis=1)
+    return Unmodelled(family, whole.evidence - alone, wheels, columns, shape, weights)
 
 
 def _only(columns: Array, rows: NDArray[np.intp]) -> Array:
@@ -142,35 +134,42 @@ def _shape(family: Family, wheel: str, weights: Array, covariance: Array) -> Sha
     return Shape(family.variable, wheel, at, curve, curve - half, curve + half)
 
 
-def still_needed(
+def gains(
     rest: Remainder,
     jacobian: Jacobian,
-    unmodelled: Unmodelled,
     changes: Sequence[Array],
-) -> list[bool]:
-    """Whether each named finding is needed once the unmodelled effect's torques are there.
+    unmodelled: Unmodelled | None = None,
+) -> list[float]:
+    """Log evidence that each named finding brings, all else fitted anew without it.
 
     Args:
         rest: what the model with all findings leaves.
         jacobian: derivatives at it.
-        unmodelled: the effect without a name.
         changes: what each of its findings adds to the values, (n,).
+        unmodelled: an effect without a name whose torques are there as well.
     """
-    both = np.concatenate([rest.base, unmodelled.columns], axis=1)
+    both = rest.base
+    if unmodelled is not None:
+        both = np.concatenate([both, unmodelled.columns], axis=1)
     everything = list(range(both.shape[1]))
     gram = Gram.of(both, rest.residual)
-    whole = _likelihood(gram, everything)
-    least = max(_NEEDED, SIMULATOR.beside_unmodelled * unmodelled.evidence)
-    needed, robot = [], rest.dataset.simulations[0].robot
-    for part, change, hypothesis in zip(
-        jacobian.own, changes, jacobian.model.hypotheses, strict=True
-    ):
+    whole, found = _likelihood(gram, everything), []
+    for part, change in zip(jacobian.own, changes, strict=True):
         others = [row for row in everything if not part.start <= row < part.stop]
         lacking = rest.residual + change * rest.weight
         other = Gram(gram.matrix, both.T @ lacking, float(lacking @ lacking))
-        gain = whole - _likelihood(other, others)
-        needed.append(gain > least and not _contradicts(unmodelled, hypothesis, robot))
-    return needed
+        found.append(whole - _likelihood(other, others))
+    return found
+
+
+def still_needed(model: Model, gained: Sequence[float], unmodelled: Unmodelled) -> list[bool]:
+    """Whether each finding of a model is needed, from what it brings beside the unmodelled one."""
+    least = max(_NEEDED, SIMULATOR.beside_unmodelled * unmodelled.evidence)
+    robot = model.described.robot
+    return [
+        gain > least and not _contradicts(unmodelled, hypothesis, robot)
+        for gain, hypothesis in zip(gained, model.hypotheses, strict=True)
+    ]
 
 
 def _contradicts(unmodelled: Unmodelled, hypothesis: Hypothesis, robot: Robot) -> bool:

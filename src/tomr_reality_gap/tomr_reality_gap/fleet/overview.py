@@ -3,17 +3,9 @@
 import json
 from collections import Counter
 from collections.abc import Sequence
-from importlib.resources import files
-
-from jinja2 import Environment, StrictUndefined
 
 from tomr_reality_gap.fleet.outcome import BAD_INPUT, FAILED, Outcome
-from tomr_reality_gap.report.words import (
-    effect_words,
-    number_words,
-    percent_words,
-    place_words,
-)
+from tomr_reality_gap.report.html import rendered
 
 HTML, JSON = "overview.html", "overview.json"
 _VERDICTS = (FAILED, BAD_INPUT, "mismatch", "match")  # in the order of their need to be seen
@@ -21,14 +13,8 @@ _VERDICTS = (FAILED, BAD_INPUT, "mismatch", "match")  # in the order of their ne
 
 def overview_page(outcomes: Sequence[Outcome]) -> str:
     """The page as HTML; it links to <case>/report.html."""
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    environment.filters.update(
-        number=number_words, percent=percent_words, effect=effect_words, place=place_words
-    )
-    template = environment.from_string(
-        files("tomr_reality_gap.fleet").joinpath("overview.html.j2").read_text(encoding="utf-8")
-    )
-    return template.render(
+    return rendered(
+        "fleet/overview.html.j2",
         sentence=counted(outcomes),
         outcomes=in_order(outcomes),
         effects=_by_effect(in_order(outcomes)),

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomr_power_model.dynamics import layout as at
-from tomr_power_model.dynamics.numbers import laid_out, timing_of
+from tomr_power_model.dynamics.numbers import laid_out, timing_of, wheel_records
 from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.effects.scales import Scales
-from tomr_power_model.robot import GRAVITY, WHEELS, Robot
+from tomr_power_model.robot import GRAVITY, Robot
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ def traction_ratios_of(robot: Robot, speed: Array, period: float) -> tuple[float
         period: s.
     """
     p = laid_out(vehicle_of(robot))
-    wheels = p[at.HEADER : int(p[at.COUPLING])].reshape(WHEELS, -1)
+    wheels = wheel_records(p)
     to_twist = wheels[:, at.TO_TWIST : at.TO_TWIST + 3]
     twist = speed @ to_twist
     # In a turning frame a momentum changes by omega x m v besides.

@@ -1,12 +1,14 @@
 """Measured against simulated, before and after, and what that amounts to."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.statistics import robust_scale
+from tomr_power_model.model.scores import accuracy
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
@@ -35,13 +37,26 @@ def simulated(
 
 
 def comparison(
-    simulation: RecordingSimulation, values: Array, run: Run, is_held_out: bool
+    simulation: RecordingSimulation,
+    values: Array,
+    run: Run,
+    *,
+    is_held_out: bool,
+    noise: Mapping[str, float] = MappingProxyType({}),
 ) -> Comparison:
-    """One recording, simulated before and after, (2, n); `run` is of `simulation.run` after."""
+    """One recording, simulated before and after, (2, n).
+
+    Args:
+        simulation: of the recording.
+        values: of all its channels, before and after.
+        run: of `simulation.run` after.
+        is_held_out: whether nothing was fitted to it.
+        noise: standard deviation by channel; of others it is taken from what is left after.
+    """
     rows = rows_of(simulation.channels)
-    residual = np.concatenate([channel.value for channel in simulation.channels]) - values[1]
     sigma = tuple(
-        np.full(part.stop - part.start, robust_scale(residual[part]) + 1e-9) for part in rows
+        noise.get(channel.name, robust_scale(channel.value - values[1, part]) + 1e-9)
+        for channel, part in zip(simulation.channels, rows, strict=True)
     )
     return Comparison(
         name=simulation.recorded.name,
@@ -59,20 +74,18 @@ def score_of(held: Sequence[Comparison]) -> Score | None:
     """Pooled over the motors of all held-out recordings; of the total where none is measured."""
     kinds = {channel.kind for item in held for channel in item.channels}
     kind = next((kind for kind in DRAWN_KINDS if kind in kinds), None)
-    measured, before, after, spread = [], [], [], []
-    for item in held:
-        for channel, first, last in zip(item.channels, item.before, item.after, strict=True):
-            if channel.kind == kind:
-                measured.append(channel.value)
-                before.append(channel.value - first)
-                after.append(channel.value - last)
-                spread.append(channel.value - channel.value.mean())
-    if not measured:
+    rows = [
+        (channel.value, old, new, channel.value - channel.value.mean())
+        for item in held
+        for channel, old, new in zip(item.channels, item.before, item.after, strict=True)
+        if channel.kind == kind
+    ]
+    if not rows:
         return None
-    total = np.abs(np.concatenate(measured)).sum()
-    deviation = np.sqrt(np.mean(np.concatenate(spread) ** 2))
-    errors = [np.concatenate(part) for part in (before, after)]
-    nrmse = [float(np.sqrt(np.mean(error**2)) / deviation) for error in errors]
-    accuracy = [float(1.0 - np.abs(error).sum() / total) for error in errors]
+    value, before, after, spread = (np.concatenate(part) for part in zip(*rows, strict=True))
+    deviation = np.sqrt(np.mean(spread**2))
+    first, last = (
+        float(np.sqrt(np.mean((value - item) ** 2)) / deviation) for item in (before, after)
+    )
     quantity = "motor current [A]" if kind == "current" else "power [W]"
-    return Score(nrmse[0], nrmse[1], accuracy[0], accuracy[1], quantity)
+    return Score(first, last, accuracy(value, before), accuracy(value, after), quantity)

@@ -108,7 +108,7 @@ def _zoom(panel: Axes, view: View, found: bool) -> None:
 def _difference(panel: Axes, view: View, found: bool) -> None:
     """Measured - simulated: samples faint, their running mean bold, the noise as a band."""
     channel, rows = view.comparison.channels[view.channel], _rows(view)
-    time, sigma = channel.time[rows], view.comparison.sigma[view.channel][rows]
+    time, sigma = channel.time[rows], view.comparison.sigma[view.channel]
     over = max(1, len(time) // _SMOOTHED)
     panel.fill_between(time, -2 * sigma, 2 * sigma, color=MEASURED, alpha=0.2, lw=0)
     for _, colour, simulated in _sides(view.comparison, view.channel, found):

@@ -7,6 +7,7 @@ from importlib.resources import files
 import numpy as np
 from attrs import frozen
 from jinja2 import Environment, StrictUndefined
+from numpy.typing import NDArray
 
 from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.explanation import Comparison, Explanation, Finding
@@ -23,8 +24,11 @@ from tomr_reality_gap.report.words import (
 
 _MOST_DRIVES = 4  # with a picture each
 _MOST_MAPS = 6
+_MOST_CHANNELS = 3  # named beside a finding
+_LEAST_SHARE = 0.01
 
 Tick = Callable[[], None]
+Array = NDArray[np.float64]
 
 
 @frozen
@@ -42,11 +46,9 @@ class ChannelLine:
 
 def report_page(explanation: Explanation, robot: str, tick: Tick = lambda: None) -> str:
     """The page as HTML; `robot` names its description, `tick` is called after each picture."""
-    template = _environment().from_string(
-        files("tomr_reality_gap.report").joinpath("report.html.j2").read_text(encoding="utf-8")
-    )
     found = bool(explanation.findings)
-    return template.render(
+    return rendered(
+        "report/report.html.j2",
         explanation=explanation,
         robot=robot,
         found=found,
@@ -87,24 +89,23 @@ def _spread(channel: Channel) -> float:
     return math.nan if channel.kind == "voltage" else float(np.std(channel.value))
 
 
-def _pair(
-    value: figures.Array, one: Comparison, number: int, scale: float | figures.Array
-) -> tuple[float, float]:
-    """RMS of (measured - simulated) / scale, before and after; NaN where the scale is 0."""
-    scale = np.where(np.asarray(scale) > 0.0, scale, np.nan)
+def _pair(value: Array, one: Comparison, number: int, scale: float) -> tuple[float, float]:
+    """RMS of measured - simulated over a scale, before and after; NaN where the scale is 0."""
     before, after = (
-        float(np.sqrt(np.mean(((value - simulated[number]) / scale) ** 2)))
+        float(np.sqrt(np.mean((value - simulated[number]) ** 2))) / (scale or math.nan)
         for simulated in (one.before, one.after)
     )
     return before, after
 
 
-def _environment() -> Environment:
+def rendered(template: str, **values: object) -> str:
+    """A page of this package from its template and what that shows."""
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     environment.filters.update(
         number=number_words, percent=percent_words, effect=effect_words, place=place_words
     )
-    return environment
+    text = files("tomr_reality_gap").joinpath(template).read_text(encoding="utf-8")
+    return environment.from_string(text).render(values)
 
 
 def _row(finding: Finding) -> Mapping[str, object]:
@@ -115,8 +116,14 @@ def _row(finding: Finding) -> Mapping[str, object]:
         "parameters": [
             (name, estimate_words(estimate)) for name, estimate in finding.parameters.items()
         ],
-        "channels": sorted(finding.located.channels.items(), key=lambda item: -item[1])[:3],
+        "channels": _main_channels(finding.located.channels),
     }
+
+
+def _main_channels(shares: Mapping[str, float]) -> list[tuple[str, float]]:
+    """The few channels that hold a percent or more, the largest share first."""
+    shown = [item for item in shares.items() if item[1] >= _LEAST_SHARE]
+    return sorted(shown, key=lambda item: -item[1])[:_MOST_CHANNELS]
 
 
 def _drives(explanation: Explanation) -> list[Comparison]:

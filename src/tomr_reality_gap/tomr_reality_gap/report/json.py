@@ -22,12 +22,15 @@ def report_json(explanation: Explanation) -> str:
 
 def report_fields(explanation: Explanation) -> dict[str, Value]:
     """The report as plain dictionaries; numbers that are not finite become None."""
+    holdout = _score(explanation.score)
+    nrmse = holdout and {key: holdout[key] for key in ("nrmse_before", "nrmse_after")}
     return {
         "verdict": explanation.verdict,
-        "findings": [_finding(finding) for finding in explanation.findings],
+        # The errors on held-out data are those of all findings together.
+        "findings": [{**_finding(item), "holdout": nrmse} for item in explanation.findings],
         "unexplained_share": _number(explanation.unexplained_share),
         "sentence": explanation.sentence,
-        "holdout": _score(explanation.score),
+        "holdout": holdout,
         "smallest_detectable": [
             {"effect": effect, "where": where, "size": size}
             for effect, where, size in explanation.detection_limits
@@ -54,7 +57,6 @@ def _finding(finding: Finding) -> dict[str, Value]:
             "channels": {name: _number(share, 3) for name, share in located.channels.items()},
         },
         "parameters": {name: _estimate(item) for name, item in finding.parameters.items()},
-        "holdout": None,
         "rivals": [
             {
                 "effect": rival.effect,
@@ -67,11 +69,6 @@ def _finding(finding: Finding) -> dict[str, Value]:
         "confidence": _number(finding.confidence, 3),
         "log_evidence": _number(finding.evidence, 1),
     }
-    if finding.holdout is not None:
-        fields["holdout"] = {
-            "nrmse_before": _number(finding.holdout.nrmse_before),
-            "nrmse_after": _number(finding.holdout.nrmse_after),
-        }
     if finding.shape is not None:
         fields["shape"] = _shape(finding.shape)
     return fields

@@ -101,7 +101,7 @@ def whiteness(comparisons: Sequence[Comparison], found: bool) -> str:
             histogram.set_ylabel(f"{name}\ndensity", fontsize=8)
             correlation.set_ylabel("autocorrelation", fontsize=8)
         panels[0].legend(fontsize=7, framealpha=0.8)
-        panels[-2].set_xlabel("residual, in units of noise", fontsize=8)
+        panels[-2].set_xlabel("residual, in units of noise (the ends: all beyond)", fontsize=8)
         panels[-1].set_xlabel("lag, samples (band: by chance)", fontsize=8)
         return png(page)
 

@@ -45,15 +45,12 @@ def best_view(explanation: Explanation) -> View | None:
     if comparison is None or not comparison.channels:
         return None
     finding = leading(explanation)
-    gains = [_gain(comparison, number, finding is not None) for number in _numbers(comparison)]
+    numbers = range(len(comparison.channels))
+    gains = [_gain(comparison, number, finding is not None) for number in numbers]
     channel = _channel(comparison, finding, gains)
     intervals = finding.located.intervals if finding is not None else ()
     time = comparison.channels[channel].time
     return View(comparison, channel, _window(time, gains[channel], intervals))
-
-
-def _numbers(comparison: Comparison) -> range:
-    return range(len(comparison.channels))
 
 
 def _gain(comparison: Comparison, number: int, found: bool) -> Array:

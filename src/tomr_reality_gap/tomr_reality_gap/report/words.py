@@ -6,11 +6,6 @@ from collections.abc import Sequence
 from tomr_power_model.effects import EFFECTS
 from tomr_reality_gap.explanation import Estimate, Finding
 
-_PLACES = {
-    "all_wheels": "all wheels",
-    "body": "body",
-    "supply": "supply",
-}
 _ALIKE = 0.2  # of the width, by which the halves of an interval shown as ± may differ
 
 
@@ -25,7 +20,7 @@ def effect_words(effect: str) -> str:
 
 def place_words(where: Sequence[str]) -> str:
     """Where it acts, in words."""
-    return ", ".join(_PLACES.get(place, place) for place in where)
+    return ", ".join("all wheels" if place == "all_wheels" else place for place in where)
 
 
 def title(finding: Finding) -> str:

@@ -1,0 +1,98 @@
+"""What a report says of each finding: its evidence, its rivals; and of what was not found."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tomr_power_model.estimation.linear_gaussian import Gram
+from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, per_wheel
+from tomr_power_model.robot import read_description, shipped_robot
+from tomr_reality_gap.analysis import detection_limits
+from tomr_reality_gap.findings import log_odds_of
+from tomr_reality_gap.fit.model import Model
+from tomr_reality_gap.fit.refine import FittedModel
+from tomr_reality_gap.fit.unmodelled import Remainder, gains, still_needed
+from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
+
+SAMPLES = 300
+
+
+def _fitted(evidence: float, *effects: str) -> FittedModel:
+    model, none = Model(ParameterisedRobot({}, "made"), (), ()), np.empty(0)
+    for effect in effects:
+        model = model.joined(Hypothesis(effect, ("body",), ()))
+    return FittedModel(model, evidence, 0.0, none, none, none)
+
+
+def test_rivals_stand_in_the_place_of_the_finding_whatever_else_was_kept() -> None:
+    """Of a and b the group for b was made; a is none, as the user's simulation shows it too."""
+    group = [_fitted(100.0, "a", "b"), _fitted(98.0, "a", "c"), _fitted(40.0, "a", "d")]
+    alone = group[0].model.hypotheses[1]
+    assert [(odd, other.effect) for odd, other in log_odds_of(alone, group)] == [
+        (-2.0, "c"),
+        (-60.0, "d"),
+    ]
+    assert log_odds_of(alone, ()) == []
+
+
+def test_each_finding_has_the_evidence_that_is_lost_without_it() -> None:
+    """Half of the energy that nothing else explains; the other finding explains half of each."""
+    random = np.random.default_rng(3)
+    columns = random.standard_normal((SAMPLES, 3))  # one nuisance, two findings
+    columns[:, 2] += columns[:, 1]
+    residual = 0.1 * random.standard_normal(SAMPLES)
+    ones = np.ones(SAMPLES)
+    rest = Remainder(None, residual, columns, ones, Gram.of(columns, residual))  # type: ignore[arg-type]
+    jacobian = SimpleNamespace(own=(slice(1, 2), slice(2, 3)))
+    changes = [4.0 * columns[:, 1], 2.0 * columns[:, 2]]
+    found = gains(rest, jacobian, changes)  # type: ignore[arg-type]
+    assert found == pytest.approx([0.25 * (change @ change) for change in changes], rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("gain", "variable", "wheel", "needed"),
+    [(31.0, "time [s]", 1, True), (29.0, "time [s]", 1, False),
+     (1e6, "wheel angle [rad]", 1, False), (1e6, "wheel angle [rad]", 2, True)],
+)  # fmt: skip
+def test_an_unnamed_effect_leaves_what_brings_evidence_beside_it(
+    gain: float, variable: str, wheel: int, needed: bool
+) -> None:
+    """A third of its own 100; but no sine where the angle of that wheel shows another curve."""
+    wheels = shipped_robot("reference").wheel_names
+    base = per_wheel(dict(read_description("reference")), wheels, "reference")
+    ripple = Hypothesis("drivetrain.torque_ripple", (wheels[1],), ())
+    model = Model(base, (), ()).joined(ripple)
+    effect = SimpleNamespace(
+        evidence=100.0, wheels=(wheel,), family=SimpleNamespace(variable=variable)
+    )
+    assert still_needed(model, [gain], effect) == [needed]  # type: ignore[arg-type]
+
+
+def test_the_smallest_that_would_have_been_seen_brings_just_its_cost() -> None:
+    """One column of 300 samples of white noise, and a nuisance that shows half of it."""
+    random = np.random.default_rng(4)
+    nuisance, own = random.standard_normal((2, SAMPLES))
+    matrix = np.stack([1e4 * nuisance, *(own + nuisance,) * 4], axis=1)
+    size = Parameter("coefficient", ("made",), "N m s", 0.01)
+    candidates = (
+        Hypothesis("friction.viscous", ("all_wheels",), (size,)),
+        Hypothesis("friction.quadratic", ("all_wheels",), (size,), least=0.5),
+        Hypothesis("friction.viscous", ("wheel_1_joint",), (size,)),
+        Hypothesis("parameter.robot.mass", ("body",), (size,)),
+    )
+    jacobian = SimpleNamespace(
+        matrix=matrix,
+        sensors=slice(0, 1),
+        model=SimpleNamespace(names=frozenset()),
+        candidates={item.key: slice(row, row + 1) for row, item in enumerate(candidates, 1)},
+    )
+    step = SimpleNamespace(jacobian=jacobian, noise=SimpleNamespace(weight=np.ones(SAMPLES)))
+    analysis = SimpleNamespace(found=SimpleNamespace(rounds=(step,)), candidates=candidates)
+    information = float(own @ own - (own @ nuisance) ** 2 / (nuisance @ nuisance))
+    expected = 0.01 * math.sqrt(2.0 * (20.0 + math.log1p(information)) / information)
+    assert detection_limits(analysis) == (  # type: ignore[arg-type]
+        ("friction.viscous", "all_wheels", f"coefficient {expected:.2g} N m s"),
+        ("friction.quadratic", "all_wheels", "coefficient 0.5 N m s"),
+    )
