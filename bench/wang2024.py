@@ -26,6 +26,7 @@ from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, TOTAL, ResidualFrame
+from tomr_power_model.calibration.wang2024_samples import read_samples
 from tomr_power_model.cli import run_main
 from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.messages.bag import bag_message
@@ -33,7 +34,6 @@ from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import Robot, load_robot
 from tomr_power_model.wang2024 import Coefficients, Samples, fit_wang2024
-from tomr_power_model.wang2024.recorded import read_samples
 from tomr_sim_bridge.missions import drive, load_mission, start_mission
 from tomr_sim_bridge.plant.samples import build
 from tomr_training.drives import every_value

@@ -12,8 +12,8 @@ from tomr_fault_diag.residuals.frame import RESIDUALS, ResidualFrame, residual_n
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUAL_TOPIC
 from tomr_fault_diag.residuals.messages import frame_of
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.intake import Unusable
-from tomr_power_model.recordings import Recording, header_stamp_ns, resolve_topic
+from tomr_power_model.messages.intake import Unusable, header_stamp_ns
+from tomr_power_model.recordings import Recording, resolve_topic
 
 Array = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from attrs import frozen
 from tomr_demo.score import DIAGNOSTICS as DIAGNOSIS
 from tomr_demo.score import TRUTH
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
-from tomr_power_model.messages.predictions import EXPECTED, prediction_topics
 from tomr_power_model.messages.types import BATTERY, DIAGNOSTICS, IMU, JOINT_STATE, TWIST_STAMPED
 from tomr_power_model.robot import Robot
+from tomr_power_model.topics.predictions import EXPECTED, prediction_topics
 
 ODOMETRY = "nav_msgs/msg/Odometry"
 

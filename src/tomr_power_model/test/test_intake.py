@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from tomr_power_model.messages.bag import bag_header, bag_message
-from tomr_power_model.messages.inputs import Complaints, model_inputs
 from tomr_power_model.messages.intake import (
     Unusable,
     WheelFinder,
@@ -19,6 +18,7 @@ from tomr_power_model.messages.intake import (
 from tomr_power_model.messages.readings import SupplyReading
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import shipped_robot
+from tomr_power_model.topics.inputs import Complaints, model_inputs
 
 STAMP = 1_700_000_000_500_000_000
 WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")

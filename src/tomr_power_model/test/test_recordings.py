@@ -13,9 +13,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.bag import bag_header, bag_message, jazzy_typestore
+from tomr_power_model.messages.intake import header_stamp_ns
 from tomr_power_model.recordings import (
     RecordingWriter,
-    header_stamp_ns,
     open_recording,
     require_topic,
     resolve_topic,

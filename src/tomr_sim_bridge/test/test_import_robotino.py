@@ -12,7 +12,8 @@ import pytest
 
 from tomr_power_model.cli import run_main
 from tomr_power_model.geometry.kinematics import twist_to_wheels
-from tomr_power_model.recordings import header_stamp_ns, open_recording
+from tomr_power_model.messages.intake import header_stamp_ns
+from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import shipped_robot
 from tomr_sim_bridge.cli.import_robotino import import_robotino
 from tomr_sim_bridge.importers.robotino import EPOCH_NS, body_twist, camera_pose

@@ -7,7 +7,8 @@ import pytest
 from matplotlib.image import imread
 
 from tomr_power_model.errors import InputError
-from tomr_power_model.recordings import header_stamp_ns, open_recording
+from tomr_power_model.messages.intake import header_stamp_ns
+from tomr_power_model.recordings import open_recording
 from tomr_sim_bridge.cli.simulate import START_NS, main
 from tomr_sim_bridge.plant.picture import save_picture
 

@@ -11,9 +11,9 @@ from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.messages.bag import bag_message
-from tomr_power_model.messages.inputs import model_inputs
 from tomr_power_model.messages.types import TWIST_STAMPED
 from tomr_power_model.model.predictor import PowerPredictor
+from tomr_power_model.topics.inputs import model_inputs
 from tomr_sim_bridge.missions.drive import drive
 from tomr_sim_bridge.plant import moments
 from tomr_sim_bridge.plant.samples import NANOSECONDS, Sample, build

@@ -9,7 +9,7 @@ from typing import Any
 
 from attrs import frozen
 
-from tomr_power_model.recordings.reader import header_stamp_ns
+from tomr_power_model.messages.bag import NANOSECONDS
 
 Triple = tuple[float, float, float]
 NAN = float("nan")
@@ -18,6 +18,15 @@ _UNKNOWN = (NAN, NAN, NAN)
 
 class Unusable(ValueError):
     """A message that says nothing usable, and why."""
+
+
+def header_stamp_ns(message: Any) -> int | None:
+    """Stamp of a message's header [ns]: 0 where it is unset, None without a header."""
+    try:
+        stamp = message.header.stamp
+    except AttributeError:
+        return None
+    return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
 
 
 def stamp_of(message: Any, receive_ns: int, fallback: bool = False) -> int:

@@ -1,6 +1,5 @@
 """A supply reading as it travels: single precision, current negative while power is drawn."""
 
-import math
 from collections.abc import Sequence
 from typing import Self
 
@@ -42,11 +41,6 @@ def readings(voltages: Sequence[float], currents: Sequence[float]) -> tuple[Supp
         SupplyReading.rounded(voltage, current)
         for voltage, current in zip(voltages, currents, strict=True)
     )
-
-
-def is_known(reading: SupplyReading) -> bool:
-    """Whether a reading says anything: a voltage may be missing, a current may not."""
-    return math.isfinite(reading.current)
 
 
 # What a BatteryState says of a supply that is no battery: the message asks for NaN.

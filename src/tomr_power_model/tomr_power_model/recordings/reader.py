@@ -13,7 +13,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection
 
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.bag import NANOSECONDS, jazzy_typestore
+from tomr_power_model.messages.bag import jazzy_typestore
 from tomr_power_model.recordings.damage import copy_whole_records, is_unclosed_mcap
 from tomr_power_model.recordings.topics import absolute_topic
 
@@ -123,15 +123,6 @@ def open_recording(path: Path | str) -> Iterator[Recording]:
             warning=warning,
             reader=reader,
         )
-
-
-def header_stamp_ns(message: Any) -> int | None:
-    """Return the stamp of a message's header [ns]: 0 where it is unset, None without a header."""
-    try:
-        stamp = message.header.stamp
-    except AttributeError:
-        return None
-    return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
 
 
 def _open(source: Path, stack: ExitStack) -> tuple[AnyReader, str | None]:

@@ -13,6 +13,7 @@ from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from tomr_power_model.cli import run_main
+from tomr_power_model.messages.intake import header_stamp_ns
 from tomr_power_model.nodes.command_line import node_arguments
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
 from tomr_power_model.nodes.stage_node import (
@@ -23,7 +24,6 @@ from tomr_power_model.nodes.stage_node import (
     message_class,
     run_node,
 )
-from tomr_power_model.recordings import header_stamp_ns
 from tomr_power_model.robot.parameters import ParameterSpec, Value
 from tomr_sim_bridge.faults import all_parameters, split_name
 from tomr_sim_bridge.plant.samples import NANOSECONDS, Plain, Sample, build
