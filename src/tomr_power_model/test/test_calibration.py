@@ -125,6 +125,19 @@ def test_intervals_hold_for_correlated_noise() -> None:
     assert 0.90 < np.mean(inside) < 0.995
 
 
+def test_recordings_of_different_encoder_rates_are_fitted_together(make_drive: MakeDrive) -> None:
+    fast, slow = make_drive(ROBOT, 1), make_drive(ROBOT, 2, name="slow")
+    every_second = {
+        name: getattr(slow, name)[::2] for name in ("encoder_time", "position", "velocity")
+    }
+    samples = align([fast, evolve(slow, **every_second)], ROBOT, Timing(span=0.1, window=0.02))
+    assert [item.parts for item in samples] == [2, 1]
+    described = ParameterisedRobot(VALUES, "test")
+    together = Problem(described, (), samples).residual([])
+    alone = [Problem(described, (), (item,)).residual([]) for item in samples]
+    np.testing.assert_array_equal(together, np.concatenate(alone))
+
+
 def test_what_the_drives_do_not_tell_is_said(make_drive: MakeDrive) -> None:
     result = calibrated([make_drive(ROBOT, 1)], Choice())
     told = "\n".join(result.warnings)
