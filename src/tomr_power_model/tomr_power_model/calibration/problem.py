@@ -80,7 +80,8 @@ class Problem:
         points = modelled_power(self.robot(numbers), self._motion)
         ends = np.cumsum([len(item.motion.speed) for item in self.samples])[:-1]
         parts = zip(np.split(points, ends), self.samples, strict=True)
-        return self.measured - np.concatenate([_means(rows, item.parts) for rows, item in parts])
+        modelled = np.concatenate([_means(rows, item.parts) for rows, item in parts])
+        return np.asarray(self.measured - modelled)
 
     def jacobian(
         self, numbers: Array, step: Array, count: Callable[[], None] = lambda: None
