@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from attrs import evolve
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, lsq_linear
 from scipy.stats import multivariate_normal
@@ -17,11 +18,6 @@ from tomr_power_model.estimation.gauss_newton import (
 from tomr_power_model.estimation.linear_gaussian import Gram, solve
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, per_wheel
 from tomr_power_model.estimation.robust import soft_l1
-from tomr_power_model.estimation.statistics import (
-    autocorrelation,
-    autocorrelation_time,
-    robust_scale,
-)
 from tomr_power_model.robot import read_description
 
 Array = NDArray[np.float64]
@@ -119,13 +115,25 @@ def test_hopeless_problems_are_left_alone(linear: tuple[Array, Array]) -> None:
     assert all(numbers == [1] for numbers in asked[1:])
 
 
-def test_autocorrelation_ends_with_each_piece() -> None:
-    """(1, -1, 1, -1) twice: three pairs of product -1 over four squares in each."""
-    alternating = np.array([1.0, -1.0, 1.0, -1.0])
-    assert autocorrelation([alternating, alternating])[1] == pytest.approx(-6.0 / 8.0)
-    assert autocorrelation_time([np.ones(2), np.ones(2)]) == pytest.approx(2.0)
-    assert autocorrelation_time([np.ones(400)], 10, 0.03) > 15.0
-    assert robust_scale(np.array([-1.0, 1.0, 1.0, 50.0])) == pytest.approx(1.4826, rel=1e-4)
+def test_a_step_that_makes_things_worse_is_taken_back_and_a_part_of_it_tried() -> None:
+    """10 atan(x) from x = 2: the step to -2.8 overshoots what it is aimed at, 0."""
+    tried: list[float] = []
+
+    def evaluate(_: Sequence[int], points: Sequence[Array]) -> list[Linearisation]:
+        (x,) = points[0]
+        tried.append(x)
+        return [Linearisation.of(np.array([-10.0 * np.arctan(x)]), np.array([[10 / (1 + x * x)]]))]
+
+    (found,) = maximise([_start([2.0])], evaluate, PRECISE)
+    assert tried[1] < -2.0
+    assert tried[2] == pytest.approx(2.0 + PRECISE.back * (tried[1] - 2.0))
+    assert found.best is not None
+    assert found.best.units == pytest.approx([0.0], abs=1e-6)
+
+    tried.clear()
+    short = evolve(_start([2.0]), largest_step=np.array([0.5]))
+    maximise([short], evaluate, PRECISE)
+    assert tried[:2] == [2.0, 1.5]
 
 
 def test_offsets_stay_within_the_bounds_of_the_description() -> None:
