@@ -17,17 +17,14 @@ import numpy as np
 import yaml
 from attrs import asdict, evolve
 from numpy.typing import NDArray
+from played import frames_of, residuals_of
 
 from tomr_fault_diag.cli.diagnose import STAGE_NODES
-from tomr_fault_diag.diagnosis.offline import diagnose
-from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.calibrated import fit_bands
-from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
 from tomr_power_model.cli import run_main
-from tomr_power_model.recordings import open_recording
-from tomr_power_model.robot import load_robot, read_node_sections, shipped_robot
+from tomr_power_model.robot import read_node_sections, shipped_robot
 from tomr_training.drives import random_drive
 from tomr_training.labels import spread
 from tomr_training.planar.generate import NORMAL, simulate
@@ -72,13 +69,8 @@ def recorded(bags: Sequence[Path], robot: str) -> None:
     parts: list[tuple[Array, Array, Array]] = []
     unit = "W"
     for bag in bags:
-        pipeline = Pipeline(load_robot(robot), settings)
-        frames: list[ResidualFrame] = []
-        with open_recording(bag) as recording:
-            for _, step in diagnose(recording, pipeline):
-                frames.extend(step.frames)
-        residual = np.array([[item.residual for item in frame.residuals] for frame in frames])
-        modelled = np.array([[item.modelled for item in frame.residuals] for frame in frames])
+        frames = frames_of(bag, robot, settings)
+        residual, modelled = residuals_of(frames)
         parts.append((residual, modelled, spread(modelled)))
         unit = next((f.residuals[1].unit for f in frames if not f.residuals[1].stale), unit)
     first, second, third = (np.concatenate(column) for column in zip(*parts, strict=True))
