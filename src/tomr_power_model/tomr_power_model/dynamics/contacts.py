@@ -112,7 +112,8 @@ def held_twist(
     for i in range(n):
         w, z = HEADER + i * stride, STATE_HEADER + i * STATE_WHEEL
         s[z + AXLE_RATE] = times(p, w + ROLL, x, y, yaw)
-        s[z + SIDE_RATE] = times(p, w + ALONG, x, y, yaw)
+        if rows > 1:
+            s[z + SIDE_RATE] = times(p, w + ALONG, x, y, yaw)
     return x, y, yaw
 
 
