@@ -12,23 +12,20 @@ from typing import Any
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
+from record import record_mission
 from rich.console import Console
 from rich.table import Table
+from stages import as_arrays, frames_of
 from tqdm import tqdm
 
-from tomr_fault_diag.diagnosis.offline import diagnose
-from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
-from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, ResidualFrame
+from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS
 from tomr_power_model.calibrate_cli import main as tomr_calibrate
 from tomr_power_model.calibration.problem import modelled_power
 from tomr_power_model.calibration.samples import samples_of
 from tomr_power_model.drive.read import read_drive
-from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.model.scores import accuracy, nrmse
-from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import Robot, load_robot
-from tomr_sim_bridge.missions import drive, load_mission, start_mission
 from tomr_training.drives import every_value
 
 Array = NDArray[np.float64]
@@ -39,7 +36,6 @@ FITTED = (("random_tour", 1), ("random_tour", 2), ("random_tour", 3), ("square",
 UNSEEN = (("random_tour", 11), ("paper_phases", 3), ("circle", 12))
 COLUMNS = ("total", "motor 1", "motor 2", "motor 3")
 PATHS = ("encoders", "streaming", "command")
-_START_NS = 1_700_000_000 * 1_000_000_000
 _WINDOW_S = 0.05  # of a decision
 
 
@@ -78,24 +74,13 @@ def record(job: Job) -> None:
         exact = {"current_noise": 0.0, "voltage_noise": 0.0, "power_rate": 200.0}
         exact |= {"current_resolution": 0.0, "voltage_resolution": 0.0}
         plant = evolve(plant, sensors=evolve(plant.sensors, **exact))
-    mission = load_mission(job.mission)
-    simulation = start_mission(mission, plant, job.mission_seed, _START_NS)
-    with RecordingWriter(job.path) as writer:
-        for samples in drive(mission, simulation, job.mission_seed):
-            for sample in samples:
-                message = to_bag(sample.message)
-                writer.write(sample.topic, sample.message.type_name, message, sample.stamp_ns)
+    record_mission(job.mission, plant, job.mission_seed, job.path)
 
 
 def streamed(bag: Path, robot: str) -> tuple[Array, Array, Array]:
     """Measured, encoder-derived and command-predicted power by decision [W], (n, 3) each."""
-    pipeline = Pipeline(load_robot(robot), DiagnosisSettings.of({}, "bench"))
-    frames: list[ResidualFrame] = []
-    with open_recording(bag) as recording:
-        for _, step in diagnose(recording, pipeline):
-            frames.extend(step.frames)
-    residual = np.array([[item.residual for item in frame.residuals] for frame in frames])
-    modelled = np.array([[item.modelled for item in frame.residuals] for frame in frames])
+    settings = DiagnosisSettings.of({}, "bench")
+    residual, modelled = as_arrays(frames_of(bag, robot, settings))
     motors, encoders = list(MOTORS), list(ENCODERS)
     measured = residual[:, motors] + modelled[:, motors]
     return measured, modelled[:, encoders], modelled[:, motors]

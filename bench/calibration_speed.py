@@ -1,12 +1,12 @@
 """How fast the model is: vectorised over samples, and step by step."""
 
 import time
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
 from attrs import evolve
+from dynamics import REPEATS, fastest
 from rich.console import Console
 
 from tomr_power_model.dynamics.drives import InverseDynamics, WheelMotion
@@ -18,18 +18,7 @@ from tomr_power_model.robot import Robot, load_robot
 _ROWS = 200_000
 _STEPS = 5_000
 _TICKS = 1_000
-_ROUNDS = 5
 _S = 1_000_000_000
-
-
-def _best(run: Callable[[], object]) -> float:
-    """CPU seconds of the fastest round."""
-    found = []
-    for _ in range(_ROUNDS):
-        begin = time.process_time()
-        run()
-        found.append(time.process_time() - begin)
-    return min(found)
 
 
 def _with_drag(robot: Robot) -> Robot:
@@ -76,10 +65,10 @@ def measure_speed() -> dict[str, Any]:
                 model.power(one)
 
         found[name] = {
-            "samples_per_second": _ROWS / _best(partial(model.power, many)),
-            "microseconds_per_sample": 1e6 * _best(single) / _STEPS,
-            "microseconds_per_control_step": 1e6 * _best(steps) / _STEPS,
-            "microseconds_per_decision": min(_streaming(robot) for _ in range(_ROUNDS)),
+            "samples_per_second": _ROWS / fastest(partial(model.power, many)),
+            "microseconds_per_sample": 1e6 * fastest(single) / _STEPS,
+            "microseconds_per_control_step": 1e6 * fastest(steps) / _STEPS,
+            "microseconds_per_decision": min(_streaming(robot) for _ in range(REPEATS)),
         }
     return found
 

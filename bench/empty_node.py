@@ -14,12 +14,12 @@ from rclpy.qos import QoSProfile
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
-from tomr_power_model.messages.inputs import model_inputs
-from tomr_power_model.messages.predictions import EXPECTED, prediction_topics
 from tomr_power_model.messages.types import BATTERY, DIAGNOSTICS, JOINT_STATE, TWIST_STAMPED
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.nodes.stage_node import SENSOR_QOS, STAGE_QOS, message_class, run_node
 from tomr_power_model.robot import shipped_robot
+from tomr_power_model.topics.inputs import model_inputs
+from tomr_power_model.topics.predictions import EXPECTED, prediction_topics
 
 Heard = tuple[str, str, QoSProfile]  # topic, type, QoS
 

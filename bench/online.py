@@ -17,9 +17,9 @@ from processes import command_path, cpu_seconds, running
 from tomr_fault_diag.classifier.messages import TOPIC as DIAGNOSTICS
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.predictions import prediction_topics
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.robot import shipped_robot
+from tomr_power_model.topics.predictions import prediction_topics
 
 NODES = ("power_model", "power_residuals", "fault_classifier")
 _BENCH = Path(__file__).resolve().parent

@@ -30,6 +30,12 @@ def steps_of(bag: Path, pipeline: Pipeline) -> Iterator[tuple[int, Step]]:
             yield receive_ns - recording.start_ns, step
 
 
+def frames_of(bag: Path, robot: str | Path, settings: DiagnosisSettings) -> list[ResidualFrame]:
+    """What the residual stage says of a recording, tick by tick."""
+    pipeline = Pipeline(load_robot(robot), settings)
+    return [frame for _, step in steps_of(bag, pipeline) for frame in step.frames]
+
+
 def as_arrays(frames: Sequence[ResidualFrame]) -> tuple[Array, Array]:
     """Residuals, and the modelled values that they are against, (n, 10) each."""
     residual = [[item.residual for item in frame.residuals] for frame in frames]

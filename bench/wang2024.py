@@ -20,21 +20,18 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
+from record import record_mission
+from stages import as_arrays, frames_of
 from tqdm import tqdm
 
-from tomr_fault_diag.diagnosis.offline import diagnose
-from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
-from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, TOTAL, ResidualFrame
+from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, TOTAL
+from tomr_power_model.calibration.wang2024_samples import read_samples
 from tomr_power_model.cli import run_main
 from tomr_power_model.dynamics.drives import WheelMotion
-from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.model.scores import accuracy, nrmse
-from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import Robot, load_robot
 from tomr_power_model.wang2024 import Coefficients, Samples, fit_wang2024
-from tomr_power_model.wang2024.recorded import read_samples
-from tomr_sim_bridge.missions import drive, load_mission, start_mission
 from tomr_training.drives import every_value
 
 Array = NDArray[np.float64]
@@ -48,7 +45,6 @@ SCORED = (
     ("random_tour", 13),
     ("random_tour", 14),
 )
-_START_NS = 1_700_000_000 * 1_000_000_000
 
 
 @frozen
@@ -74,14 +70,8 @@ def record(planned: tuple[str, int], deviation: float, deviation_seed: int, fold
     """Drive a mission with a seed and keep the recording."""
     name, seed = planned
     plant = deviating(load_robot("reference"), deviation, deviation_seed)
-    mission = load_mission(name)
     path = folder / f"{name}_{seed}"
-    simulation = start_mission(mission, plant, seed, _START_NS)
-    with RecordingWriter(path) as writer:
-        for samples in drive(mission, simulation, seed):
-            for sample in samples:
-                message = to_bag(sample.message)
-                writer.write(sample.topic, sample.message.type_name, message, sample.stamp_ns)
+    record_mission(name, plant, seed, path)
     return path
 
 
@@ -103,13 +93,8 @@ def samples_of(bags: Sequence[Path], robot: Robot) -> Samples:
 
 def play(bag: Path, robot: str, parameters: dict[str, object]) -> Played:
     """A recording through the stages, with the power model that the parameters choose."""
-    pipeline = Pipeline(load_robot(robot), DiagnosisSettings.of(parameters, "bench"))
-    frames: list[ResidualFrame] = []
-    with open_recording(bag) as recording:
-        for _, step in diagnose(recording, pipeline):
-            frames.extend(step.frames)
-    residual = np.array([[item.residual for item in frame.residuals] for frame in frames])
-    modelled = np.array([[item.modelled for item in frame.residuals] for frame in frames])
+    settings = DiagnosisSettings.of(parameters, "bench")
+    residual, modelled = as_arrays(frames_of(bag, robot, settings))
     motors, encoders = list(MOTORS), list(ENCODERS)
 
     def columns(of_motors: Array, total: Array) -> Array:

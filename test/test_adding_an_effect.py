@@ -13,6 +13,7 @@ import pytest
 import rclpy
 import yaml
 from attrs import evolve
+from effect_samples import SCALES
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -25,7 +26,6 @@ from tomr_power_model.dynamics.simulation import Simulation, Steps
 from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.effects import EFFECTS, Effect, EffectParameter, HypothesisPrior, Wheel
 from tomr_power_model.effects.missions import SPEEDS
-from tomr_power_model.effects.scales import Scales
 from tomr_power_model.errors import InputError
 from tomr_power_model.estimation.parameter import per_wheel
 from tomr_power_model.nodes.robot_parameters import declare_robot
@@ -126,22 +126,7 @@ def test_calibration_fits_it_by_default(values: dict[str, object]) -> None:
 
 def test_the_gap_tool_offers_it_as_a_hypothesis() -> None:
     base = per_wheel(read_description("reference"), WHEELS, "robot.yaml")
-    scales = Scales(
-        torque=0.1,
-        speed=5.0,
-        current=0.2,
-        power=2.0,
-        copper=0.1,
-        load=50.0,
-        radius=0.05,
-        arm=0.2,
-        mass=15.0,
-        gear=20.0,
-        voltage=24.0,
-        duration=60.0,
-        period=0.005,
-    )
-    found = [item for item in catalogue(base, WHEELS, scales, 0.02) if item.effect == EFFECT]
+    found = [item for item in catalogue(base, WHEELS, SCALES, 0.02) if item.effect == EFFECT]
     assert [item.where for item in found] == [("all_wheels",), *((wheel,) for wheel in WHEELS)]
     (size,) = found[0].parameters
     assert (size.unit, size.lower, size.upper) == ("s^2/rad^2", 0.0, 0.1)

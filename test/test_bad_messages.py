@@ -17,10 +17,10 @@ from sensor_msgs.msg import BatteryState, JointState
 
 from tomr_fault_diag.classifier.messages import NAME
 from tomr_fault_diag.residuals.frame import residual_names
-from tomr_power_model.messages.predictions import EXPECTED, prediction_topics
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.nodes.stage_node import STAGE_QOS
 from tomr_power_model.robot import shipped_robot
+from tomr_power_model.topics.predictions import EXPECTED, prediction_topics
 
 ROBOT = shipped_robot("reference")
 ROBOT_FILE = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")

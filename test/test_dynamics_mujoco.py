@@ -19,9 +19,7 @@ from tomr_power_model.dynamics.simulation import Simulation, Steps
 from tomr_power_model.dynamics.vehicle import (
     Vehicle,
     WheelPlace,
-    mecanum_wheel,
     omni_wheel,
-    plain_wheel,
     vehicle_of,
 )
 from tomr_power_model.robot import shipped_robot
@@ -51,11 +49,11 @@ def four_omni() -> Sequence[WheelPlace]:
 
 
 def four_mecanum() -> Sequence[WheelPlace]:
-    return [mecanum_wheel(x, y, 0.0, math.copysign(0.25 * math.pi, x * y)) for x, y in CORNERS]
+    return [WheelPlace(x, y, 0.0, math.copysign(0.25 * math.pi, x * y)) for x, y in CORNERS]
 
 
 def two_driven() -> Sequence[WheelPlace]:
-    return [plain_wheel(0.0, 0.15, 0.0), plain_wheel(0.0, -0.15, 0.0)]
+    return [WheelPlace(0.0, y, 0.0, None) for y in (0.15, -0.15)]
 
 
 def on(wheels: Sequence[WheelPlace]) -> Vehicle:

@@ -17,10 +17,10 @@ from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_power_model.messages.bag import jazzy_typestore, to_bag
 from tomr_power_model.messages.outgoing import TYPES, DiagnosticMessage, JointMessage, SupplyMessage
-from tomr_power_model.messages.predictions import EXPECTED, prediction_topics
 from tomr_power_model.nodes.stage_node import STAGE_QOS, message_class
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import shipped_robot
+from tomr_power_model.topics.predictions import EXPECTED, prediction_topics
 
 BAG = Path(__file__).parents[1] / "bags" / "circle_encoder_lost"
 ROBOT = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")

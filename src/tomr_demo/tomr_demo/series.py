@@ -15,8 +15,8 @@ from tomr_power_model.drive.sources import TOTAL_TOPIC
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.intake import Unusable, header_stamp_ns
 from tomr_power_model.messages.plain import NANOSECONDS
-from tomr_power_model.messages.predictions import TOTAL as TOTAL_PREDICTED
 from tomr_power_model.recordings import Recording, resolve_topic
+from tomr_power_model.topics.predictions import TOTAL as TOTAL_PREDICTED
 
 Array = NDArray[np.float64]
 

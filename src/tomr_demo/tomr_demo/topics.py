@@ -5,7 +5,6 @@ from attrs import frozen
 from tomr_demo.score import DIAGNOSTICS as DIAGNOSIS
 from tomr_demo.score import TRUTH
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
-from tomr_power_model.messages.predictions import EXPECTED, prediction_topics
 from tomr_power_model.messages.types import (
     BATTERY,
     DIAGNOSTICS,
@@ -15,6 +14,7 @@ from tomr_power_model.messages.types import (
     TWIST_STAMPED,
 )
 from tomr_power_model.robot import Robot
+from tomr_power_model.topics.predictions import EXPECTED, prediction_topics
 
 # The processes, in the order in which data passes through them, and the modules they run.
 PROCESSES = {

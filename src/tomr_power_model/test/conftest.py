@@ -15,13 +15,7 @@ from tomr_power_model.drive.record import Drive
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.dynamics.simulation import Simulation, Steps
-from tomr_power_model.dynamics.vehicle import (
-    Vehicle,
-    mecanum_wheel,
-    omni_wheel,
-    plain_wheel,
-    vehicle_of,
-)
+from tomr_power_model.dynamics.vehicle import Vehicle, WheelPlace, omni_wheel, vehicle_of
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.messages.bag import bag_header, bag_message
 from tomr_power_model.messages.types import BATTERY, JOINT_STATE, TWIST, TWIST_STAMPED
@@ -170,9 +164,9 @@ def _of_kind(kind: str) -> Vehicle:
         angles = [math.pi * (0.25 + 0.5 * wheel) for wheel in range(4)]
         wheels = [omni_wheel(0.2 * math.cos(a), 0.2 * math.sin(a), a + math.pi / 2) for a in angles]
     elif kind == "four_mecanum":  # the rollers on the floor lie along a diamond's sides
-        wheels = [mecanum_wheel(x, y, 0.0, math.copysign(math.pi / 4, x * y)) for x, y in corners]
+        wheels = [WheelPlace(x, y, 0.0, math.copysign(math.pi / 4, x * y)) for x, y in corners]
     elif kind == "two_driven":
-        wheels = [plain_wheel(0.0, 0.15, 0.0), plain_wheel(0.0, -0.15, 0.0)]
+        wheels = [WheelPlace(0.0, y, 0.0, None) for y in (0.15, -0.15)]
     else:
         return vehicle
     n = len(wheels)

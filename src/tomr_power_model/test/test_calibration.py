@@ -10,8 +10,9 @@ from scipy.ndimage import maximum_filter1d
 from tomr_power_model.calibration.calibrate import Result, Timing, align, calibrate
 from tomr_power_model.calibration.fit import fit
 from tomr_power_model.calibration.parameters import Choice, choose
-from tomr_power_model.calibration.problem import Problem, modelled_power
+from tomr_power_model.calibration.problem import Problem, determined, modelled_power
 from tomr_power_model.calibration.samples import Samples, samples_of
+from tomr_power_model.calibration.structure import structure_warnings
 from tomr_power_model.drive.motion import wheel_motion
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.dynamics.drives import InverseDynamics, WheelMotion
@@ -125,6 +126,52 @@ def test_intervals_hold_for_correlated_noise() -> None:
     assert 0.90 < np.mean(inside) < 0.995
 
 
+def test_recordings_of_different_encoder_rates_are_fitted_together(make_drive: MakeDrive) -> None:
+    fast, slow = make_drive(ROBOT, 1), make_drive(ROBOT, 2, name="slow")
+    every_second = {
+        name: getattr(slow, name)[::2] for name in ("encoder_time", "position", "velocity")
+    }
+    samples = align([fast, evolve(slow, **every_second)], ROBOT, Timing(span=0.1, window=0.02))
+    assert [item.parts for item in samples] == [2, 1]
+    described = ParameterisedRobot(VALUES, "test")
+    together = Problem(described, (), samples).residual([])
+    alone = [Problem(described, (), (item,)).residual([]) for item in samples]
+    np.testing.assert_array_equal(together, np.concatenate(alone))
+
+
+@pytest.mark.parametrize(("shift", "word"), [(0.03, "late"), (-0.03, "early")])
+def test_a_power_sensor_that_comes_late_is_named(
+    make_drive: MakeDrive, shift: float, word: str
+) -> None:
+    drive = make_drive(ROBOT, 1)
+    shifted = evolve(drive, power_time=drive.power_time + shift)
+    told = structure_warnings(align([shifted], ROBOT, TIMING), ROBOT)
+    late = [line for line in told if f"{word} against joint_states" in line]
+    topics = [line.partition(" ")[0] for line in late]
+    assert topics == [f"{name}/power" for name in ROBOT.wheel_topics]
+
+
+def test_missing_physics_is_suspected_where_the_misfit_follows_speed(make_drive: MakeDrive) -> None:
+    windy = {"friction.quadratic": ({"coefficient": 2e-3},) * 3}
+    real = evolve(ROBOT, physics={**ROBOT.physics, **windy})
+    samples = align([make_drive(real, 1)], ROBOT, TIMING)
+    (line,) = structure_warnings(samples, ROBOT)
+    assert "missing physics: run tomr_gap explain" in line
+    assert line.endswith("depends on speed)")
+    assert structure_warnings(samples, real) == []
+
+
+def test_wheels_at_rest_say_nothing_where_drivers_hold_them(make_drive: MakeDrive) -> None:
+    (samples,) = align([make_drive(ROBOT, 1)], ROBOT, TIMING)
+    still = np.abs(samples.motion.speed) < 0.15
+    assert still.any()
+    left_out = np.isnan(determined(samples, ROBOT)) & np.isfinite(samples.measured)
+    np.testing.assert_array_equal(left_out[:, :3], still & np.isfinite(samples.measured[:, :3]))
+    assert left_out[still.all(axis=1), 3].all()
+    loose = evolve(ROBOT, controller=evolve(ROBOT.controller, integral=0.0))
+    np.testing.assert_array_equal(determined(samples, loose), samples.measured)
+
+
 def test_what_the_drives_do_not_tell_is_said(make_drive: MakeDrive) -> None:
     result = calibrated([make_drive(ROBOT, 1)], Choice())
     told = "\n".join(result.warnings)
@@ -172,6 +219,12 @@ def test_motor_currents_without_sign_and_total_power_alone(make_drive: MakeDrive
             evolve(choice, keys=("motor.resistance",), quantity="motor_current"),
             "test",
         )
+
+
+def test_power_is_an_average_over_the_described_window(make_drive: MakeDrive) -> None:
+    wide = evolve(ROBOT, sensors=evolve(ROBOT.sensors, power_window=0.02))
+    described, given = (samples_of(make_drive(ROBOT, 1), wide, 0.05, w) for w in (None, 0.03))
+    assert (described.parts, given.parts) == (2, 3)
 
 
 def test_motion_between_irregular_samples() -> None:

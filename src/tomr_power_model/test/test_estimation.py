@@ -1,9 +1,11 @@
 """Evidence, optimiser, loss and parameters of the estimation, on problems solved by hand."""
 
 from collections.abc import Sequence
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from attrs import evolve
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, lsq_linear
 from scipy.stats import multivariate_normal
@@ -14,14 +16,10 @@ from tomr_power_model.estimation.gauss_newton import (
     Start,
     maximise,
 )
+from tomr_power_model.estimation.intervals import block_length
 from tomr_power_model.estimation.linear_gaussian import Gram, solve
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, per_wheel
 from tomr_power_model.estimation.robust import soft_l1
-from tomr_power_model.estimation.statistics import (
-    autocorrelation,
-    autocorrelation_time,
-    robust_scale,
-)
 from tomr_power_model.robot import read_description
 
 Array = NDArray[np.float64]
@@ -47,6 +45,16 @@ def test_evidence_is_the_ratio_of_gaussian_densities(linear: tuple[Array, Array]
     nothing = multivariate_normal(np.zeros(12), np.eye(12))
     expected = with_all.logpdf(residual) - nothing.logpdf(residual)
     assert solve(Gram.of(columns, residual), [0, 1, 2]).evidence == pytest.approx(expected)
+
+
+def test_normal_equations_of_many_rows_weigh_each() -> None:
+    random = np.random.default_rng(1)
+    columns, residual = random.normal(size=(20_000, 2)), random.normal(size=20_000)
+    weight = random.uniform(0.5, 2.0, 20_000)
+    found, whitened = Gram.of(columns, residual, weight), columns * weight[:, None]
+    np.testing.assert_allclose(found.matrix, whitened.T @ whitened)
+    np.testing.assert_allclose(found.vector, whitened.T @ (residual * weight))
+    assert found.square == pytest.approx(((residual * weight) ** 2).sum())
 
 
 def test_a_linear_problem_takes_one_step(linear: tuple[Array, Array]) -> None:
@@ -119,13 +127,25 @@ def test_hopeless_problems_are_left_alone(linear: tuple[Array, Array]) -> None:
     assert all(numbers == [1] for numbers in asked[1:])
 
 
-def test_autocorrelation_ends_with_each_piece() -> None:
-    """(1, -1, 1, -1) twice: three pairs of product -1 over four squares in each."""
-    alternating = np.array([1.0, -1.0, 1.0, -1.0])
-    assert autocorrelation([alternating, alternating])[1] == pytest.approx(-6.0 / 8.0)
-    assert autocorrelation_time([np.ones(2), np.ones(2)]) == pytest.approx(2.0)
-    assert autocorrelation_time([np.ones(400)], 10, 0.03) > 15.0
-    assert robust_scale(np.array([-1.0, 1.0, 1.0, 50.0])) == pytest.approx(1.4826, rel=1e-4)
+def test_a_step_that_makes_things_worse_is_taken_back_and_a_part_of_it_tried() -> None:
+    """10 atan(x) from x = 2: the step to -2.8 overshoots what it is aimed at, 0."""
+    tried: list[float] = []
+
+    def evaluate(_: Sequence[int], points: Sequence[Array]) -> list[Linearisation]:
+        (x,) = points[0]
+        tried.append(x)
+        return [Linearisation.of(np.array([-10.0 * np.arctan(x)]), np.array([[10 / (1 + x * x)]]))]
+
+    (found,) = maximise([_start([2.0])], evaluate, PRECISE)
+    assert tried[1] < -2.0
+    assert tried[2] == pytest.approx(2.0 + PRECISE.back * (tried[1] - 2.0))
+    assert found.best is not None
+    assert found.best.units == pytest.approx([0.0], abs=1e-6)
+
+    tried.clear()
+    short = evolve(_start([2.0]), largest_step=np.array([0.5]))
+    maximise([short], evaluate, PRECISE)
+    assert tried[:2] == [2.0, 1.5]
 
 
 def test_offsets_stay_within_the_bounds_of_the_description() -> None:
@@ -134,6 +154,33 @@ def test_offsets_stay_within_the_bounds_of_the_description() -> None:
     torque = Parameter("torque", keys, "N m", 0.01)
     assert base.offset([torque], [0.02]).values[keys[1]] == pytest.approx(0.08)
     assert base.offset([torque], [-1.0]).values[keys[1]] == 0.0
+
+
+def test_an_offset_of_what_is_left_out_begins_at_its_neutral_value() -> None:
+    base = per_wheel(read_description("reference"), WHEELS, "reference")
+    key = "physics.sensor.power_scale.wheel_2_joint.scale"
+    assert base.offset([Parameter("scale", (key,), "", 0.1)], [0.05]).values[key] == 1.05
+
+
+def test_a_wheels_own_value_goes_before_that_of_all() -> None:
+    own = {"physics.friction.coulomb.wheel_2_joint.torque": 0.1}
+    values = per_wheel({**read_description("reference"), **own}, WHEELS, "reference").values
+    torques = [values[f"physics.friction.coulomb.{wheel}.torque"] for wheel in WHEELS]
+    assert torques == [0.06, 0.1, 0.06]
+
+
+def test_a_derivative_steps_to_the_permitted_side() -> None:
+    share = Parameter("efficiency", ("x",), "", 0.1, step=0.01, lower=0.0, upper=1.0)
+    assert [share.step_at(value) for value in (0.5, 0.995)] == [0.01, -0.01]
+
+
+def test_blocks_are_long_against_correlation_and_drives_where_there_are_many() -> None:
+    random = np.random.default_rng(2)
+    drive = SimpleNamespace(time=0.1 * np.arange(100), stretch=np.zeros(100, dtype=int))
+    lasting = np.repeat(random.normal(size=200), 10)[:, None]  # for 1 s
+    assert block_length([drive] * 20, lasting) == pytest.approx(9.9)
+    assert 5.0 < block_length([drive] * 19, lasting[:1900]) < 9.9
+    assert block_length([drive] * 19, random.normal(size=(1900, 1))) < 1.5
 
 
 def test_coordinates_of_the_mass_centre_are_set_one_by_one() -> None:

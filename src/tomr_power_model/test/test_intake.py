@@ -11,7 +11,6 @@ from rclpy.serialization import serialize_message
 
 from tomr_power_model.drive.sources import TOTAL, PowerReading
 from tomr_power_model.messages.bag import bag_header, bag_message, jazzy_typestore, to_bag
-from tomr_power_model.messages.inputs import Complaints, measured_inputs, model_inputs
 from tomr_power_model.messages.intake import (
     Unusable,
     WheelFinder,
@@ -33,6 +32,7 @@ from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.nodes.stage_node import to_ros
 from tomr_power_model.robot import shipped_robot
+from tomr_power_model.topics.inputs import Complaints, measured_inputs, model_inputs
 
 STAMP = 1_700_000_000_500_000_000
 WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")

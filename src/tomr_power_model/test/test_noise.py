@@ -89,3 +89,16 @@ def test_a_channel_that_mostly_stands_still_is_not_taken_to_be_exact(white: np.n
     noise = 0.02 * white * (value > 0.0)
     sigma = noise_of([_channel("speed")], noise, NOTHING, value, time_derivative=STILL).sigma
     assert sigma.min() > 0.3 * 4e-3 * value.std()
+
+
+def test_a_coarse_channel_is_no_more_exact_than_its_quantum(white: np.ndarray) -> None:
+    coarse = SimpleNamespace(kind="current", time=0.02 * np.arange(COUNT), quantum=0.5)
+    sigma = noise_of([coarse], 0.01 * white, NOTHING, STILL, time_derivative=STILL).sigma
+    np.testing.assert_allclose(sigma, 0.5 / np.sqrt(12.0))
+
+
+def test_noise_of_a_voltage_does_not_grow_with_it(white: np.ndarray) -> None:
+    value = 5.0 * np.sin(2.0 * np.pi * np.arange(COUNT) / 500.0)
+    noise = white * np.hypot(0.1, 0.1 * value)
+    sigma = noise_of([_channel("voltage")], noise, NOTHING, value, time_derivative=STILL).sigma
+    assert np.ptp(sigma) == pytest.approx(0.0, abs=1e-12)

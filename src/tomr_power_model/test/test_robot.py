@@ -51,6 +51,7 @@ def test_shipped_robots_load() -> None:
         ({"physics__friction.coulomb": {"torqe": 0.1}}, ["torqe", "torque"]),
         ({"physics__friction.stribeck": {"torque": 0.1}}, ["friction.stribeck.speed", "missing"]),
         ({"measurement__source": "guess"}, ["measurement.source", "one of"]),
+        ({"controller__integrator": "sideways"}, ["controller.integrator", "backward, forward"]),
     ],
 )
 def test_bad_values_get_one_clear_line(
@@ -63,6 +64,16 @@ def test_bad_values_get_one_clear_line(
     assert "\n" not in line
     for word in [str(file), *words]:
         assert word in line
+
+
+def test_what_a_file_may_leave_out_or_say(tmp_path: Path) -> None:
+    drag = {"physics__contact.roller_drag": {"coefficient": 0.1}}
+    plain = load_robot(_write(tmp_path, **drag))
+    assert (plain.controller.integrator, plain.sensors.power_window) == ("backward", 0.005)
+    assert plain.effect("contact.roller_drag") == {"coefficient": 0.1, "slip": 0.0}
+    changes = {"controller__integrator": "forward", "sensors__power_window": 0.02}
+    told = load_robot(_write(tmp_path, **changes))
+    assert (told.controller.integrator, told.sensors.power_window) == ("forward", 0.02)
 
 
 @pytest.mark.parametrize("text", ["", "a: [", "/**: {}", "- 1", "/**: {ros__parameters: {}}"])

@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from tomr_power_model.estimation.statistics import autocorrelation_time, robust_scale
+from tomr_power_model.estimation.statistics import (
+    autocorrelation,
+    autocorrelation_time,
+    robust_scale,
+)
 
 
 def _process(seed: int, phi: float, count: int = 2000) -> np.ndarray:
@@ -26,6 +30,16 @@ def test_pieces_are_not_joined() -> None:
     pieces = [np.full(50, sign) for sign in (1.0, -1.0)]
     assert autocorrelation_time(pieces) > 20.0
     assert autocorrelation_time([np.concatenate(pieces * 20)]) > 20.0
+    # (1, -1, 1, -1) twice: three pairs of product -1 over four squares in each.
+    alternating = np.array([1.0, -1.0, 1.0, -1.0])
+    assert autocorrelation([alternating, alternating])[1] == pytest.approx(-6.0 / 8.0)
+
+
+def test_correlation_is_summed_up_to_what_is_negligible() -> None:
+    """Pulses 100 samples apart, each five long: triangles 1, 0.8, 0.6, 0.4, 0.2, then nothing."""
+    pulses = (np.arange(1000) % 100 < 5).astype(float)
+    assert autocorrelation_time([pulses], 400, 0.03) == pytest.approx(2.0 * 3.0 - 1.0)
+    assert autocorrelation_time([pulses], 3, 0.03) == pytest.approx(2.0 * 2.4 - 1.0)
 
 
 def test_a_robust_scale_ignores_knocks_and_blanks() -> None:

@@ -9,6 +9,7 @@ from attrs import evolve, fields
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tomr_power_model.calibration.wang2024_samples import read_samples
 from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.errors import InputError
 from tomr_power_model.geometry.kinematics import twist_to_wheels
@@ -19,7 +20,6 @@ from tomr_power_model.model.settings import MODEL_PARAMETERS, ModelSettings
 from tomr_power_model.robot import shipped_robot
 from tomr_power_model.robot.parameters import check_all
 from tomr_power_model.wang2024 import Coefficients, Samples, Wang2024Model, fit_wang2024
-from tomr_power_model.wang2024.recorded import read_samples
 from tomr_power_model.wang2024.state import Chassis, state_of
 
 BAG = Path(__file__).parents[3] / "bags" / "square"

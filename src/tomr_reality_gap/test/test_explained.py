@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from attrs import evolve
+from effect_samples import MODERATE
 
 from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
@@ -20,37 +21,7 @@ from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 from tomr_sim_bridge.plant.simulation import Simulation
 
 WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
-FOUND: Mapping[str, Mapping[str, float]] = {
-    "friction.coulomb": {"torque": 0.09},
-    "friction.viscous": {"coefficient": 0.006},
-    "friction.stribeck": {"torque": 0.04, "speed": 1.5},
-    "friction.asymmetric": {"torque": -0.02},
-    "friction.load_dependent": {"coefficient": 0.05},
-    "friction.quadratic": {"coefficient": 5e-4},
-    "drivetrain.torque_ripple": {"torque": 0.03, "order": 6.0, "phase": 0.4},
-    "contact.roller_drag": {"coefficient": 0.01},
-    "contact.rolling_resistance": {"coefficient": 0.01},
-    "contact.slip": {"friction": 0.4},
-    "body.payload_mass": {"mass": 2.0},
-    "body.mass_center_offset": {"x": 0.01, "y": -0.02},
-    "body.slope": {"angle": 0.01, "azimuth": 0.7},
-    "electrical.winding_heating": {
-        "thermal_resistance": 4.0,
-        "time_constant": 60.0,
-        "initial": 30.0,
-    },
-    "electrical.supply_sag": {"resistance": 0.1},
-    "electrical.driver_standby": {"power": 1.5},
-    "electrical.switching_loss": {"coefficient": 0.3},
-    "electrical.regeneration_loss": {"efficiency": 0.5},
-    "electrical.iron_loss": {"hysteresis": 5e-4, "eddy": 2e-6},
-    "kinematic.wheel_radius": {"scale": 1.01},
-    "sensor.power_scale": {"scale": 1.05},
-    "sensor.power_bias": {"power": 0.4},
-    "sensor.power_lag": {"time_constant": 0.05},
-    "sensor.clock_offset": {"delay": 0.02},
-}
-MODELLED = [effect for effect in FOUND if effect != "contact.slip"]
+MODELLED = [effect for effect in MODERATE if effect != "contact.slip"]
 
 
 def explained(folder: Path, effects: Mapping[str, Mapping[str, float]], wheels: int = 3) -> Robot:
@@ -101,21 +72,17 @@ def simulated(robot: Robot, twist: tuple[float, float, float], until: float) -> 
     return np.array([np.mean(values) for values in found.values()])
 
 
-def test_every_effect_of_the_vocabulary_is_tried_here() -> None:
-    assert set(FOUND) == set(EFFECTS)
-
-
 @pytest.mark.parametrize("effect", MODELLED)
 def test_nodes_and_simulator_load_it_as_it_is(effect: str, tmp_path: Path) -> None:
     """At one wheel only, which needs neutral values for the others."""
-    robot = explained(tmp_path, {effect: FOUND[effect]}, wheels=1)
-    assert robot.everywhere(effect, next(iter(FOUND[effect])))[0] != 0.0
+    robot = explained(tmp_path, {effect: MODERATE[effect]}, wheels=1)
+    assert robot.everywhere(effect, next(iter(MODERATE[effect])))[0] != 0.0
     assert np.isfinite(predicted(robot, (0.2, 0.0, 0.0), 0.6)).all()
     assert np.isfinite(simulated(robot, (0.2, 0.0, 0.0), 0.2 + 0.5)).all()
 
 
 def test_all_effects_at_once_cost_the_same_in_nodes_and_simulator(tmp_path: Path) -> None:
-    robot = explained(tmp_path, {effect: FOUND[effect] for effect in MODELLED})
+    robot = explained(tmp_path, {effect: MODERATE[effect] for effect in MODELLED})
     twist = (0.0, 0.3, 0.3)
     expected = predicted(robot, twist, 3.0)
     before = predicted(load_robot("reference"), twist, 3.0)

@@ -101,7 +101,7 @@ def fit(examples: Examples, recipe: Recipe, progress: Callable[[float], None]) -
     module = module_of(recipe)
     optimiser = torch.optim.Adam(module.parameters(), lr=recipe.learning_rate)
     for _ in range(recipe.epochs):
-        batches = torch.randperm(len(x)).split(recipe.batch)
+        batches = torch.split(torch.randperm(len(x)), recipe.batch)
         progress(epoch(module, (x, y), batches, optimiser.step))
     weights = weights_of(module)
     # In double precision, as the robot computes it: the trained weights are exact there.

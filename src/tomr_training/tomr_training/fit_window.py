@@ -125,7 +125,7 @@ def fit_window(
     random = np.random.default_rng(recipe.seed)
     trained = views_of(examples, recipe, random), torch.from_numpy(examples.label)
     for _ in range(recipe.epochs):
-        batches = torch.from_numpy(random.permutation(len(examples))).split(recipe.batch)
+        batches = torch.split(torch.from_numpy(random.permutation(len(examples))), recipe.batch)
         progress(epoch(module, trained, batches, optimiser.step, schedule.step))
     return _fitted(module, examples)
 

@@ -11,10 +11,10 @@ from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.messages.bag import to_bag
-from tomr_power_model.messages.inputs import model_inputs
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.messages.types import TWIST_STAMPED
 from tomr_power_model.model.predictor import PowerPredictor
+from tomr_power_model.topics.inputs import model_inputs
 from tomr_sim_bridge.missions.drive import drive
 from tomr_sim_bridge.plant import moments
 from tomr_sim_bridge.plant.samples import Sample

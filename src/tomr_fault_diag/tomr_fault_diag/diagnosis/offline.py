@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 from tomr_fault_diag.diagnosis.pipeline import Pipeline, Step
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.inputs import Input
 from tomr_power_model.recordings import Recording, resolve_topic
+from tomr_power_model.topics.inputs import Input
 
 
 def find_topics(

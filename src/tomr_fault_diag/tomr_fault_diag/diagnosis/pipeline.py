@@ -18,14 +18,14 @@ from tomr_fault_diag.residuals.messages import residual_message
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.dynamics.binding import has_numba
-from tomr_power_model.messages.inputs import Complaints, Input, model_inputs
 from tomr_power_model.messages.intake import WheelFinder
 from tomr_power_model.messages.outgoing import Outgoing
-from tomr_power_model.messages.predictions import prediction_messages
 from tomr_power_model.messages.types import TWIST_STAMPED
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import Robot
+from tomr_power_model.topics.inputs import Complaints, Input, model_inputs
+from tomr_power_model.topics.predictions import prediction_messages
 
 Take = Callable[[Any, int], str | None]
 

@@ -10,12 +10,12 @@ from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, Classifie
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
 from tomr_fault_diag.residuals.messages import frame_of
-from tomr_power_model.messages.inputs import Input, guarded
 from tomr_power_model.messages.intake import stamp_of
 from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.types import DIAGNOSTICS
 from tomr_power_model.nodes.command_line import node_arguments
 from tomr_power_model.nodes.stage_node import STAGE_QOS, StageNode, run_node
+from tomr_power_model.topics.inputs import Input, guarded
 
 
 class FaultClassifierNode(StageNode):

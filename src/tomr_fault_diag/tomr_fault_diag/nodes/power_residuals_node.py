@@ -12,19 +12,19 @@ from tomr_fault_diag.residuals.settings import (
 )
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
-from tomr_power_model.messages.inputs import Input, guarded
 from tomr_power_model.messages.intake import stamp_of
 from tomr_power_model.messages.outgoing import DiagnosticMessage
-from tomr_power_model.messages.predictions import (
-    EXPECTED,
-    PredictionAssembler,
-    prediction_topics,
-)
 from tomr_power_model.messages.types import BATTERY, JOINT_STATE
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.nodes.command_line import node_arguments
 from tomr_power_model.nodes.stage_node import STAGE_QOS, StageNode, run_node
 from tomr_power_model.robot.parameters import ParameterSpec
+from tomr_power_model.topics.inputs import Input, guarded
+from tomr_power_model.topics.predictions import (
+    EXPECTED,
+    PredictionAssembler,
+    prediction_topics,
+)
 
 HARDWARE_ID = ParameterSpec("hardware_id", "of this robot, in every status", "str", "tomr")
 PARAMETERS = (*RESIDUAL_PARAMETERS, HARDWARE_ID)

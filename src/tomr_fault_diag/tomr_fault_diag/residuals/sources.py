@@ -1,9 +1,9 @@
 """What the residual stage reads besides the predictions."""
 
 from tomr_fault_diag.residuals.stage import ResidualStage
-from tomr_power_model.messages.inputs import Input, measured_inputs
 from tomr_power_model.messages.intake import WheelFinder
 from tomr_power_model.robot import Robot
+from tomr_power_model.topics.inputs import Input, measured_inputs
 
 
 def residual_inputs(

@@ -1,5 +1,6 @@
 """What sensors show of a drive: spans, scale, bias, lag and delay, worked by hand."""
 
+import os
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -9,7 +10,14 @@ from attrs import evolve
 from tomr_power_model.dynamics import batch
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.numbers import laid_out, no_input
-from tomr_power_model.dynamics.simulation import Excitation, Readout, Variant, drive, predict
+from tomr_power_model.dynamics.simulation import (
+    Excitation,
+    Readout,
+    Variant,
+    drive,
+    predict,
+    worker_count,
+)
 from tomr_power_model.dynamics.vehicle import Vehicle
 
 MakeVehicle = Callable[..., Vehicle]
@@ -28,9 +36,10 @@ def shown(
     time: np.ndarray,
     span: float,
     later: tuple[float, ...] = (0.0,),
+    wheel: int = 1,
 ) -> np.ndarray:
-    """Of wheel 2, (delays, times); times from the start."""
-    channels = np.array([[kind, 1, 0, len(time)]])
+    """Of wheel 2 if not another, (delays, times); times from the start."""
+    channels = np.array([[kind, wheel, 0, len(time)]])
     readout = Readout(channels, 10.0 + time, np.full(len(time), span))
     return np.asarray(next(predict([Variant(laid_out(vehicle), 0, later)], excitation(), readout)))
 
@@ -54,6 +63,42 @@ def test_spans_are_means_over_whole_steps(make_vehicle: MakeVehicle, kind: str) 
     found = shown(vehicle, getattr(batch, kind), time, 0.1)[0]
     means = [expected[round(200 * t) - 20 : round(200 * t)].mean() for t in time]
     np.testing.assert_allclose(found, means, rtol=1e-9)
+
+
+def test_parts_of_a_step_of_all_wheels_add_up_to_the_total(make_vehicle: MakeVehicle) -> None:
+    time = np.linspace(0.101, 0.2, 20)  # while power changes within the steps
+    motors = sum(shown(make_vehicle(), batch.POWER, time, 0.002, wheel=i)[0] for i in range(3))
+    total = shown(make_vehicle(), batch.TOTAL, time, 0.002)[0]
+    np.testing.assert_allclose(total, motors + 12.0, rtol=1e-9)
+
+
+def test_power_rises_within_a_step_as_the_simulation_says(make_vehicle: MakeVehicle) -> None:
+    steps = drive(Variant(laid_out(make_vehicle())), excitation())
+    half = shown(make_vehicle(), batch.POWER, np.array([0.1525]), 0.0025)[0]
+    assert abs(steps.tilt[30, 1]) > 0.04
+    np.testing.assert_allclose(half, steps.power[30, 1] - 0.25 * steps.tilt[30, 1], rtol=1e-9)
+
+
+def test_an_instant_is_read_as_a_mean_around_it(make_vehicle: MakeVehicle) -> None:
+    steps = drive(Variant(laid_out(make_vehicle())), excitation())
+    found = shown(make_vehicle(), batch.SPEED, np.array([0.1525, 0.155]), 0.0)[0]
+    between = 0.5 * (steps.speed[30, 1] + steps.speed[31, 1])
+    np.testing.assert_allclose(found, [steps.speed[30, 1], between], rtol=1e-9)
+
+
+def test_a_lagging_sensor_shows_what_its_lag_left(make_vehicle: MakeVehicle) -> None:
+    vehicle = make_vehicle(further={"sensor.power_lag": {"time_constant": 0.1}})
+    expected = drive(Variant(laid_out(vehicle)), excitation()).power[:, 1].copy()
+    batch.follow(expected, np.zeros(400), 0.05)
+    found = shown(vehicle, batch.POWER, np.array([0.3, 0.6, 1.1]), 0.005)[0]
+    np.testing.assert_allclose(found, expected[[59, 119, 219]], rtol=1e-9)
+
+
+def test_threads_are_as_many_as_the_environment_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    assert worker_count() == 3
+    monkeypatch.setenv("OMP_NUM_THREADS", "")
+    assert worker_count() == len(os.sched_getaffinity(0))
 
 
 def test_all_of_a_drive_read_later(make_vehicle: MakeVehicle) -> None:

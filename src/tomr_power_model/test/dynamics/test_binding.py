@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tomr_power_model.dynamics import binding
+from tomr_power_model.effects import EFFECTS
 
 # A function that compiles in no time, in a module of its own: compiled code is kept by file.
 TWICE = """
@@ -85,6 +86,13 @@ def test_a_user_without_a_home_gets_a_temporary_folder(
     monkeypatch.setattr(binding.os.path, "expanduser", lambda path: path)
     monkeypatch.setattr(binding.tempfile, "gettempdir", lambda: str(tmp_path))
     assert [place.parent for place in binding._cache_places()] == [tmp_path]
+
+
+def test_compiled_code_belongs_to_all_that_it_is_made_of() -> None:
+    """A change of the layout or of any effect must not meet what was compiled before it."""
+    parts = {"batch", "contacts", "inverse", "layout", "numbers", "start", "step"}
+    effects = {effect_id.partition(".")[2] for effect_id in EFFECTS}
+    assert parts | effects <= {file.stem for file in binding._sources()}
 
 
 @pytest.mark.parametrize("left", [0, 100, -1])

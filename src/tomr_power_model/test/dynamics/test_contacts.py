@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tomr_power_model.dynamics import layout as at
+from tomr_power_model.dynamics.simulation import Simulation
 from tomr_power_model.dynamics.vehicle import Vehicle
 from tomr_power_model.robot import GRAVITY
 
@@ -43,6 +44,20 @@ def test_wheels_that_spin_push_with_friction_times_load(
     np.testing.assert_allclose(change / 0.005, 0.1 * grip * GRAVITY, rtol=1e-6)
     np.testing.assert_allclose(driven.twist[:, 1:], 0.0, atol=1e-9)
     assert np.abs(driven.steps.gap[20:]).max() > 0.5
+
+
+def test_tyres_that_spin_and_skid_brake_sideways(
+    make_vehicle: MakeVehicle, drive_vehicle: DriveVehicle
+) -> None:
+    """Half of the weight is on them: 0.1 g / 2 along the spin and 0.1 g / 2 against the skid."""
+    slippery = {"contact.slip": {"friction": 0.1}}
+    vehicle = make_vehicle(
+        "two_driven", physics=slippery, mass_center=(0.0,) * 3, acceleration_limit=0.0
+    )
+    state = Simulation(vehicle).start((0.0, 0.5, 0.0))
+    driven = drive_vehicle(vehicle, towards((50.0, 0.0, 0.0), 40), state)
+    change = driven.twist[39, :2] - driven.twist[19, :2]
+    np.testing.assert_allclose(change / 0.1, [0.05 * GRAVITY, -0.05 * GRAVITY], rtol=1e-6)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from effect_samples import LARGE
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -24,33 +25,6 @@ SPEED = st.floats(-0.8, 0.8)
 TWISTS = st.tuples(SPEED, SPEED, st.floats(-3.0, 3.0))
 FEW = settings(max_examples=12, deadline=None)
 
-# As large as they come; sensors are not part of the motion.
-LARGE: Physics = {
-    "friction.coulomb": {"torque": 0.4},
-    "friction.viscous": {"coefficient": 0.05},
-    "friction.stribeck": {"torque": 0.2, "speed": 0.5},
-    "friction.asymmetric": {"torque": 0.1},
-    "friction.load_dependent": {"coefficient": 0.3},
-    "friction.quadratic": {"coefficient": 0.005},
-    "drivetrain.torque_ripple": {"torque": 0.1, "order": 7.0, "phase": 0.3},
-    "contact.roller_drag": {"coefficient": 0.2, "slip": 0.2},
-    "contact.rolling_resistance": {"coefficient": 0.05},
-    "contact.slip": {"friction": 0.2},
-    "body.payload_mass": {"mass": 10.0},
-    "body.mass_center_offset": {"x": 0.05, "y": -0.04},
-    "body.slope": {"angle": 0.05, "azimuth": 1.0},
-    "electrical.winding_heating": {
-        "thermal_resistance": 10.0,
-        "time_constant": 20.0,
-        "initial": 10.0,
-    },
-    "electrical.supply_sag": {"resistance": 0.8},
-    "electrical.driver_standby": {"power": 3.0},
-    "electrical.switching_loss": {"coefficient": 0.5},
-    "electrical.regeneration_loss": {"efficiency": 0.3},
-    "electrical.iron_loss": {"hysteresis": 0.01, "eddy": 1e-4},
-    "kinematic.wheel_radius": {"scale": 0.95},
-}
 EFFECT_IDS = st.sets(st.sampled_from(sorted(LARGE)), max_size=8)
 
 
@@ -69,10 +43,6 @@ def compiled_drive(vehicle: Vehicle, commands: np.ndarray, late: int = 0) -> Ste
     rest = np.zeros(3)
     excitation = Excitation(0.0, inputs, rest, rest, 0.0, np.zeros(n))
     return drive(Variant(laid_out(vehicle), late), excitation, n)
-
-
-def test_every_effect_is_among_the_random_ones() -> None:
-    assert set(LARGE) == {name for name in EFFECTS if not name.startswith("sensor.")}
 
 
 @given(twists=st.lists(TWISTS, min_size=2, max_size=2), effect_ids=EFFECT_IDS)

@@ -169,6 +169,18 @@ def test_dry_friction_holds_on_a_slope_until_it_is_too_steep(
     assert on(0.02).twist[-1] == pytest.approx([expected, 0.0, 0.0], rel=1e-6, abs=1e-8)
 
 
+def test_a_slope_turns_a_robot_by_its_mass_centre(
+    make_vehicle: MakeVehicle, drive_vehicle: DriveVehicle
+) -> None:
+    # 3 cm to the left of the middle: -0.03 m g sin(0.02) against 3 (0.2 / 0.05)^2 k^2 / R.
+    slope = {"body.slope": {"angle": 0.02, "azimuth": 0.0}}
+    vehicle = make_vehicle(physics=slope, mass_center=(0.0, 0.03, 0.0), **NO_LOOP)
+    turning = -0.03 * 15.0 * GRAVITY * math.sin(0.02) / (3.0 * 4.0**2 * K**2 / R)
+    assert drive_vehicle(vehicle, held((0.0,) * 3, 200)).twist[-1, 2] == pytest.approx(
+        turning, rel=1e-3
+    )
+
+
 def test_in_saturation_the_integral_does_not_wind_up(
     make_vehicle: MakeVehicle, drive_vehicle: DriveVehicle
 ) -> None:

@@ -3,27 +3,12 @@
 import math
 
 import pytest
+from effect_samples import LARGE, MODERATE, SCALES
 
 from tomr_power_model.effects import EFFECTS, Effect, Wheel
-from tomr_power_model.effects.scales import Scales
 
 WHEEL = Wheel(speed=2.0, load=50.0, transmitted=-0.4, angle=0.5, radius=0.05, gear_ratio=20.0)
 BACK = WHEEL._replace(speed=-2.0)
-SCALES = Scales(
-    torque=0.1,
-    speed=5.0,
-    current=0.2,
-    power=2.0,
-    copper=0.1,
-    load=50.0,
-    radius=0.05,
-    arm=0.2,
-    mass=15.0,
-    gear=20.0,
-    voltage=24.0,
-    duration=60.0,
-    period=0.005,
-)
 
 
 @pytest.mark.parametrize("effect", EFFECTS.values(), ids=list(EFFECTS))
@@ -40,6 +25,11 @@ def test_an_effect_tells_all_of_itself(effect: type[Effect]) -> None:
         assert all(size(SCALES) > 0.0 for size in effect.prior.sizes.values())
         for shape in effect.prior.shapes(SCALES):
             assert {*effect.prior.sizes, *shape} <= set(effect.parameters)
+
+
+def test_every_effect_is_among_the_samples() -> None:
+    assert set(MODERATE) == set(EFFECTS)
+    assert set(LARGE) == {name for name in EFFECTS if not name.startswith("sensor.")}
 
 
 def test_labels_tell_effects_apart() -> None:

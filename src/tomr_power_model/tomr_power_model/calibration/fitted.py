@@ -12,9 +12,9 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from tomr_power_model.effects import EFFECTS
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, Values
 from tomr_power_model.robot import WHEELS, read_sections
+from tomr_power_model.robot.description import split_effect
 from tomr_power_model.robot.files import CALIBRATION, EVERY_NODE, IDENTITY
 
 Array = NDArray[np.float64]
@@ -96,11 +96,8 @@ def _nested(flat: Mapping[str, object]) -> Tree:
 
 
 def _parts(key: str) -> list[str]:
-    for effect_id in EFFECTS:
-        before, found, after = key.partition(f"physics.{effect_id}.")
-        if found:
-            return [*before.split(".")[:-1], "physics", effect_id, *after.split(".")]
-    return key.split(".")
+    found = split_effect(key)
+    return key.split(".") if found is None else ["physics", found[0], *found[1].split(".")]
 
 
 def _lines(tree: Tree, indent: int, prefix: str, comments: Mapping[str, str]) -> list[str]:

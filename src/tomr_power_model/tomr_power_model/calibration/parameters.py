@@ -1,6 +1,6 @@
 """Which values of a robot.yaml are fitted, and the priors of them."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import cast
 
 from attrs import field, frozen
@@ -16,7 +16,9 @@ from tomr_power_model.estimation.parameter import (
     Parameter,
     Values,
     bounds_of,
-    split_effect,
+    center_axis,
+    center_of,
+    is_of_wheels,
     uniform_std,
     unit_of,
     wheel_key,
@@ -25,7 +27,6 @@ from tomr_power_model.robot.description import closest
 from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
 
 EVERY = "all"
-_CENTER, _AXES = "robot.mass_center", ("x", "y", "z")
 _MOTOR = tuple(spec.name for spec in MOTOR_PARAMETERS)
 # Of place or past, which an instant's motion does not show, or of other tools.
 _NOT_BY_DEFAULT = ("kinematic.", "sensor.", "body.", "drivetrain.", "electrical.winding_heating")
@@ -102,12 +103,12 @@ def _expand(
     key: str, values: Values, wheels: Sequence[str], choice: Choice, place: str
 ) -> list[Parameter]:
     """The parameters behind a key: three if each wheel has its own."""
-    if key.rpartition(".")[0] == _CENTER and key.rpartition(".")[2] in _AXES:
-        center = list(cast(Iterable[float], values.get(_CENTER, (0.0, 0.0, 0.0))))
-        return [_parameter(key, key, center[_AXES.index(key[-1])], choice)]
+    axis = center_axis(key)
+    if axis is not None:
+        return [_parameter(key, key, center_of(values)[axis], choice)]
     own = next((wheel for wheel in wheels if f".{wheel}." in key), None)
     general = key if own is None else key.replace(f".{own}.", ".")
-    for_wheels = general in _MOTOR or _is_of_wheels(general)
+    for_wheels = general in _MOTOR or is_of_wheels(general)
     if general not in _known() or (own and not for_wheels):
         raise InputError(f"--fit {key}: no such value in a robot.yaml: {closest(key, _known())}")
     modelled = general in _MOTOR and general != "motor.rotor_inertia"
@@ -127,12 +128,6 @@ def _expand(
         _parameter(name, general, values.get(name, values.get(general, default)), choice)
         for name in names
     ]
-
-
-def _is_of_wheels(general: str) -> bool:
-    if general not in _known() or not general.startswith("physics."):
-        return False
-    return EFFECTS[split_effect(general)[0]].place == "wheel"
 
 
 def _parameter(key: str, general: str, value: object, choice: Choice) -> Parameter:

@@ -1,7 +1,8 @@
 """Priors of a description's values before a fit, and the drives that would determine them."""
 
 from tomr_power_model.effects import EFFECTS
-from tomr_power_model.estimation.parameter import split_effect
+from tomr_power_model.estimation.parameter import effect_parameter
+from tomr_power_model.robot.description import split_effect
 
 # Standard deviation relative to the value: data sheets are good for windings, poor for friction.
 RELATIVE_STD = {
@@ -41,17 +42,16 @@ _DRIVES = (
 
 def absent_prior(general: str) -> tuple[float, float]:
     """Mean and standard deviation of a value that a description does not give."""
-    if not general.startswith("physics."):
+    parameter = effect_parameter(general)
+    if parameter is None:
         return _ABSENT.get(general, (0.0, 1.0))
-    effect_id, name = split_effect(general)
-    parameter = EFFECTS[effect_id].parameters[name]
     return parameter.start, parameter.prior_std
 
 
 def drive_for(general: str) -> str:
-    """The drive that would determine a value."""
-    for effect_id, effect in EFFECTS.items():
-        if general == f"physics.{effect_id}" or general.startswith(f"physics.{effect_id}."):
-            return effect.shown_by
+    """The drive that would determine a value, or an effect as a whole: physics.<effect id>."""
+    effect = split_effect(general + ".")
+    if effect is not None:
+        return EFFECTS[effect[0]].shown_by
     found = (text for start, text in _DRIVES if general.startswith(start))
     return next(found, "a longer drive with more headings, speeds and accelerations")

@@ -29,6 +29,10 @@ def modelled_power(robot: Robot, motion: WheelMotion, parts: int = 1) -> Array:
     rows = np.empty((len(power), CHANNELS))
     rows[:, :WHEELS] = power
     rows[:, TOTAL] = drives.power.sum(axis=1) + robot.supply.auxiliary_power
+    return _means(rows, parts)
+
+
+def _means(rows: Array, parts: int) -> Array:
     return rows if parts == 1 else np.asarray(rows.reshape(-1, parts, CHANNELS).mean(axis=1))
 
 
@@ -65,10 +69,6 @@ class Problem:
         measured = np.concatenate([determined(item, described) for item in self.samples])
         object.__setattr__(self, "measured", measured)
 
-    @property
-    def parts(self) -> int:
-        return self.samples[0].parts
-
     def robot(self, numbers: Sequence[float] | Array) -> Robot:
         """The robot with these values."""
         keys = (parameter.keys[0] for parameter in self.parameters)
@@ -76,7 +76,12 @@ class Problem:
 
     def residual(self, numbers: Sequence[float] | Array) -> Array:
         """Measured minus modelled power [W], (n, 4), NaN where nothing was measured."""
-        return self.measured - modelled_power(self.robot(numbers), self._motion, self.parts)
+        # All recordings in one call, but windows of their own: encoders may differ in rate.
+        points = modelled_power(self.robot(numbers), self._motion)
+        ends = np.cumsum([len(item.motion.speed) for item in self.samples])[:-1]
+        parts = zip(np.split(points, ends), self.samples, strict=True)
+        modelled = np.concatenate([_means(rows, item.parts) for rows, item in parts])
+        return np.asarray(self.measured - modelled)
 
     def jacobian(
         self, numbers: Array, step: Array, count: Callable[[], None] = lambda: None

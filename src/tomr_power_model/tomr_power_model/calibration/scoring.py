@@ -17,7 +17,6 @@ from tomr_power_model.robot import WHEELS, Robot
 Array = NDArray[np.float64]
 
 COLUMNS = ("motor 1", "motor 2", "motor 3", "motors", "robot")
-_MOTORS_SUM = WHEELS  # column of the sum of the motors; the whole robot comes after it
 _MEAN_ABSOLUTE = np.sqrt(2.0 / np.pi)  # of noise, over its standard deviation
 _EPISODE = 1.0  # s
 _OUT_OF_LINE = 4.0  # times the usual misfit

@@ -20,8 +20,7 @@ from pathlib import Path
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
-from tomr_power_model.dynamics import batch, contacts, inverse, layout, start, step
-from tomr_power_model.dynamics.numbers import law_offsets
+from tomr_power_model.dynamics import batch, contacts, inverse, layout, numbers, start, step
 from tomr_power_model.effects import EFFECTS, LAWS, base
 
 _MODULES = (contacts, step, inverse, start, batch)
@@ -90,14 +89,14 @@ def _after(one: Any, other: Any, jit: Jit) -> Any:
 
 def _law(name: str, effect_ids: Iterable[str], jit: Jit) -> Any:
     """The laws of one kind of several effects, as one function."""
-    offsets, effects = law_offsets(), EFFECTS
+    offsets = numbers.law_offsets()
     changes = name == "supplied"
     found = None
     for effect_id in effect_ids:
-        law = getattr(effects[effect_id], name)
+        law = getattr(EFFECTS[effect_id], name)
         if law is None:
             continue
-        count = len(effects[effect_id].parameters)
+        count = len(EFFECTS[effect_id].parameters)
         made = _one(jit(law), offsets[effect_id], count, not changes, jit)
         join = _after if changes else _added
         found = made if found is None else join(found, made, jit)
@@ -124,7 +123,9 @@ def _bound(effect_ids: Iterable[str], jit: Jit, entry: Jit) -> Any:
 
 def plain(effect_ids: tuple[str, ...]) -> Any:
     """The dynamics as they are, with the laws of some effects only: others would add nothing."""
-    return _plain(tuple(name for name in law_offsets() if name in effect_ids), tuple(EFFECTS))
+    return _plain(
+        tuple(name for name in numbers.law_offsets() if name in effect_ids), tuple(EFFECTS)
+    )
 
 
 @cache
@@ -227,6 +228,6 @@ def _is_whole(file: Path) -> bool:
 
 
 def _sources() -> set[Path]:
-    modules: list[ModuleType] = [*_MODULES, layout, base]
+    modules: list[ModuleType] = [*_MODULES, layout, numbers, base]
     files = {Path(__file__), *(Path(str(module.__file__)) for module in modules)}
     return files | {Path(inspect.getfile(effect)) for effect in EFFECTS.values()}

@@ -21,8 +21,6 @@ class Body:
     to_twist: Array  # wheel speeds to body twist, (3, n)
     along: Array  # sliding in the rollers' free direction per body twist, (n, 3)
     mass_matrix: Array  # at base_link, (3, 3)
-    wheel_inertia: Array  # wheel and rotor at the axle [kg m^2], (n,)
-    normal: Array  # wheel loads at rest [N], (n,)
     mass: float  # kg
     mass_center: tuple[float, float]  # m
 
@@ -35,8 +33,6 @@ class Body:
             to_twist=wheels[:, at.TO_TWIST : at.TO_TWIST + 3].T,
             along=wheels[:, at.ALONG : at.ALONG + 3],
             mass_matrix=p[at.INERTIA : at.INERTIA + 9].reshape(3, 3),
-            wheel_inertia=wheels[:, at.AXLE_INERTIA],
-            normal=wheels[:, at.LOAD],
             mass=float(p[at.MASS]),
             mass_center=(float(p[at.CENTER_X]), float(p[at.CENTER_Y])),
         )

@@ -24,7 +24,6 @@ from tomr_power_model.dynamics.layout import (
     FLOOR_X,
     FLOOR_Y,
     FORCE,
-    FROM_ALONG,
     FROM_ROLL,
     GAP,
     GRIP,
@@ -43,7 +42,6 @@ from tomr_power_model.dynamics.layout import (
     RADIUS,
     RATE,
     ROLL,
-    SIDE,
     SIDE_LIMIT,
     SIDE_RATE,
     SLIDING,
@@ -73,6 +71,11 @@ SLIDING_SWEEPS = 4
 ROLLS = 1e-4  # m/s: slower than this a wheel does not slide
 
 
+def times(p: Numbers, row: int, x: float, y: float, yaw: float) -> float:
+    """A row of three of the robot's numbers times a twist, or a force."""
+    return p[row] * x + p[row + 1] * y + p[row + 2] * yaw
+
+
 def body_force(
     p: Numbers, s: Numbers, u: Numbers, vx: float, vy: float, wz: float
 ) -> tuple[float, float, float]:
@@ -98,23 +101,19 @@ def held_twist(
 ) -> tuple[float, float, float]:
     """Twist with the last step's forces; leaves the rates that they act against."""
     stride = int(p[STRIDE])
-    holds = p[HOLDS] > 0.0
+    rows = 2 if p[HOLDS] > 0.0 else 1
     for i in range(n):
         w, z = HEADER + i * stride, STATE_HEADER + i * STATE_WHEEL
-        held = s[z + HELD]
-        x -= p[w + FROM_ROLL] * held
-        y -= p[w + FROM_ROLL + 1] * held
-        yaw -= p[w + FROM_ROLL + 2] * held
-        if holds:
-            side = s[z + SIDE]
-            x -= p[w + FROM_ALONG] * side
-            y -= p[w + FROM_ALONG + 1] * side
-            yaw -= p[w + FROM_ALONG + 2] * side
+        for part in range(rows):  # at the axle, then along the rollers
+            held, way = s[z + HELD + part], w + FROM_ROLL + 3 * part
+            x -= p[way] * held
+            y -= p[way + 1] * held
+            yaw -= p[way + 2] * held
     for i in range(n):
         w, z = HEADER + i * stride, STATE_HEADER + i * STATE_WHEEL
-        s[z + AXLE_RATE] = p[w + ROLL] * x + p[w + ROLL + 1] * y + p[w + ROLL + 2] * yaw
-        if holds:
-            s[z + SIDE_RATE] = p[w + ALONG] * x + p[w + ALONG + 1] * y + p[w + ALONG + 2] * yaw
+        s[z + AXLE_RATE] = times(p, w + ROLL, x, y, yaw)
+        if rows > 1:
+            s[z + SIDE_RATE] = times(p, w + ALONG, x, y, yaw)
     return x, y, yaw
 
 
@@ -123,8 +122,7 @@ def contacts(
 ) -> tuple[float, float, float]:
     """Twist after dry friction, from the twist without it; finds the forces that hold."""
     stride = int(p[STRIDE])
-    holds = p[HOLDS] > 0.0
-    rows = 2 if holds else 1
+    rows = 2 if p[HOLDS] > 0.0 else 1
     x, y, yaw = held_twist(p, s, n, x, y, yaw)
     first = int(p[COUPLING])
     for _ in range(SWEEPS):
@@ -146,10 +144,22 @@ def contacts(
                 yaw -= p[way + 2] * change
                 for j in range(n):
                     other = STATE_HEADER + j * STATE_WHEEL
-                    s[other + AXLE_RATE] -= p[row + j] * change
-                    if holds:
-                        s[other + SIDE_RATE] -= p[row + n + j] * change
+                    for acted in range(rows):
+                        s[other + AXLE_RATE + acted] -= p[row + acted * n + j] * change
     return x, y, yaw
+
+
+def grip_of(p: Numbers, s: Numbers, u: Numbers, i: int) -> float:
+    """Most traction of wheel i [N]."""
+    grip = p[HEADER + i * int(p[STRIDE]) + GRIP] * u[INPUT_HEADER + i * INPUT_WHEEL + FLOOR]
+    return grip * s[STATE_HEADER + i * STATE_WHEEL + WHEEL_LOAD]
+
+
+def gap_of(p: Numbers, s: Numbers, i: int, x: float, y: float, yaw: float) -> float:
+    """Sliding of wheel i in its rolling direction, should it turn on at NEXT [m/s]."""
+    w = HEADER + i * int(p[STRIDE])
+    rolling = times(p, w + ROLL, x, y, yaw)
+    return p[w + RADIUS] * (s[STATE_HEADER + i * STATE_WHEEL + NEXT] - rolling)
 
 
 def too_much(p: Numbers, s: Numbers, u: Numbers, n: int) -> bool:
@@ -159,15 +169,13 @@ def too_much(p: Numbers, s: Numbers, u: Numbers, n: int) -> bool:
         w, z = HEADER + i * stride, STATE_HEADER + i * STATE_WHEEL
         speeding = p[w + AXLE_INERTIA] * (s[z + NEXT] - s[z + SPEED]) / p[STEP]
         torque = s[z + TORQUE] - p[w + DAMPING] * s[z + MEAN] - s[z + HELD] - speeding
-        grip = p[w + GRIP] * u[INPUT_HEADER + i * INPUT_WHEEL + FLOOR] * s[z + WHEEL_LOAD]
-        if abs(torque) > grip * p[w + RADIUS]:
+        if abs(torque) > grip_of(p, s, u, i) * p[w + RADIUS]:
             return True
     return False
 
 
 def slide(p: Numbers, s: Mutable, u: Numbers, n: int) -> None:
     """A step of body and wheels apart; leaves the twist after it in RATE."""
-    stride = int(p[STRIDE])
     for i in range(n):
         z = STATE_HEADER + i * STATE_WHEEL
         s[z + NEXT], s[z + MEAN], s[z + GAP] = s[z + SPEED], 0.0, 0.0
@@ -183,9 +191,8 @@ def slide(p: Numbers, s: Mutable, u: Numbers, n: int) -> None:
             s[z + MEAN] += 0.5 / SLIDING_PARTS * (s[z + FIRST] + s[z + NEXT])
     slides = 0.0
     for i in range(n):
-        w, z = HEADER + i * stride, STATE_HEADER + i * STATE_WHEEL
-        rolling = p[w + ROLL] * x + p[w + ROLL + 1] * y + p[w + ROLL + 2] * yaw
-        s[z + GAP] = p[w + RADIUS] * (s[z + NEXT] - rolling)
+        z = STATE_HEADER + i * STATE_WHEEL
+        s[z + GAP] = gap_of(p, s, i, x, y, yaw)
         if abs(s[z + GAP]) > ROLLS:
             slides = 1.0
     s[SLIDING], s[YAW_MEAN] = slides, mean_yaw
@@ -203,20 +210,16 @@ def slide_part(
         s[z + FIRST] = s[z + NEXT]
         free = p[w + SLIDING_GAIN] * (s[z + TORQUE] - s[z + HELD])
         s[z + NEXT] = p[w + SLIDING_DECAY] * s[z + NEXT] + free
-        along = p[w + ALONG] * x + p[w + ALONG + 1] * y + p[w + ALONG + 2] * yaw
-        drag = s[z + SIDE_LIMIT] * math.tanh(along / STICKING_SLIDE)
+        drag = s[z + SIDE_LIMIT] * math.tanh(times(p, w + ALONG, x, y, yaw) / STICKING_SLIDE)
         fx -= p[w + ALONG] * drag
         fy -= p[w + ALONG + 1] * drag
         mz -= p[w + ALONG + 2] * drag
-    m = MOBILITY
-    x += h * (p[m] * fx + p[m + 1] * fy + p[m + 2] * mz)
-    y += h * (p[m + 3] * fx + p[m + 4] * fy + p[m + 5] * mz)
-    yaw += h * (p[m + 6] * fx + p[m + 7] * fy + p[m + 8] * mz)
+    x += h * times(p, MOBILITY, fx, fy, mz)
+    y += h * times(p, MOBILITY + 3, fx, fy, mz)
+    yaw += h * times(p, MOBILITY + 6, fx, fy, mz)
     inverse = int(p[TRACTION])
     for i in range(n):
-        w, z = HEADER + i * stride, STATE_HEADER + i * STATE_WHEEL
-        rolling = p[w + ROLL] * x + p[w + ROLL + 1] * y + p[w + ROLL + 2] * yaw
-        s[z + GAP] = p[w + RADIUS] * (s[z + NEXT] - rolling)
+        s[STATE_HEADER + i * STATE_WHEEL + GAP] = gap_of(p, s, i, x, y, yaw)
     for i in range(n):  # all at once as if none slid, then one after the other within its limit
         z = STATE_HEADER + i * STATE_WHEEL
         force = 0.0
@@ -226,21 +229,18 @@ def slide_part(
     for sweep in range(SLIDING_SWEEPS):
         for i in range(n):
             w, z = HEADER + i * stride, STATE_HEADER + i * STATE_WHEEL
-            grip = p[w + GRIP] * u[INPUT_HEADER + i * INPUT_WHEEL + FLOOR] * s[z + WHEEL_LOAD]
+            grip, gain = grip_of(p, s, u, i), p[w + SLIDING_GAIN]
             wanted, before = s[z + FORCE], 0.0
             if sweep > 0:
                 before = wanted
-                rolling = p[w + ROLL] * x + p[w + ROLL + 1] * y + p[w + ROLL + 2] * yaw
-                gap = p[w + RADIUS] * (s[z + NEXT] - rolling)
-                wanted = before + gap / p[w + SLIDING_OWN]
+                wanted = before + gap_of(p, s, i, x, y, yaw) / p[w + SLIDING_OWN]
             force = min(max(wanted, -grip), grip)
             s[z + FORCE] = force
             change = force - before
             x += p[w + PULL] * change
             y += p[w + PULL + 1] * change
             yaw += p[w + PULL + 2] * change
-            s[z + NEXT] -= p[w + SLIDING_GAIN] * p[w + RADIUS] * change
-            gain = p[w + SLIDING_GAIN]
+            s[z + NEXT] -= gain * p[w + RADIUS] * change
             held = min(max(s[z + HELD] + s[z + NEXT] / gain, -s[z + DRY]), s[z + DRY])
             s[z + NEXT] -= gain * (held - s[z + HELD])
             s[z + HELD] = held

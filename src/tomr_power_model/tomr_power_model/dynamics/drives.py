@@ -63,10 +63,8 @@ class InverseDynamics:
         rows[:, at.MOTION_YAW] = np.nan if motion.yaw_rate is None else motion.yaw_rate
         rows[:, at.MOTION_HEADING] = np.nan
         own = rows[:, at.MOTION_HEADER :].reshape(count, wheels, at.MOTION_WHEEL)
-        own[..., at.MOTION_SPEED], own[..., at.MOTION_ACCELERATION] = (
-            motion.speed,
-            motion.acceleration,
-        )
+        own[..., at.MOTION_SPEED] = motion.speed
+        own[..., at.MOTION_ACCELERATION] = motion.acceleration
         own[..., at.MOTION_ANGLE] = own[..., at.MOTION_VOLTAGE] = np.nan
         out = np.empty((count, wheels * at.POWER_WHEEL))
         compiled().drive_powers(self.numbers, rows, out, wheels)

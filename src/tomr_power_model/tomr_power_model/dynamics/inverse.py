@@ -9,7 +9,7 @@ friction fades over STICKING_SPEED, unless the voltage that its driver holds is 
 
 import math
 
-from tomr_power_model.dynamics.contacts import STICKING_SLIDE, Mutable, Numbers
+from tomr_power_model.dynamics.contacts import STICKING_SLIDE, Mutable, Numbers, times
 from tomr_power_model.dynamics.layout import (
     ALONG,
     AXLE_INERTIA,
@@ -82,10 +82,10 @@ def carried_force(
         yaw += p[w + TO_TWIST + 2] * change
     if m[MOTION_YAW] == m[MOTION_YAW]:
         wz = m[MOTION_YAW]
-    mass, x, y, g = p[MASS], p[CENTER_X], p[CENTER_Y], INERTIA
-    fx = p[g] * ax + p[g + 1] * ay + p[g + 2] * yaw - mass * wz * (vy + wz * x)
-    fy = p[g + 3] * ax + p[g + 4] * ay + p[g + 5] * yaw + mass * wz * (vx - wz * y)
-    mz = p[g + 6] * ax + p[g + 7] * ay + p[g + 8] * yaw + mass * wz * (x * vx + y * vy)
+    mass, x, y = p[MASS], p[CENTER_X], p[CENTER_Y]
+    fx = times(p, INERTIA, ax, ay, yaw) - mass * wz * (vy + wz * x)
+    fy = times(p, INERTIA + 3, ax, ay, yaw) + mass * wz * (vx - wz * y)
+    mz = times(p, INERTIA + 6, ax, ay, yaw) + mass * wz * (x * vx + y * vy)
     heading = m[MOTION_HEADING]
     if heading == heading and (p[FLOOR_X] != 0.0 or p[FLOOR_Y] != 0.0):
         cos, sin = math.cos(heading), math.sin(heading)
@@ -102,7 +102,7 @@ def drive_power(p: Numbers, m: Numbers, out: Mutable, n: int) -> None:
         w, a = HEADER + i * stride, MOTION_HEADER + i * MOTION_WHEEL
         if p[w + DRAG] > 0.0:
             load = max(p[w + LOAD] + p[w + LOAD_X] * along_x + p[w + LOAD_Y] * along_y, 0.0)
-            along = p[w + ALONG] * vx + p[w + ALONG + 1] * vy + p[w + ALONG + 2] * wz
+            along = times(p, w + ALONG, vx, vy, wz)
             across = p[w + ROLLER_SLIP] * m[a + MOTION_SPEED]
             sliding = math.sqrt(along * along + across * across)
             if sliding > 0.0:
@@ -114,7 +114,7 @@ def drive_power(p: Numbers, m: Numbers, out: Mutable, n: int) -> None:
     for i in range(n):
         w, a, o = HEADER + i * stride, MOTION_HEADER + i * MOTION_WHEEL, i * POWER_WHEEL
         speed = m[a + MOTION_SPEED]
-        carried = p[w + TO_TWIST] * fx + p[w + TO_TWIST + 1] * fy + p[w + TO_TWIST + 2] * mz
+        carried = times(p, w + TO_TWIST, fx, fy, mz)
         carried += p[w + AXLE_INERTIA] * m[a + MOTION_ACCELERATION]
         load = max(p[w + LOAD] + p[w + LOAD_X] * along_x + p[w + LOAD_Y] * along_y, 0.0)
         k, hot = p[w + CONSTANT], p[w + RESISTANCE] * (1.0 + COPPER * m[a + MOTION_RISE])

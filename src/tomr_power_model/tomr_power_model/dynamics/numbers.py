@@ -207,9 +207,8 @@ def _wheels(records: Array, vehicle: Vehicle, effects: PlantNumbers, geometry: G
 
 
 def _laws(records: Array, vehicle: Vehicle) -> None:
-    effects = EFFECTS
     for effect_id, place in law_offsets().items():
-        names = list(effects[effect_id].parameters)
+        names = list(EFFECTS[effect_id].parameters)
         for record, given in zip(records, vehicle.physics.get(effect_id, ()), strict=False):
             if given is not None:
                 record[place] = 1.0

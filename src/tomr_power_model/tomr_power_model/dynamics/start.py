@@ -2,7 +2,7 @@
 
 import math
 
-from tomr_power_model.dynamics.contacts import Mutable, Numbers
+from tomr_power_model.dynamics.contacts import Mutable, Numbers, times
 from tomr_power_model.dynamics.inverse import drive_power
 from tomr_power_model.dynamics.layout import (
     ANGLE,
@@ -58,10 +58,8 @@ def begin(p: Numbers, s: Mutable, motion: Mutable, power: Mutable, n: int) -> No
     for i in range(n):
         w, z = HEADER + i * stride, STATE_HEADER + i * STATE_WHEEL
         a = MOTION_HEADER + i * MOTION_WHEEL
-        speed = change = 0.0
-        for k in range(3):
-            speed += p[w + ROLL + k] * s[TWIST + k]
-            change += p[w + ROLL + k] * s[RATE + k]
+        speed = times(p, w + ROLL, s[TWIST], s[TWIST + 1], s[TWIST + 2])
+        change = times(p, w + ROLL, s[RATE], s[RATE + 1], s[RATE + 2])
         s[z + SPEED], s[z + MEASURED], s[z + MEAN] = speed, speed, speed
         s[z + RISE] = p[w + INITIAL_RISE]
         s[z + WHEEL_LOAD], s[z + TURNED], s[z + COUNTED] = p[w + LOAD], 0.0, 0.0

@@ -28,6 +28,7 @@ from tomr_power_model.dynamics.contacts import (
     body_force,
     contacts,
     slide,
+    times,
     too_much,
 )
 from tomr_power_model.dynamics.layout import (
@@ -196,9 +197,8 @@ def control(p: Numbers, s: Mutable, u: Numbers, n: int) -> None:
     share = 1.0 - p[SAG] * s[DRAWN] / most
     for i in range(n):
         w, z = HEADER + i * stride, STATE_HEADER + i * STATE_WHEEL
-        asked = p[w + ASK] * vx + p[w + ASK + 1] * vy + p[w + ASK + 2] * wz
-        s[z + ASKED] = asked
-        error = asked - s[z + MEASURED]
+        s[z + ASKED] = times(p, w + ASK, vx, vy, wz)
+        error = s[z + ASKED] - s[z + MEASURED]
         total = s[z + INTEGRAL] + error * p[PERIOD]
         summed = total if p[BACKWARD] > 0.0 else s[z + INTEGRAL]
         wanted = p[PROPORTIONAL] * error + p[INTEGRAL_GAIN] * summed
@@ -225,7 +225,7 @@ def substep(p: Numbers, s: Mutable, u: Numbers, n: int) -> None:
         fy += p[w + ROLL + 1] * torque
         mz += p[w + ROLL + 2] * torque
         if p[DRAGS] > 0.0:
-            along = p[w + ALONG] * vx + p[w + ALONG + 1] * vy + p[w + ALONG + 2] * wz
+            along = times(p, w + ALONG, vx, vy, wz)
             across = p[w + ROLLER_SLIP] * s[z + SPEED]
             sliding = math.sqrt(along * along + across * across)
             if sliding > 0.0:
@@ -242,7 +242,7 @@ def substep(p: Numbers, s: Mutable, u: Numbers, n: int) -> None:
     x, y, yaw = contacts(p, s, n, x, y, yaw)
     for i in range(n):
         w, z = HEADER + i * stride, STATE_HEADER + i * STATE_WHEEL
-        s[z + NEXT] = p[w + ROLL] * x + p[w + ROLL + 1] * y + p[w + ROLL + 2] * yaw
+        s[z + NEXT] = times(p, w + ROLL, x, y, yaw)
         s[z + MEAN] = 0.5 * (s[z + SPEED] + s[z + NEXT])
         s[z + GAP] = 0.0
     s[YAW_MEAN] = 0.5 * (wz + yaw)

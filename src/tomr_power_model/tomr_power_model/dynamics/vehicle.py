@@ -54,16 +54,6 @@ def omni_wheel(x: float, y: float, drive: float) -> WheelPlace:
     return WheelPlace(x, y, drive, drive + 0.5 * math.pi)
 
 
-def mecanum_wheel(x: float, y: float, drive: float, twist: float) -> WheelPlace:
-    """A wheel with rollers whose free direction lies `twist` [rad] anti-clockwise of its drive."""
-    return WheelPlace(x, y, drive, drive + twist)
-
-
-def plain_wheel(x: float, y: float, drive: float) -> WheelPlace:
-    """A wheel without rollers."""
-    return WheelPlace(x, y, drive, None)
-
-
 def vehicle_of(robot: Robot) -> Vehicle:
     """Three omni wheels around the middle, as ros2_controllers' omni_wheel_drive_controller."""
     places = []
@@ -108,9 +98,8 @@ def plant_numbers(vehicle: Vehicle) -> PlantNumbers:
         power_lag=[0.0] * n,
         power_delay=[0.0] * n,
     )
-    effects = EFFECTS
     for effect_id, per_wheel in vehicle.physics.items():
-        effect = effects[effect_id]
+        effect = EFFECTS[effect_id]
         own = per_wheel if effect.place == "wheel" else per_wheel[:1]
         for wheel, given in enumerate(own):
             if given is not None:

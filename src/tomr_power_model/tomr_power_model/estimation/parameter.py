@@ -9,8 +9,10 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.effects import EFFECTS
+from tomr_power_model.effects import EFFECTS, EffectParameter
 from tomr_power_model.robot import Robot, robot_from_parameters
+from tomr_power_model.robot.description import split_effect
+from tomr_power_model.robot.parameters import ParameterSpec
 from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
 
 Array = NDArray[np.float64]
@@ -84,13 +86,13 @@ class ParameterisedRobot:
         """The same with some values set, such as the shape of an effect that joins."""
         changed = dict(self.values)
         for key, value in values.items():
-            group, _, axis = key.rpartition(".")
-            if group == _CENTER:
-                center = list(cast(Iterable[float], changed.get(_CENTER, (0.0, 0.0, 0.0))))
-                center[_AXES.index(axis)] = float(value)
-                changed[_CENTER] = center
-            else:
+            axis = center_axis(key)
+            if axis is None:
                 changed[key] = value
+            else:
+                center = center_of(changed)
+                center[axis] = float(value)
+                changed[_CENTER] = center
         return ParameterisedRobot(MappingProxyType(changed), self.place)
 
     @property
@@ -106,13 +108,18 @@ def per_wheel(values: Values, wheel_names: Sequence[str], place: str) -> Paramet
         shared = flat.get(spec.name)
         for wheel in wheel_names:
             flat.setdefault(wheel_key(spec.name, wheel), shared)
-    for key in [key for key in flat if key.startswith("physics.")]:
-        effect_id, rest = split_effect(key)
-        if EFFECTS[effect_id].place == "wheel" and "." not in rest:
+    for key in values:
+        if is_of_wheels(key) and not any(f".{wheel}." in key for wheel in wheel_names):
             for wheel in wheel_names:
-                flat.setdefault(f"physics.{effect_id}.{wheel}.{rest}", flat[key])
+                flat.setdefault(wheel_key(key, wheel), flat[key])
             del flat[key]
     return ParameterisedRobot(MappingProxyType(flat), place)
+
+
+def is_of_wheels(key: str) -> bool:
+    """Whether a number is one of an effect that acts at wheels."""
+    found = split_effect(key)
+    return found is not None and EFFECTS[found[0]].place == "wheel"
 
 
 def wheel_key(general: str, wheel: str) -> str:
@@ -121,43 +128,49 @@ def wheel_key(general: str, wheel: str) -> str:
     return f"{group}.{wheel}.{leaf}"
 
 
-def split_effect(key: str) -> tuple[str, str]:
-    """(effect id, rest) of physics.<effect id>.<rest>."""
-    for effect_id in EFFECTS:
-        prefix = f"physics.{effect_id}."
-        if key.startswith(prefix):
-            return effect_id, key.removeprefix(prefix)
-    raise KeyError(key)
+def effect_parameter(key: str) -> EffectParameter | None:
+    """What the vocabulary says of a number; None for one that belongs to no effect."""
+    found = split_effect(key)
+    if found is None:
+        return None
+    effect_id, rest = found
+    return EFFECTS[effect_id].parameters[rest.rpartition(".")[2]]
+
+
+def center_axis(key: str) -> int | None:
+    """Which coordinate of the mass centre a number is; None for another one."""
+    group, _, axis = key.rpartition(".")
+    return _AXES.index(axis) if group == _CENTER and axis in _AXES else None
+
+
+def center_of(values: Values) -> list[float]:
+    """The mass centre that a description gives [m]."""
+    return list(cast(Iterable[float], values.get(_CENTER, (0.0, 0.0, 0.0))))
 
 
 def neutral_of(key: str) -> float:
     """What a number counts as where a description leaves it out."""
-    if not key.startswith("physics."):
-        return 0.0
-    effect_id, rest = split_effect(key)
-    return EFFECTS[effect_id].parameters[rest.rpartition(".")[2]].neutral
+    described = effect_parameter(key)
+    return 0.0 if described is None else described.neutral
 
 
 def bounds_of(key: str) -> tuple[float, float]:
     """Permitted range of a description's number."""
-    if key.startswith("physics."):
-        effect_id, rest = split_effect(key)
-        parameter = EFFECTS[effect_id].parameters[rest.rpartition(".")[2]]
-        return max(parameter.minimum, parameter.above + _TINY), parameter.maximum
-    leaf = key.rpartition(".")[2]
-    group = key.partition(".")[0]
-    for spec in ROBOT_PARAMETERS:
-        if spec.name == f"{group}.{leaf}":
-            return max(spec.minimum, spec.above + _TINY), spec.maximum
-    return -math.inf, math.inf
+    described = effect_parameter(key) or _fixed(key)
+    if described is None:
+        return -math.inf, math.inf
+    return max(described.minimum, described.above + _TINY), described.maximum
 
 
 def unit_of(key: str) -> str:
     """Unit of a description's number."""
-    group, _, leaf = key.rpartition(".")
-    if key.startswith("physics."):
-        return EFFECTS[split_effect(key)[0]].parameters[leaf].unit
-    if group == _CENTER:
+    if center_axis(key) is not None:
         return "m"
-    names = {spec.name: spec.unit for spec in ROBOT_PARAMETERS}
-    return names.get(f"{key.partition('.')[0]}.{leaf}", "")
+    described = effect_parameter(key) or _fixed(key)
+    return "" if described is None else described.unit
+
+
+def _fixed(key: str) -> ParameterSpec | None:
+    """A number that every description has, be it of one wheel's motor."""
+    general = f"{key.partition('.')[0]}.{key.rpartition('.')[2]}"
+    return next((spec for spec in ROBOT_PARAMETERS if spec.name == general), None)

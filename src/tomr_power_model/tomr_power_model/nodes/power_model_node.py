@@ -1,16 +1,16 @@
 """Node `power_model`: the predicted power of each motor."""
 
-from tomr_power_model.messages.inputs import model_inputs
 from tomr_power_model.messages.outgoing import JointMessage, SupplyMessage
-from tomr_power_model.messages.predictions import (
-    EXPECTED,
-    prediction_messages,
-    prediction_topics,
-)
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.settings import MODEL_PARAMETERS, ModelSettings
 from tomr_power_model.nodes.command_line import node_arguments
 from tomr_power_model.nodes.stage_node import CMD_VEL_TYPE, TWIST_TYPES, StageNode, run_node
+from tomr_power_model.topics.inputs import model_inputs
+from tomr_power_model.topics.predictions import (
+    EXPECTED,
+    prediction_messages,
+    prediction_topics,
+)
 
 PARAMETERS = (*MODEL_PARAMETERS, CMD_VEL_TYPE)
 

@@ -17,12 +17,12 @@ from rclpy.signals import SignalHandlerOptions
 
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_OK
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.inputs import Complaints, Input
 from tomr_power_model.messages.outgoing import TYPES, Outgoing
 from tomr_power_model.messages.plain import Plain, build
 from tomr_power_model.messages.types import TWIST, TWIST_STAMPED
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
 from tomr_power_model.robot.parameters import ParameterSpec, Value
+from tomr_power_model.topics.inputs import Complaints, Input
 
 # Sensors are best effort: a late sample is worth less than the next one. The depth bridges the
 # moments in which a small computer does something else.

@@ -192,16 +192,12 @@ def _motors(
     return motors[0], motors[1], motors[2]
 
 
-def _split_physics(key: str, names: tuple[str, ...]) -> tuple[str, str | None, str] | None:
-    """Split physics.<effect>[.<wheel>].<parameter> into its parts, None if it is no such key."""
+def split_effect(key: str) -> tuple[str, str] | None:
+    """(effect id, rest) of physics.<effect id>.<rest>; None for another key."""
     for effect_id in EFFECTS:
         prefix = f"physics.{effect_id}."
         if key.startswith(prefix):
-            rest = key.removeprefix(prefix)
-            for name in names:
-                if rest.startswith(name + "."):
-                    return effect_id, name, rest.removeprefix(name + ".")
-            return effect_id, None, rest
+            return effect_id, key.removeprefix(prefix)
     return None
 
 
@@ -211,10 +207,12 @@ def _physics(
     shared: dict[str, dict[str, float]] = {}
     own: dict[str, dict[str, dict[str, float]]] = {}
     for key, value in values.items():
-        parts = _split_physics(key, names)
+        parts = split_effect(key)
         if parts is None:
             continue
-        effect_id, name, parameter = parts
+        effect_id, rest = parts
+        name = next((name for name in names if rest.startswith(name + ".")), None)
+        parameter = rest if name is None else rest.removeprefix(name + ".")
         number = _effect_parameter(effect_id, parameter, key, value, place)
         if name is None:
             shared.setdefault(effect_id, {})[parameter] = number
@@ -273,7 +271,7 @@ def _reject_unknown(values: Mapping[str, object], names: tuple[str, ...], place:
         for spec in MOTOR_PARAMETERS
     }
     for key in values:
-        if key in fixed or key in overrides or _split_physics(key, names):
+        if key in fixed or key in overrides or split_effect(key):
             continue
         near = closest(key, [*fixed, *(f"physics.{effect}" for effect in EFFECTS)])
         raise InputError(f"{place}: {key} is unknown: {near}")

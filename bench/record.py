@@ -1,0 +1,22 @@
+"""Missions of the simulator, recorded."""
+
+from pathlib import Path
+
+from tomr_power_model.messages.bag import to_bag
+from tomr_power_model.messages.plain import NANOSECONDS
+from tomr_power_model.recordings import RecordingWriter
+from tomr_power_model.robot import Robot
+from tomr_sim_bridge.missions import drive, load_mission, start_mission
+
+_START_NS = 1_700_000_000 * NANOSECONDS
+
+
+def record_mission(name: str, plant: Robot, seed: int, path: Path) -> None:
+    """Drive a mission with a seed and keep the recording."""
+    mission = load_mission(name)
+    simulation = start_mission(mission, plant, seed, _START_NS)
+    with RecordingWriter(path) as writer:
+        for samples in drive(mission, simulation, seed):
+            for sample in samples:
+                message = to_bag(sample.message)
+                writer.write(sample.topic, sample.message.type_name, message, sample.stamp_ns)
