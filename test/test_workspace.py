@@ -43,6 +43,8 @@ LIBRARIES = {
 TRAINING = {"torch"}
 # Only a fleet of recordings needs Dask: requirements-fleet.txt.
 FLEET = {"distributed"}
+# What tests of several packages share; pyproject.toml puts it on their path.
+SHARED = {path.stem for path in ROOT.glob("test/*.py")}
 
 
 @functools.cache
@@ -188,6 +190,7 @@ def test_imports_are_declared(package: Path) -> None:
             *(TRAINING if package.name == "tomr_training" else ()),
         }
         known |= FLEET if "fleet" in str(file.relative_to(package)) else set()
+        known |= SHARED if file.parent.name == "test" else set()
         for name in {full.partition(".")[0] for full in imports(file)} - known:
             key, requirement = LIBRARIES.get(name, (name, None))
             assert key in declared, f"{file} imports {name}: package.xml does not declare {key}"
