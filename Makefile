@@ -74,7 +74,7 @@ bench: setup ## measure CPU, latency and offline speed, as ratios (not a test)
 figures: .venv/training ## draw the figures of docs/experiments.md anew (installs torch)
 	$(BIN)/python bench/experiments.py all --out docs/figures
 
-train: .venv/training ## train the classifier anew, in two minutes (installs torch)
+train: .venv/training ## train the classifier anew, in five minutes (installs torch)
 	$(BIN)/tomr_train --out src/tomr_fault_diag/tomr_fault_diag/weights/window.npz $(ARGS)
 
 bags: setup ## record the small recordings in bags/ anew

@@ -12,6 +12,7 @@ from attrs import evolve
 from tomr_fault_diag.classifier.belief import CONTROLS, Belief, six_of
 from tomr_fault_diag.classifier.features import (
     BLIND,
+    CHANNELS,
     INPUTS,
     WINDOW,
     by_wheel,
@@ -77,26 +78,34 @@ def test_channels_by_hand() -> None:
     one = np.arcsinh(3.0)
     assert seen[0] == 0.0
     np.testing.assert_allclose(seen[1:4], [one, 0.0, -one])
+    # What is measured: 4 W, 2 W and nothing, each against a band of 2 W.
+    np.testing.assert_allclose(seen[7:10], [np.arcsinh(6.0), one, 0.0])
     # "Slower than told" by 0.4 rad/s at -8 rad/s is +0.4 rad/s; an unknown one is as modelled.
-    np.testing.assert_allclose(seen[7:10], [one, np.arcsinh(6.0), 0.0])
-    np.testing.assert_allclose(seen[10:13], np.arcsinh([6.0, -16.0, 10.0]))
-    np.testing.assert_allclose(seen[13:16], np.arcsinh([6.4, -15.2, 10.0]))
+    np.testing.assert_allclose(seen[10:13], [one, np.arcsinh(6.0), 0.0])
+    np.testing.assert_allclose(seen[13:16], np.arcsinh([6.0, -16.0, 10.0]))
+    np.testing.assert_allclose(seen[16:19], np.arcsinh([6.4, -15.2, 10.0]))
+
+
+def test_unknown_power_looks_as_modelled_and_draws_nothing() -> None:
+    seen = channels_of(frame(0, ALL, power=(NAN, 0.0, 0.0)))
+    assert seen[1] == seen[7] == 0.0
+    assert seen[8] > 0.0
 
 
 def test_each_wheel_sees_itself_first_and_turning_forwards() -> None:
-    window = np.arange(WINDOW * 16, dtype=float).reshape(WINDOW, 16) + 1.0
-    window[:, 11] *= -1.0  # wheel 2 turns backwards
-    views = by_wheel(window).reshape(3, WINDOW, 16)
+    window = np.arange(WINDOW * CHANNELS, dtype=float).reshape(WINDOW, CHANNELS) + 1.0
+    window[:, 14] *= -1.0  # wheel 2 turns backwards
+    views = by_wheel(window).reshape(3, WINDOW, CHANNELS)
     np.testing.assert_array_equal(views[0], window)
     np.testing.assert_array_equal(views[1, :, 1:4], window[:, [2, 3, 1]])
-    np.testing.assert_array_equal(views[1, :, 10:13], -window[:, [11, 12, 10]])
-    np.testing.assert_array_equal(views[2, :, 7:10], window[:, [9, 7, 8]])
+    np.testing.assert_array_equal(views[1, :, 13:16], -window[:, [14, 15, 13]])
+    np.testing.assert_array_equal(views[2, :, 7:13], window[:, [9, 7, 8, 12, 10, 11]])
 
 
 def test_another_numbering_of_the_wheels_names_the_other_wheel() -> None:
     network, random = WindowNetwork.load(), np.random.default_rng(0)
-    window = random.normal(0.0, 1.0, (WINDOW, 16))
-    turned = window[:, [0, *(1 + 3 * g + (w + 1) % 3 for g in range(5) for w in range(3))]]
+    window = random.normal(0.0, 1.0, (WINDOW, CHANNELS))
+    turned = window[:, [0, *(1 + 3 * g + (w + 1) % 3 for g in range(6) for w in range(3))]]
     ahead, found = network.scores_of(window), network.scores_of(turned)
     np.testing.assert_allclose(found[:2], ahead[:2])
     np.testing.assert_allclose(found[2:5], ahead[[3, 4, 2]])
@@ -218,12 +227,14 @@ def test_a_wheel_that_moves_without_being_told_is_not_idle() -> None:
 
 
 def test_robots_that_lack_a_sensor_look_as_modelled_there() -> None:
-    window = np.ones((2, WINDOW, 16))
+    window = np.ones((2, WINDOW, CHANNELS))
     total, motors, encoders = (blind(window.copy()) for blind in BLIND)
     assert (total[..., 0] == 0.0).all()
     assert (total[..., 1:] == 1.0).all()
-    assert (motors[..., 1:7] == 0.0).all()
-    assert (encoders[..., 4:10] == 0.0).all()
+    assert (motors[..., 1:10] == 0.0).all()
+    assert (motors[..., 10:] == 1.0).all()
+    assert (encoders[..., [4, 5, 6, 10, 11, 12]] == 0.0).all()
+    assert (encoders[..., [7, 8, 9]] == 1.0).all()
     assert by_wheel(window).shape == (2, 3, INPUTS)
 
 

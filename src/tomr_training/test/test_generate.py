@@ -3,12 +3,11 @@
 from collections.abc import Callable
 
 import numpy as np
-import pytest
-from attrs import asdict, evolve
+from attrs import evolve
 
 from tomr_power_model.robot import shipped_robot
 from tomr_sim_bridge.missions.schema import PlannedFault
-from tomr_training.drives import Drive, random_drive
+from tomr_training.drives import Drive
 from tomr_training.labels import SLIPPING, Noise, deviates
 from tomr_training.planar.generate import (
     CONTROL,
@@ -17,7 +16,6 @@ from tomr_training.planar.generate import (
     NORMAL,
     STATE_OF,
     simulate,
-    training_drive,
 )
 from tomr_training.planar.plant import run_plant
 
@@ -56,21 +54,6 @@ def test_slipping_without_a_fault_is_ignored(straight: Callable[..., Drive]) -> 
     labels = simulate(drive).labels
     assert (labels[slips] == IGNORED).all()
     assert (labels[~slips] == NORMAL).all()
-
-
-def test_every_other_robot_is_tuned_and_some_are_shoved_before_they_start() -> None:
-    shoved = 0
-    for seed in range(8):
-        drive, plain = training_drive(REFERENCE, seed), random_drive(REFERENCE, seed)
-        given, own = asdict(plain.plant.controller), asdict(drive.plant.controller)
-        changed = {key: own[key] / given[key] for key in own if own[key] != given[key]}
-        tuned = set() if seed % 2 else {"proportional", "integral", "acceleration_limit"}
-        assert set(changed) == tuned
-        assert list(changed.values()) == pytest.approx([1.0] * len(changed), abs=0.05)
-        early = drive.bumps[len(plain.bumps) :]
-        assert all(bump.start < 1.0 for bump in early)
-        shoved += bool(early)
-    assert 0 < shoved < 8
 
 
 def test_a_true_state_is_named_without_the_wheel_of_a_lost_signal() -> None:

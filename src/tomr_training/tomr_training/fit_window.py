@@ -31,7 +31,7 @@ _CHUNK = 8192
 class WindowRecipe:
     """Size of the network and how it is trained."""
 
-    hidden: tuple[int, int] = (64, 32)
+    hidden: tuple[int, int] = (96, 48)
     learning_rate: float = 6e-3
     batch: int = 1024
     epochs: int = 6
@@ -44,7 +44,7 @@ class WindowRecipe:
 
 @frozen
 class Examples:
-    """Drives as the network sees them, (n, WINDOW - 1 + ticks, 16), and what to learn of them."""
+    """Drives as the network sees them, (n, WINDOW - 1 + ticks, 19), and what to learn of them."""
 
     seen: Floats
     drive: NDArray[np.int64]  # of each example, (m,)
@@ -55,7 +55,7 @@ class Examples:
         return len(self.label)
 
     def windows(self, rows: NDArray[np.int64]) -> Floats:
-        """Windows of some examples, (rows, WINDOW, 16), the newest tick last."""
+        """Windows of some examples, (rows, WINDOW, 19), the newest tick last."""
         ticks = self.tick[rows, None] + np.arange(WINDOW)
         return np.asarray(self.seen[self.drive[rows, None], ticks])
 
@@ -77,7 +77,7 @@ def examples_of(drives: Iterable[LabelledTicks], recipe: WindowRecipe) -> Exampl
 
 
 def channels_of_drive(drive: LabelledTicks) -> Floats:
-    """Channels of a drive, (ticks, 16)."""
+    """Channels of a drive, (ticks, 19)."""
     residual, band = drive.compared.residuals(BandSettings())
     return channels(residual, band, drive.compared.modelled).astype(np.float32)
 
@@ -107,7 +107,7 @@ class FittedWindow:
     """Trained weights, and what torch itself answers to some windows."""
 
     network: WindowNetwork
-    check_windows: Floats  # (k, WINDOW, 16)
+    check_windows: Floats  # (k, WINDOW, 19)
     check_scores: NDArray[np.float64]  # (k, 8)
 
 

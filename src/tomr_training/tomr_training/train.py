@@ -68,7 +68,7 @@ def _parser() -> argparse.ArgumentParser:
         default="calibrated",
         help="of wang2024: bands that make the codes (default: %(default)s)",
     )
-    parser.add_argument("--drives", type=int, default=3600, help="to train on (default 3600)")
+    parser.add_argument("--drives", type=int, default=7200, help="to train on (default 7200)")
     parser.add_argument("--validation", type=int, default=200, help="to validate on (default 200)")
     parser.add_argument("--first-seed", type=int, default=10_000_000, help="of the drives")
     parser.add_argument("--epochs", type=int, help="default: that of the recipe")

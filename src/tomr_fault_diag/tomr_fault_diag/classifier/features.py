@@ -1,10 +1,11 @@
 """What the window network sees of a frame: continuous, scaled so that healthy is about 1 or less.
 
-Sixteen numbers a tick, in groups of three by wheel:
+Nineteen numbers a tick, in groups of three by wheel:
 
     total        residual of the total power / band
     motors 1-3   residuals of the motors' powers against the command / band
     encoders 1-3 the same against the encoders
+    drawn 1-3    measured power of the motors / band: a driver without a signal draws next to none
     slower 1-3   measured - expected wheel speed / band, signed as the wheel turns
     expected 1-3, measured 1-3   wheel speeds
 
@@ -24,14 +25,13 @@ from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL, Res
 Array = NDArray[np.float64]
 Real = TypeVar("Real", np.float32, np.float64)
 
-CHANNELS = 16
+CHANNELS = 19
 WINDOW = 8  # ticks
 INPUTS = CHANNELS * WINDOW
 _FINE = 3.0  # per band
 _SPEED = 0.5  # rad/s
-_RESIDUAL = slice(0, 7)
-_SIGNED = slice(7, CHANNELS)
-_EXPECTED = slice(10, 13)
+_SIGNED = slice(10, CHANNELS)
+_EXPECTED = slice(13, 16)
 _MOTORS, _SPEEDS, _ENCODERS = list(MOTORS), list(SPEEDS), list(ENCODERS)
 
 
@@ -41,20 +41,21 @@ def _turned(wheel: int) -> list[int]:
     return [0, *(start + (wheel + place) % 3 for start in groups for place in range(3))]
 
 
-TURNS = np.array([_turned(wheel) for wheel in range(3)])  # (3, 16)
+TURNS = np.array([_turned(wheel) for wheel in range(3)])  # (3, 19)
 SIGNED = np.arange(CHANNELS) >= _SIGNED.start  # channels that turn with the wheels' direction
 
 
 def channels(residual: Array, band: Array, modelled: Array) -> Array:
-    """Channels (..., 16) of residuals, bands and modelled values (..., 10), NaN where unknown."""
-    scaled = np.arcsinh(_FINE * residual / band)
-    scaled[~np.isfinite(scaled)] = 0.0
+    """Channels (..., 19) of residuals, bands and modelled values (..., 10), NaN where unknown."""
+    scaled = _scaled(residual / band)
+    drawn = _scaled(((modelled + residual) / band)[..., _MOTORS])
     expected = np.nan_to_num(modelled[..., _SPEEDS])
     way = np.where(expected < 0.0, -1.0, 1.0)
     measured = expected + np.nan_to_num(residual[..., _SPEEDS]) * way
     return np.concatenate(
         [
             scaled[..., [TOTAL, *_MOTORS, *_ENCODERS]],
+            drawn,
             scaled[..., _SPEEDS] * way,
             np.arcsinh(expected / _SPEED),
             np.arcsinh(measured / _SPEED),
@@ -63,13 +64,23 @@ def channels(residual: Array, band: Array, modelled: Array) -> Array:
     )
 
 
+def _scaled(ratio: Array) -> Array:
+    """As the network sees a ratio to a band; what is unknown is "as modelled"."""
+    found = np.arcsinh(_FINE * ratio)
+    return np.where(np.isfinite(found), found, 0.0)
+
+
 def channels_of(frame: ResidualFrame) -> Array:
-    """Channels (16,) of one frame, as `channels`; plain floats, ten are too few for numpy."""
+    """Channels (19,) of one frame, as `channels`; plain floats, ten are too few for numpy."""
     scaled = [
         0.0 if item.stale else math.asinh(_FINE * item.residual / item.band)
         for item in frame.residuals
     ]
     values = [scaled[TOTAL], *(scaled[k] for k in _MOTORS), *(scaled[k] for k in _ENCODERS)]
+    for k in _MOTORS:
+        item = frame.residuals[k]
+        drawn = item.modelled + item.residual
+        values.append(0.0 if item.stale else math.asinh(_FINE * drawn / item.band))
     expected, measured = [], []
     for k in _SPEEDS:
         item = frame.residuals[k]
@@ -83,11 +94,11 @@ def channels_of(frame: ResidualFrame) -> Array:
 
 
 def by_wheel(window: NDArray[Real]) -> NDArray[Real]:
-    """Inputs (..., 3, WINDOW * 16) as seen from each wheel, of windows (..., WINDOW, 16).
+    """Inputs (..., 3, WINDOW * 19) as seen from each wheel, of windows (..., WINDOW, 19).
 
     The newest tick comes last.
     """
-    seen = window[..., TURNS]  # (..., WINDOW, 3, 16)
+    seen = window[..., TURNS]  # (..., WINDOW, 3, 19)
     way = np.where(window[..., -1, _EXPECTED] < 0.0, -1.0, 1.0).astype(window.dtype)  # (..., 3)
     seen = np.where(SIGNED, seen * way[..., None, :, None], seen)
     seen = np.moveaxis(seen, -2, -3)
@@ -100,13 +111,13 @@ def _without_total(window: Array) -> Array:
 
 
 def _without_motors(window: Array) -> Array:
-    window[..., 1:7] = 0.0
+    window[..., 1:10] = 0.0
     return window
 
 
 def _without_encoders(window: Array) -> Array:
-    window[..., 4:10] = 0.0
-    window[..., 13:16] = window[..., 10:13]
+    window[..., [4, 5, 6, 10, 11, 12]] = 0.0
+    window[..., 16:19] = window[..., 13:16]
     return window
 
 

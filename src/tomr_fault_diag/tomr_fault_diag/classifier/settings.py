@@ -50,7 +50,7 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
         "striking",
         "of window: log-likelihood ratio to normal that a single window must reach besides",
         "float",
-        7.0,
+        9.0,
         "",
         0.0,
         50.0,
@@ -72,7 +72,7 @@ class ClassifierSettings:
     weights: str = ""
     evidence_weight: float = 0.4
     caution: float = 11.0
-    striking: float = 7.0
+    striking: float = 9.0
     filter_time: int = to_ns(0.15)
     confirm_time: int = to_ns(0.15)
     recovery_time: int = to_ns(1.0)

@@ -70,11 +70,11 @@ class WindowNetwork:
         return np.concatenate([out[..., :2].mean(axis=-2), out[..., 2], out[..., 3]], axis=-1)
 
     def scores_of(self, windows: Array) -> Array:
-        """Logits (..., 8) of windows (..., WINDOW, 16)."""
+        """Logits (..., 8) of windows (..., WINDOW, 19)."""
         return self.scores(by_wheel(windows))
 
     def log_likelihoods(self, window: Array) -> Array:
-        """Log-likelihoods (8,), up to a constant, of a window (WINDOW, 16)."""
+        """Log-likelihoods (8,), up to a constant, of a window (WINDOW, 19)."""
         return np.asarray(self.scores_of(window) - self._log_prior)
 
     @cached_property

@@ -6,16 +6,17 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.belief import CONTROLS, ENCODERS, HYPOTHESES, six_of
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_sim_bridge.missions.schema import PlannedFault
-from tomr_training.drives import DEVIATION, Drive, bumps, random_drive, wheel_of
+from tomr_training.drives import Drive, wheel_of
 from tomr_training.labels import SLIPPING, Flags, GroundTruth, Noise, deviates
 from tomr_training.planar.plant import run_plant
+from tomr_training.planar.population import training_drive
 from tomr_training.planar.residuals import Compared, compare
 from tomr_training.planar.schedule import faulty_ticks
 from tomr_training.planar.sensors import Signals
@@ -54,32 +55,6 @@ def _simulated(seed: int) -> LabelledTicks:
 @cache
 def _reference() -> Robot:
     return shipped_robot("reference")
-
-
-def training_drive(reference: Robot, seed: int) -> Drive:
-    """A random drive, every other one bumped before it starts: shoved, not faulty.
-
-    Every other robot has drivers that are tuned a little off as well: a real driver's loop is
-    never known as well as a simulated one's.
-    """
-    drive = random_drive(reference, seed)
-    random = np.random.default_rng([seed, 2])
-    early = bumps(drive.believed, random, int(random.integers(0, 2)), 1.0)
-    drive = evolve(drive, bumps=(*drive.bumps, *early))
-    if seed % 2:
-        return drive
-    given = drive.plant.controller
-
-    def off(value: float) -> float:
-        return float(value * random.uniform(1.0 - DEVIATION, 1.0 + DEVIATION))
-
-    tuned = evolve(
-        given,
-        proportional=off(given.proportional),
-        integral=off(given.integral),
-        acceleration_limit=off(given.acceleration_limit),
-    )
-    return evolve(drive, plant=evolve(drive.plant, controller=tuned))
 
 
 def simulate(drive: Drive) -> LabelledTicks:
