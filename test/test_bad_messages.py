@@ -307,7 +307,7 @@ def _disturb(bench: Bench, name: str, case: Case) -> None:
         assert not frame.outside, (name, frame)
         assert case.stale or not frame.stale, (name, frame)
     for _, state in bench.states[said:]:
-        assert _quiet(state) or (case.stale and state.startswith("unknown")), (name, state)
+        assert _quiet(state) or (case.stale and state.startswith("stale")), (name, state)
     if case.node:
         bench.processes[case.node].wait_for_output(case.words)
 
@@ -335,7 +335,7 @@ def _restart_the_model(bench: Bench, spawn: Callable[[str], Any]) -> None:
     bench.until(lambda: len(bench.frames[-1].stale) == len(NAMES), "nothing to compare")
     reasons = set(bench.frames[-1].stale.values())
     assert reasons == {"no prediction: is the power_model node running?"}
-    bench.until(lambda: bench.states[-1][1].startswith("unknown: no prediction"), "unknown state")
+    bench.until(lambda: bench.states[-1][1].startswith("stale: no prediction"), "stale state")
     bench.processes["power_model"] = spawn("power_model")
     bench.until(lambda: bench.is_sound(since), "all is well after the restart", timeout=30.0)
     assert not any(frame.outside for frame in bench.frames[since:])

@@ -12,7 +12,7 @@ from stages import as_arrays, pipeline_of, steps_of
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.stage import Diagnosis
-from tomr_fault_diag.classifier.states import NOT_OBSERVABLE, UNKNOWN
+from tomr_fault_diag.classifier.states import DISOBEYS, NOT_OBSERVABLE
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, ResidualFrame
 from tomr_power_model.model.ticks import NANOSECONDS
 
@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 Change = tuple[float, str, int | None]  # stamp [s], state, wheel 1..3
 
 JOBS = 2
-# The suite's `unknown` says that no power can be compared; the score's says: an unknown fault.
-_SCORED = {NOT_OBSERVABLE.name: "not_observable", UNKNOWN.name: "stale"}
+# The score knows no state of a robot that does not follow: none of its faults is known.
+_SCORED = {NOT_OBSERVABLE.name: "not_observable", DISOBEYS.name: "unknown"}
 
 
 @frozen

@@ -14,6 +14,7 @@ from tomr_fault_diag.classifier.states import (
     NORMAL,
     NOT_OBSERVABLE,
     SLIP,
+    STALE,
     STATES,
     UNKNOWN,
 )
@@ -26,7 +27,7 @@ DIAGNOSTICS = "/diagnostics"
 TRUTH = "/ground_truth/faults"
 HEALTHY = "healthy"
 NORMAL_STATE = STATES[NORMAL].name
-_NO_FAULTS = (NORMAL_STATE, UNKNOWN.name)
+_NO_FAULTS = (NORMAL_STATE, STALE.name)
 
 
 @frozen

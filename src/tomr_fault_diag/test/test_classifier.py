@@ -13,7 +13,7 @@ from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
-from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STATES, UNKNOWN
+from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STALE, STATES
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_fault_diag.residuals.settings import ResidualSettings
@@ -126,11 +126,11 @@ def test_reports_come_once_a_second_and_on_changes() -> None:
     assert set(gaps[1:].tolist()) == {1000}
 
 
-def test_nothing_to_compare_is_unknown_not_normal() -> None:
+def test_nothing_to_compare_is_stale_not_normal() -> None:
     classifier = _classifier()
     diagnosis = classifier.classify(_frame(1, HEALTHY, stale=True))
     assert diagnosis is not None
-    assert diagnosis.state is UNKNOWN
+    assert diagnosis.state is STALE
     assert diagnosis.state.level is Level.STALE
 
 

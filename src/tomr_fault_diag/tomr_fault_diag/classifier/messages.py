@@ -1,7 +1,7 @@
 """A diagnosis as a DiagnosticArray (REP-107)."""
 
 from tomr_fault_diag.classifier.stage import Diagnosis
-from tomr_fault_diag.classifier.states import NORMAL, NOT_OBSERVABLE, STATES, UNKNOWN
+from tomr_fault_diag.classifier.states import NORMAL, NOT_OBSERVABLE, STALE, STATES
 from tomr_fault_diag.residuals.frame import residual_names
 from tomr_fault_diag.residuals.messages import sentence
 from tomr_power_model.messages.outgoing import DiagnosticMessage
@@ -40,7 +40,7 @@ def evidence_of(robot: Robot, diagnosis: Diagnosis) -> list[str]:
 
 def _headline(robot: Robot, diagnosis: Diagnosis) -> str:
     state = diagnosis.state
-    if state == UNKNOWN:
+    if state == STALE:
         missing = next((r.missing for r in diagnosis.frame.residuals if r.stale), "too little seen")
         return f"{state.name}: {missing}"
     if state == NOT_OBSERVABLE:

@@ -4,9 +4,18 @@ import numpy as np
 from attrs import field, frozen
 
 from tomr_fault_diag.classifier.judges import Judge, Opinion
+from tomr_fault_diag.classifier.misfit import MisfitWatch
 from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
-from tomr_fault_diag.classifier.states import NORMAL, NOT_OBSERVABLE, STATES, UNKNOWN, State
+from tomr_fault_diag.classifier.states import (
+    DISOBEYS,
+    NORMAL,
+    NOT_OBSERVABLE,
+    STALE,
+    STATES,
+    UNKNOWN,
+    State,
+)
 from tomr_fault_diag.residuals.frame import MOTORS, TOTAL, ResidualFrame
 
 
@@ -24,16 +33,23 @@ class Diagnosis:
     unseen: Unseen = field(factory=Unseen)
 
 
+# Whatever comes next may follow at once.
+_QUIET = (None, STALE, NOT_OBSERVABLE, STATES[NORMAL])
+
+
 class FaultClassifier:
     """Streaming core of the classifier; driven by stamps, the same online and offline.
 
     A fault is named when the judge is sure of it, normal again when it leads for `recovery_time`.
-    A named fault stays named while nothing speaks against it, as when its wheel is idle.
+    A named fault stays named while nothing speaks against it, as when its wheel is idle. Whatever
+    the judge says: a robot that does not follow its commands is called so, and what a healthy one
+    could not show is unknown, not normal.
     """
 
     def __init__(self, judge: Judge) -> None:
         self._judge = judge
         self._motion = MotionWatch()
+        self._misfits = MisfitWatch()
         self.clear()
 
     @property
@@ -49,13 +65,14 @@ class FaultClassifier:
         """Start afresh."""
         self._judge.clear()
         self._motion.clear()
+        self._misfits.clear()
         self._stamp = 0
         self._opinion: Opinion | None = None
         self._unseen = Unseen()
         self._state: State | None = None
         self._since = 0
         self._wheel: int | None = None
-        self._candidate = UNKNOWN
+        self._candidate = STALE
         self._candidate_since = 0
 
     def classify(self, frame: ResidualFrame) -> Diagnosis | None:
@@ -94,28 +111,40 @@ class FaultClassifier:
         return stamp // period != (stamp - elapsed) // period
 
     def _decide(self, frame: ResidualFrame, elapsed: int) -> None:
-        self._unseen = self._motion.take(frame)
+        self._unseen, misfit = self._motion.take(frame), self._misfits.take(frame)
         if not _is_decidable(frame):
             self._judge.clear()
             self._opinion = None
-            self._candidate = UNKNOWN
-            self._enter(UNKNOWN, frame.stamp_ns, None)
+            self._candidate = STALE
+            self._enter(STALE, frame.stamp_ns, None)
+            return
+        if misfit.disobeys:
+            # No fault of one wheel looks like this; what the judge makes of it says nothing.
+            self._judge.clear()
+            self._opinion = None
+            self._candidate = DISOBEYS
+            self._enter(DISOBEYS, frame.stamp_ns, None)
             return
         opinion = self._opinion = self._judge.judge(frame, elapsed, self._unseen)
         leading = STATES[int(np.argmax(opinion.probabilities))]
+        if leading is STATES[NORMAL] and misfit.unexplained:
+            leading = UNKNOWN
         if leading != self._candidate:
             self._candidate, self._candidate_since = leading, frame.stamp_ns
-        if leading is STATES[NORMAL]:
+        if leading is UNKNOWN:
+            if self._state in _QUIET:
+                self._enter(UNKNOWN, frame.stamp_ns, None)
+        elif leading is STATES[NORMAL] or (misfit.ignores_commands and self._state in _QUIET):
             self._settle(frame.stamp_ns)
         elif opinion.sure and (leading != self._state or opinion.wheel != self._wheel):
             self._enter(leading, self._candidate_since, opinion.wheel)
         elif self._state is None:
-            self._enter(UNKNOWN, frame.stamp_ns, None)
+            self._enter(STALE, frame.stamp_ns, None)
 
     def _settle(self, stamp: int) -> None:
         """Nothing is wrong, any more or still; what that is called depends on the motion."""
         quiet = NOT_OBSERVABLE if self._unseen.everything else STATES[NORMAL]
-        if self._state in (None, UNKNOWN, NOT_OBSERVABLE, STATES[NORMAL]):
+        if self._state in _QUIET:
             self._enter(quiet, stamp, None)
         elif stamp - self._candidate_since >= self.settings.recovery_time:
             self._enter(quiet, self._candidate_since, None)

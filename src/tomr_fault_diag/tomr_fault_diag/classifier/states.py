@@ -26,7 +26,10 @@ NORMAL = 0
 SLIP = 1
 CONTROL = 2
 MOTOR = 3  # of wheel 0; those of wheels 1 and 2 follow
-UNKNOWN = State("unknown", Level.STALE)
+# Something is wrong that is none of these, or what is wrong cannot be told.
+DISOBEYS = State("does not follow its commands", Level.ERROR)
+UNKNOWN = State("unknown", Level.WARN)
+STALE = State("stale", Level.STALE)  # nothing can be compared
 # Nothing is wrong as far as can be told, and in this motion nothing could be told.
 NOT_OBSERVABLE = State("not observable in this motion", Level.OK)
-FAULTLESS = frozenset({STATES[NORMAL].name, UNKNOWN.name, NOT_OBSERVABLE.name})
+FAULTLESS = frozenset({STATES[NORMAL].name, STALE.name, NOT_OBSERVABLE.name})

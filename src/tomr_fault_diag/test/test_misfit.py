@@ -1,0 +1,124 @@
+"""What fits no state: robots that do not follow, residuals that stay far out of their bands."""
+
+import numpy as np
+import pytest
+
+from tomr_fault_diag.classifier.judges import Opinion
+from tomr_fault_diag.classifier.misfit import MisfitWatch
+from tomr_fault_diag.classifier.observability import Unseen
+from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.classifier.stage import FaultClassifier
+from tomr_fault_diag.classifier.states import CONTROL, NORMAL
+from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
+from tomr_power_model.messages.plain import Level
+
+MS = 1_000_000
+BASE = 1_700_000_000_000 * MS
+NAN = float("nan")
+Three = tuple[float, float, float]
+TURNING: Three = (3.0, -8.0, 5.0)
+
+
+def frame(at_ms: int, expected: Three, measured: Three, total: float = 0.0) -> ResidualFrame:
+    """Expected and measured wheel speeds [rad/s]; residual of the total power in bands of 2 W."""
+    quiet = (Residual(0.0, 1.0, 2.0),) * 3
+    speeds = tuple(
+        Residual((is_ - want) * (-1.0 if want < 0.0 else 1.0), 0.2, want, "rad/s")
+        for want, is_ in zip(expected, measured, strict=True)
+    )
+    return ResidualFrame(
+        BASE + at_ms * MS, (Residual(2.0 * total, 2.0, 20.0), *quiet, *speeds, *quiet)
+    )
+
+
+class Sure:
+    """A judge that is sure of one state, whatever it sees."""
+
+    settings = ClassifierSettings()
+
+    def __init__(self, state: int) -> None:
+        self.state = state
+
+    def clear(self) -> None:
+        """Nothing to forget."""
+
+    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+        return Opinion(np.eye(6)[self.state], sure=True)
+
+
+def named(frames: list[ResidualFrame], judge: int = NORMAL) -> list[tuple[int, str]]:
+    """Changes of the state: when [ms], and to what."""
+    classifier, found = FaultClassifier(Sure(judge)), []
+    for item in frames:
+        diagnosis = classifier.classify(item)
+        if diagnosis is not None and diagnosis.changed:
+            found.append(((diagnosis.stamp_ns - BASE) // MS, diagnosis.state.name))
+    return found
+
+
+@pytest.mark.parametrize("period", [10, 50, 200])
+def test_a_robot_that_stands_when_told_to_drive_does_not_follow(period: int) -> None:
+    driving = [frame(t, TURNING, TURNING) for t in range(period, 2000, period)]
+    stopped = [frame(t, TURNING, (0.0, 0.0, 0.1)) for t in range(2000, 4000, period)]
+    again = [frame(t, TURNING, TURNING) for t in range(4000, 6000, period)]
+    changes = named(driving + stopped + again)
+    assert [state for _, state in changes] == ["normal", "does not follow its commands", "normal"]
+    assert 300 <= changes[1][0] - 2000 <= 300 + period
+    assert 1000 <= changes[2][0] - 4000 <= 1000 + period
+
+
+def test_no_wheel_is_accused_meanwhile() -> None:
+    driving = [frame(50, TURNING, TURNING)]
+    stopped = [frame(t, TURNING, (0.0, 0.0, 0.0)) for t in range(100, 1000, 50)]
+    assert [state for _, state in named(stopped, CONTROL)] == [
+        "normal",
+        "does not follow its commands",
+    ]
+    assert named(driving, CONTROL) == [(50, "control system fault")]
+
+
+@pytest.mark.parametrize(
+    ("expected", "measured"),
+    [
+        (TURNING, (0.0, -8.0, 5.0)),  # one wheel only: a fault of its own
+        ((3.0, 0.0, 0.0), (0.0, 0.0, 0.0)),  # one that need turn: it may have one
+        (TURNING, (1.0, -3.0, 2.0)),  # slower, but not standing
+        ((0.2, -0.3, 0.1), (0.0, 0.0, 0.0)),  # creeping
+        (TURNING, (NAN, NAN, NAN)),  # nobody knows
+    ],
+)
+def test_what_may_be_something_else(expected: Three, measured: Three) -> None:
+    watch = MisfitWatch()
+    seen = [watch.take(frame(t, expected, measured)) for t in range(50, 3000, 50)]
+    assert not any(item.disobeys or item.ignores_commands for item in seen)
+
+
+def test_what_a_healthy_robot_could_not_show_is_unknown() -> None:
+    normal = [frame(t, TURNING, TURNING) for t in range(50, 1000, 50)]
+    far = [frame(t, TURNING, TURNING, total=-4.0) for t in range(1000, 3000, 50)]
+    near = [frame(t, TURNING, TURNING, total=2.0) for t in range(3000, 5000, 50)]
+    changes = named(normal + far + near)
+    assert changes == [(50, "normal"), (2000, "unknown"), (4000, "normal")]
+
+
+def test_a_named_fault_is_not_called_unknown() -> None:
+    far = [frame(t, TURNING, TURNING, total=9.0) for t in range(50, 3000, 50)]
+    assert named(far, CONTROL) == [(50, "control system fault")]
+
+
+def test_a_short_stray_is_not_unknown() -> None:
+    frames = [
+        frame(t, TURNING, TURNING, total=9.0 if t % 1000 < 900 else 0.0)
+        for t in range(50, 5000, 50)
+    ]
+    assert [state for _, state in named(frames)] == ["normal"]
+
+
+def test_levels() -> None:
+    classifier = FaultClassifier(Sure(NORMAL))
+    levels = {}
+    for t in range(50, 3000, 50):
+        diagnosis = classifier.classify(frame(t, TURNING, (0.0, 0.0, 0.0)))
+        if diagnosis is not None:
+            levels[diagnosis.state.name] = diagnosis.state.level
+    assert levels["does not follow its commands"] is Level.ERROR

@@ -1,0 +1,67 @@
+"""What fits no state that a classifier knows: commands that are not followed, and far residuals.
+
+The classifier weighs known states against each other, so something else can look like any of them.
+These rules ask nothing but the residuals themselves.
+"""
+
+from attrs import frozen
+
+from tomr_fault_diag.residuals.frame import SPEEDS, Residual, ResidualFrame
+from tomr_power_model.model.ticks import to_ns
+
+_TURNING = 0.5  # rad/s: a wheel that is expected to turn
+_STANDING = 0.2  # of the expected speed: a slower wheel does not follow
+_AT_LEAST = 2  # wheels that must be expected to turn: one alone may have a fault of its own
+_IGNORED_FOR = to_ns(0.3)
+_FAR = 3.0  # bands
+_FAR_FOR = to_ns(1.0)
+
+
+@frozen
+class Misfit:
+    """What a frame shows beside the classifier's states."""
+
+    ignores_commands: bool = False  # for a moment already: wheels stand that should turn
+    disobeys: bool = False  # and for long enough to be named
+    unexplained: bool = False  # some residual has been far out of its band for long
+
+
+class MisfitWatch:
+    """Remembers since when [ns] nothing follows, and each residual lies far out of its band."""
+
+    def __init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget what was seen."""
+        self._ignored_since: int | None = None
+        self._far_since: dict[int, int] = {}
+
+    def take(self, frame: ResidualFrame) -> Misfit:
+        """Take the newest tick."""
+        now = frame.stamp_ns
+        ignores = _ignores_commands([frame.residuals[index] for index in SPEEDS])
+        if not ignores:
+            self._ignored_since = None
+        elif self._ignored_since is None:
+            self._ignored_since = now
+        far = [index for index, item in enumerate(frame.residuals) if _is_far(item)]
+        self._far_since = {index: self._far_since.get(index, now) for index in far}
+        return Misfit(
+            ignores,
+            self._ignored_since is not None and now - self._ignored_since >= _IGNORED_FOR,
+            any(now - since >= _FAR_FOR for since in self._far_since.values()),
+        )
+
+
+def _ignores_commands(speeds: list[Residual]) -> bool:
+    """Whether none of the wheels turns that are expected to, and there are enough of these."""
+    turning = [item for item in speeds if abs(item.modelled) > _TURNING and not item.stale]
+    # Residuals of speed are signed along the expected direction.
+    return len(turning) >= _AT_LEAST and all(
+        abs(item.modelled) + item.residual < _STANDING * abs(item.modelled) for item in turning
+    )
+
+
+def _is_far(item: Residual) -> bool:
+    return abs(item.residual) > _FAR * item.band  # false where either is NaN
