@@ -9,6 +9,7 @@ from attrs import evolve
 
 from tomr_power_model.calibration.calibrate import Result, Timing, align, calibrate
 from tomr_power_model.calibration.parameters import Choice
+from tomr_power_model.drive import read
 from tomr_power_model.drive.clean import cleaned
 from tomr_power_model.drive.cut import without
 from tomr_power_model.drive.quality import sensor_faults
@@ -133,3 +134,23 @@ def test_without_voltages_currents_are_compared_at_the_nominal_one(
     missing, nominal = found.notes
     assert "the voltage of the whole supply is missing (999 messages)" in missing
     assert nominal.endswith("currents are compared, at supply.nominal_voltage = 24 V")
+
+
+def test_malformed_messages_are_left_out_and_counted(
+    tmp_path: Path, make_drive: MakeDrive, write_bag: WriteBag, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever reading a message raises, as live: the others still count."""
+    bag = write_bag(make_drive(ROBOT, 1), tmp_path / "tour")
+    whole = read_drive(bag, ROBOT)
+    given, count = read.twist_of, iter(range(10**6))
+
+    def now_and_then(message: object) -> tuple[float, float, float]:
+        number = next(count)
+        if number < 2:
+            raise (OverflowError, ValueError)[number]("no number")
+        return given(message)
+
+    monkeypatch.setattr(read, "twist_of", now_and_then)
+    found = read_drive(bag, ROBOT)
+    assert len(found.command_time) == len(whole.command_time) - 2
+    assert any("no number" in note for note in found.notes)

@@ -1,8 +1,7 @@
 """Node `fault_classifier`: the robot's state on /diagnostics."""
 
+from collections.abc import Mapping
 from typing import Any
-
-from rclpy.parameter import Parameter
 
 from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.messages import TOPIC, diagnosis_message
@@ -23,23 +22,20 @@ class FaultClassifierNode(StageNode):
 
     def __init__(self) -> None:
         super().__init__("fault_classifier", CLASSIFIER_PARAMETERS)
-        self._classifier = FaultClassifier(make_judge(ClassifierSettings.of(self.values)))
+        self.classifier = FaultClassifier(make_judge(ClassifierSettings.of(self.values)))
         self.offer(TOPIC, DiagnosticMessage)
         self.listen([Input(RESIDUALS, DIAGNOSTICS, guarded(self._take))], self._advance, STAGE_QOS)
-        self.add_post_set_parameters_callback(self._retune)
+        self.on_change(self._retune)
 
     def _take(self, message: Any, receive_ns: int) -> None:
         frame = frame_of(message, stamp_of(message, receive_ns))
-        diagnosis = self._classifier.classify(frame)
+        diagnosis = self.classifier.classify(frame)
         if diagnosis is not None:
-            hardware_id = self._classifier.settings.hardware_id
+            hardware_id = self.classifier.settings.hardware_id
             self.send(diagnosis_message(self._robot, diagnosis, hardware_id))
 
-    def _retune(self, parameters: list[Parameter]) -> None:
-        for parameter in parameters:
-            if parameter.name in self.values:
-                self.values[parameter.name] = parameter.value
-        self._classifier.settings = ClassifierSettings.of(self.values)
+    def _retune(self, values: Mapping[str, object]) -> None:
+        self.classifier.settings = ClassifierSettings.of(values)
 
     def _advance(self) -> None:
         """Nothing is due later: a frame is answered when it comes."""

@@ -2,8 +2,6 @@
 
 from typing import Any
 
-from rclpy.parameter import Parameter
-
 from tomr_fault_diag.residuals.messages import TOPIC, residual_message
 from tomr_fault_diag.residuals.settings import (
     RESIDUAL_PARAMETERS,
@@ -35,30 +33,24 @@ class PowerResidualsNode(StageNode):
 
     def __init__(self) -> None:
         super().__init__("power_residuals", PARAMETERS)
-        self._stage = ResidualStage(self._robot, ResidualSettings.of(self.values))
+        self.stage = ResidualStage(self._robot, ResidualSettings.of(self.values))
         self._assembler = PredictionAssembler(self._robot)
         self.offer(TOPIC, DiagnosticMessage)
         predictions = [self._prediction(topic) for topic in prediction_topics(self._robot)]
         self.listen(predictions, self._advance, STAGE_QOS)
-        self.listen(residual_inputs(self._robot, self._stage), self._advance)
-        self.add_post_set_parameters_callback(self._retune)
+        self.listen(residual_inputs(self._robot, self.stage), self._advance)
+        self.on_change(lambda values: self.stage.retune(BandSettings.of(values)))
 
     def _prediction(self, topic: str) -> Input:
         def take(message: Any, receive_ns: int) -> Arrival | None:
             stamp = stamp_of(message, receive_ns)
             prediction = self._assembler.add(topic, stamp, message)
-            return None if prediction is None else self._stage.prediction(prediction)
+            return None if prediction is None else self.stage.prediction(prediction)
 
         return Input(topic, JOINT_STATE if topic == EXPECTED else BATTERY, guarded(take))
 
-    def _retune(self, parameters: list[Parameter]) -> None:
-        for parameter in parameters:
-            if parameter.name in self.values:
-                self.values[parameter.name] = parameter.value
-        self._stage.retune(BandSettings.of(self.values))
-
     def _advance(self) -> None:
-        for frame in self._stage.due():
+        for frame in self.stage.due():
             self.send(residual_message(self._robot, frame, str(self.values["hardware_id"])))
 
 

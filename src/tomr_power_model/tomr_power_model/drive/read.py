@@ -19,7 +19,7 @@ from tomr_power_model.drive.sources import (
 )
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.intake import (
-    Unusable,
+    MALFORMED,
     WheelFinder,
     stamp_of,
     twist_of,
@@ -117,7 +117,7 @@ class _Collector:
             for taker in self.takers[topic]:
                 try:
                     taker(message, receive_ns)
-                except (Unusable, AttributeError, LookupError, TypeError) as error:
+                except MALFORMED as error:
                     problem = f"{topic}: {error}"
                     self.complaints[problem] = self.complaints.get(problem, 0) + 1
 

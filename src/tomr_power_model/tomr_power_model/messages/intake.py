@@ -20,6 +20,10 @@ class Unusable(ValueError):
     """A message that says nothing usable, and why."""
 
 
+# What reading a malformed message may raise; no message may stop a stage or a tool.
+MALFORMED = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+
+
 def header_stamp_ns(message: Any) -> int | None:
     """Return the stamp of a message's header [ns]: 0 where it is unset, None without a header."""
     try:

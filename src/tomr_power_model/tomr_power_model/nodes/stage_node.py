@@ -12,6 +12,7 @@ from rclpy._rclpy_pybind11 import RCLError
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
@@ -87,6 +88,17 @@ class StageNode(Node):
             # Each default event adds to every wait: together a sixth of the nodes' CPU.
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
+
+    def on_change(self, apply: Callable[[dict[str, Value]], None]) -> None:
+        """Apply all values anew when some of them are set while the node runs."""
+
+        def set_(parameters: list[Parameter]) -> None:
+            for parameter in parameters:
+                if parameter.name in self.values:
+                    self.values[parameter.name] = parameter.value
+            apply(self.values)
+
+        self.add_post_set_parameters_callback(set_)
 
     def complain(self, topic: str, problem: str) -> None:
         """Warn of a message, the first time and then ever more rarely."""

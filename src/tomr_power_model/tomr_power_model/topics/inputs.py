@@ -13,6 +13,7 @@ from tomr_power_model.drive.sources import (
     total_topics,
 )
 from tomr_power_model.messages.intake import (
+    MALFORMED,
     Triple,
     Unusable,
     WheelFinder,
@@ -47,7 +48,7 @@ def guarded(take: Take) -> Callable[[Any, int], str | None]:
             arrival = take(message, receive_ns)
         except Unusable as error:
             return f"{error}; the message is ignored"
-        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        except MALFORMED as error:
             return f"malformed ({error}); the message is ignored"
         return _complaint(arrival)
 

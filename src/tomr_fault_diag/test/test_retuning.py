@@ -1,0 +1,47 @@
+"""Parameters that are set while a node runs."""
+
+from collections.abc import Iterator
+from importlib.resources import files
+
+import pytest
+import rclpy
+from rclpy.parameter import Parameter
+
+from tomr_fault_diag.nodes.fault_classifier_node import FaultClassifierNode
+from tomr_fault_diag.nodes.power_residuals_node import PowerResidualsNode
+from tomr_power_model.model.ticks import to_ns
+from tomr_power_model.nodes.stage_node import StageNode
+
+KINDS = {"residuals": PowerResidualsNode, "classifier": FaultClassifierNode}
+
+
+@pytest.fixture
+def node(request: pytest.FixtureRequest) -> Iterator[StageNode]:
+    robot = str(files("tomr_power_model").joinpath("robots").joinpath("reference.yaml"))
+    rclpy.init(args=["--ros-args", "--params-file", robot])
+    made = KINDS[request.param]()
+    yield made
+    made.destroy_node()
+    rclpy.shutdown()
+
+
+@pytest.mark.parametrize("node", ["residuals"], indirect=True)
+def test_bands_hold_from_the_next_tick_on(node: PowerResidualsNode) -> None:
+    (result,) = node.set_parameters([Parameter("band.power", value=3.5)])
+    assert result.successful
+    assert node.stage.settings.bands.power == 3.5
+
+
+@pytest.mark.parametrize("node", ["residuals"], indirect=True)
+def test_a_band_that_does_not_fit_is_refused(node: PowerResidualsNode) -> None:
+    before = node.stage.settings.bands
+    (result,) = node.set_parameters([Parameter("band.power", value=-1.0)])
+    assert not result.successful
+    assert node.stage.settings.bands == before
+
+
+@pytest.mark.parametrize("node", ["classifier"], indirect=True)
+def test_times_of_the_classifier_hold_at_once(node: FaultClassifierNode) -> None:
+    (result,) = node.set_parameters([Parameter("recovery_time", value=2.5)])
+    assert result.successful
+    assert node.classifier.settings.recovery_time == to_ns(2.5)
