@@ -4,6 +4,7 @@ import pytest
 from attrs import asdict
 
 from tomr_power_model.robot import Robot, shipped_robot
+from tomr_sim_bridge.missions.schema import TwistPhase
 from tomr_training.drives import Bump, random_drive
 from tomr_training.planar.population import training_drive
 
@@ -74,3 +75,24 @@ def test_half_of_the_robots_are_of_the_reference_family(seed: int) -> None:
     drive, plain = training_drive(REFERENCE, seed), random_drive(REFERENCE, seed)
     assert drive.believed == plain.believed
     assert drive.plant.physics == plain.plant.physics
+
+
+def test_other_kinds_creep_where_they_would_go_straight_and_still_pause() -> None:
+    skewed = paused = 0
+    for seed in OTHER:
+        given = random_drive(REFERENCE, seed).mission.phases
+        own = training_drive(REFERENCE, seed).mission.phases
+        assert len(own) == len(given)
+        for before, after in zip(given, own, strict=True):
+            if not isinstance(before, TwistPhase):
+                assert after == before
+                continue
+            assert isinstance(after, TwistPhase)
+            assert (after.twist[:2], after.duration) == (before.twist[:2], before.duration)
+            assert abs(after.twist[2] - before.twist[2]) <= 0.25
+            skewed += after != before
+            if not any(before.twist):
+                assert after == before
+                paused += 1
+    assert skewed > 0
+    assert paused > 0

@@ -7,9 +7,11 @@ from attrs import evolve
 
 from tomr_power_model.robot import Robot
 from tomr_power_model.robot.description import PerWheel
+from tomr_sim_bridge.missions.schema import Phase, TwistPhase
 from tomr_training.drives import DEVIATION, Drive, bumps, random_drive
 
 _DRY, _VISCOUS, _STRIBECK = "friction.coulomb", "friction.viscous", "friction.stribeck"
+_CREEP = 0.25  # rad/s of yaw: with it a wheel that need not turn creeps, or sticks
 
 
 def training_drive(reference: Robot, seed: int) -> Drive:
@@ -71,14 +73,25 @@ def _of_another_kind(drive: Drive, random: np.random.Generator) -> Drive:
         }
         return evolve(robot, motors=(first, second, third), physics=physics)
 
+    phases = tuple(_skewed(phase, random) for phase in drive.mission.phases)
     pushes = bumps(drive.believed, random, int(random.integers(0, 3)), drive.length)
     longer = (evolve(push, duration=2.0 * push.duration) for push in pushes)
     return evolve(
         drive,
+        mission=evolve(drive.mission, phases=phases),
         plant=changed(drive.plant),
         believed=changed(drive.believed),
         bumps=tuple(sorted((*drive.bumps, *longer), key=lambda bump: bump.start)),
     )
+
+
+def _skewed(phase: Phase, random: np.random.Generator) -> Phase:
+    """Half of the phases with a little yaw: some wheel then creeps where it would stand."""
+    yaw_rate, chosen = float(random.uniform(-_CREEP, _CREEP)), random.random() < 0.5
+    if not isinstance(phase, TwistPhase) or not any(phase.twist) or not chosen:
+        return phase
+    along, across, turning = phase.twist
+    return evolve(phase, twist=(along, across, turning + yaw_rate))
 
 
 def _scaled(wheels: PerWheel, factor: float) -> PerWheel:
