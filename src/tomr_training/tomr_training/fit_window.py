@@ -107,7 +107,7 @@ class FittedWindow:
     """Trained weights, and what torch itself answers to some windows."""
 
     network: WindowNetwork
-    check_windows: Floats  # (k, WINDOW, 19)
+    check_windows: NDArray[np.float64]  # (k, WINDOW, 19)
     check_scores: NDArray[np.float64]  # (k, 8)
 
 
@@ -160,9 +160,10 @@ def prior_of(labels: NDArray[np.int64]) -> NDArray[np.float64]:
 
 def _fitted(module: WindowModule, examples: Examples) -> FittedWindow:
     rows = np.arange(0, len(examples), max(1, len(examples) // 20))[:20]
-    check = examples.windows(rows)
+    # As they are stored: rounding may turn the direction of a wheel that hardly moves.
+    check = np.round(examples.windows(rows).astype(np.float64), 4)
     arrays = [*weights_of(module), prior_of(examples.label)]
     # In double precision, as the robot computes it: the trained weights are exact there.
     with torch.no_grad():
-        scores = module.double()(torch.from_numpy(by_wheel(check.astype(np.float64))))
+        scores = module.double()(torch.from_numpy(by_wheel(check)))
     return FittedWindow(WindowNetwork(*arrays), check, scores.numpy())

@@ -136,7 +136,7 @@ def _window(options: argparse.Namespace, train: Ticks, unseen: Ticks) -> Trained
         "recipe": asdict(recipe),
         "training_ticks": len(examples),
         "torch_check": {
-            "windows": np.round(fitted.check_windows.astype(float), 4).tolist(),
+            "windows": fitted.check_windows.tolist(),
             "scores": fitted.check_scores.tolist(),
         },
     }
