@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_fault_diag.classifier.judges import make_judge
+from tomr_fault_diag.classifier.judges import JUDGES, make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.network import Network
-from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STALE, STATES
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
@@ -66,6 +66,11 @@ def test_defaults_of_parameters_are_those_of_settings() -> None:
     assert found.classifier == ClassifierSettings()
     assert found.residuals == ResidualSettings()
     assert evolve(found.model, model_values={}) == ModelSettings()
+
+
+def test_every_classifier_that_can_be_chosen_is_there() -> None:
+    (spec,) = [spec for spec in CLASSIFIER_PARAMETERS if spec.name == "classifier"]
+    assert set(spec.choices) == set(JUDGES)
 
 
 def test_softmax_by_hand() -> None:

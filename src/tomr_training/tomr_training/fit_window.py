@@ -161,7 +161,7 @@ def prior_of(labels: NDArray[np.int64]) -> NDArray[np.float64]:
 def _fitted(module: WindowModule, examples: Examples) -> FittedWindow:
     rows = np.arange(0, len(examples), max(1, len(examples) // 20))[:20]
     # As they are stored: rounding may turn the direction of a wheel that hardly moves.
-    check = np.round(examples.windows(rows).astype(np.float64), 4)
+    check: NDArray[np.float64] = examples.windows(rows).astype(np.float64).round(4)
     arrays = [*weights_of(module), prior_of(examples.label)]
     # In double precision, as the robot computes it: the trained weights are exact there.
     with torch.no_grad():

@@ -6,6 +6,7 @@ enough of the likeliest for that to be named.
 
 import math
 from collections import deque
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Protocol
 
@@ -129,8 +130,12 @@ class CodeJudge:
         )
 
 
+JUDGES: Mapping[str, Callable[[ClassifierSettings], Judge]] = {
+    "window": lambda settings: WindowJudge(WindowNetwork.load(settings.weights), settings),
+    "wang2024": lambda settings: CodeJudge(Network.load(settings.weights), settings),
+}
+
+
 def make_judge(settings: ClassifierSettings) -> Judge:
     """The classifier that the settings ask for; raises InputError for weights that do not fit."""
-    if settings.classifier == "wang2024":
-        return CodeJudge(Network.load(settings.weights), settings)
-    return WindowJudge(WindowNetwork.load(settings.weights), settings)
+    return JUDGES[settings.classifier](settings)
