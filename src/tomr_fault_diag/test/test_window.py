@@ -21,7 +21,7 @@ from tomr_fault_diag.classifier.features import (
 )
 from tomr_fault_diag.classifier.judges import WindowJudge, make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message
-from tomr_fault_diag.classifier.observability import Unseen
+from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NOT_OBSERVABLE, STATES
@@ -236,6 +236,30 @@ def test_robots_that_lack_a_sensor_look_as_modelled_there() -> None:
     assert (encoders[..., [4, 5, 6, 10, 11, 12]] == 0.0).all()
     assert (encoders[..., [7, 8, 9]] == 1.0).all()
     assert by_wheel(window).shape == (2, 3, INPUTS)
+
+
+@pytest.mark.parametrize("hz", [5, 10, 20, 40, 100])
+def test_what_is_named_does_not_hang_on_the_rate_of_decisions(hz: int) -> None:
+    period, start = 1000 // hz, 2000
+
+    def at(ms: int) -> ResidualFrame:
+        found = frame(0, ALL, **(LOST if ms > start else {}))
+        return evolve(found, stamp_ns=BASE + ms * MS)
+
+    found = run([at(ms) for ms in range(period, 4000, period)])
+    changes = [((d.stamp_ns - BASE) // MS, d.state.name) for d in found if d.changed]
+    assert [state for _, state in changes] == ["normal", "motor system fault 2"]
+    assert changes[1][0] - start <= 300 + period
+
+
+@pytest.mark.parametrize("hz", [5, 10, 20, 40, 100])
+def test_an_idle_wheel_is_idle_after_half_a_second_at_any_rate(hz: int) -> None:
+    period = 1000 // hz
+    watch, found = MotionWatch(), []
+    for ms in range(period, 2000, period):
+        found.append(watch.take(evolve(frame(0, IDLE), stamp_ns=BASE + ms * MS)))
+    first = next(k for k, unseen in enumerate(found) if unseen.wheels == (0,))
+    assert 450 <= first * period < 450 + period
 
 
 def test_damaged_weights_are_refused(tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 
 _SURE = 0.99
 _STRIKING_TICKS = 10  # in which one window must have been so
+_TICK = to_ns(0.05)
 _TOO_LONG = to_ns(0.5)  # between two frames that belong to one window
 
 
@@ -59,7 +60,8 @@ class WindowJudge:
 
     A fault is named when the belief is sure of it and one window of the last half second was
     `striking` by itself: an error of the description says little, but says it for as long as the
-    motion lasts.
+    motion lasts. The network knows ticks of 50 ms: of faster ones it sees the last in each 50 ms,
+    slower ones it sees again.
     """
 
     def __init__(self, network: WindowNetwork, settings: ClassifierSettings) -> None:
@@ -71,6 +73,8 @@ class WindowJudge:
     def clear(self) -> None:
         """Forget what was seen: as if the robot had stood still."""
         self._window = np.zeros((WINDOW, CHANNELS))
+        self._slot: int | None = None
+        self._opinion = Opinion(np.eye(len(STATES))[NORMAL], sure=False)
         self._recent: deque[Array] = deque(maxlen=_STRIKING_TICKS)
         self._belief.clear()
 
@@ -78,8 +82,18 @@ class WindowJudge:
         """Look at the newest frame."""
         if elapsed_ns > _TOO_LONG:
             self._window[:] = 0.0
+            self._slot = None
+        slot = frame.stamp_ns // _TICK
+        count = 1 if self._slot is None else slot - self._slot
+        self._slot = slot
+        for _ in range(count):
+            self._opinion = self._step(channels_of(frame), unseen)
+        return self._opinion
+
+    def _step(self, seen: Array, unseen: Unseen) -> Opinion:
+        """Opinion after one more tick of the network."""
         self._window[:-1] = self._window[1:]
-        self._window[-1] = channels_of(frame)
+        self._window[-1] = seen
         likelihoods = self._network.log_likelihoods(self._window)
         for idle in unseen.wheels:  # what an idle wheel hides it cannot refute either
             faults = [CONTROLS.start + idle, ENCODERS.start + idle]

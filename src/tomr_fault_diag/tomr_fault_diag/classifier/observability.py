@@ -9,10 +9,12 @@ from collections import deque
 from attrs import frozen
 
 from tomr_fault_diag.residuals.frame import SPEEDS, Residual, ResidualFrame
+from tomr_power_model.model.ticks import to_ns
 
 _TURNING = 0.5  # rad/s: a slower wheel counts as idle
 _SPEEDING = 0.3  # rad/s over the time below: what asks for traction
-_TICKS = 10  # without it, before a fault counts as not observable
+_LATELY = to_ns(0.5)  # without it, before a fault counts as not observable
+_LEAST = to_ns(0.45)  # of the motion that must be known: ten ticks of 50 ms
 _WHEELS = 3
 
 
@@ -35,28 +37,37 @@ class Unseen:
         return (*motors, "slip") if self.slip else motors
 
 
+_Tick = tuple[int, tuple[float, ...], tuple[bool, ...]]  # stamp [ns], expected, turning
+
+
 class MotionWatch:
     """Remembers the wheels' motion of the last half second; plain floats, three are few."""
 
     def __init__(self) -> None:
-        self._expected: deque[tuple[float, ...]] = deque(maxlen=_TICKS)
-        self._turning: deque[tuple[bool, ...]] = deque(maxlen=_TICKS)
+        self._ticks: deque[_Tick] = deque()
+        self.clear()
 
     def clear(self) -> None:
         """Forget the motion."""
-        self._expected.clear()
-        self._turning.clear()
+        self._ticks.clear()
+        self._since: int | None = None  # ns
 
     def take(self, frame: ResidualFrame) -> Unseen:
         """Take the newest tick; returns what the last ticks could not show."""
         speeds = [frame.residuals[index] for index in SPEEDS]
-        self._expected.append(tuple([speed.modelled for speed in speeds]))
-        self._turning.append(tuple([_turns(speed) for speed in speeds]))
-        if len(self._expected) < _TICKS:
+        expected = tuple([speed.modelled for speed in speeds])
+        now, turning = frame.stamp_ns, tuple([_turns(speed) for speed in speeds])
+        self._ticks.append((now, expected, turning))
+        while self._ticks[0][0] <= now - _LATELY:
+            self._ticks.popleft()
+        if self._since is None:
+            self._since = now
+        if now - self._since < _LEAST:
             return Unseen()
-        turning = [any(wheel) for wheel in zip(*self._turning, strict=True)]
+        _, every_expected, every_turning = zip(*self._ticks, strict=True)
+        turning = tuple([any(wheel) for wheel in zip(*every_turning, strict=True)])
         steady = all(
-            max(wheel) - min(wheel) < _SPEEDING for wheel in zip(*self._expected, strict=True)
+            max(wheel) - min(wheel) < _SPEEDING for wheel in zip(*every_expected, strict=True)
         )
         return Unseen(tuple([wheel for wheel, turns in enumerate(turning) if not turns]), steady)
 
