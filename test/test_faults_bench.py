@@ -24,7 +24,14 @@ from faults.regimes import AT_REST, noise_of, regimes_of, rms, tick_means, tick_
 from faults.truth import missed, ratios, true_value
 
 from tomr_fault_diag.classifier.stage import Diagnosis
-from tomr_fault_diag.classifier.states import DISOBEYS, NOT_OBSERVABLE, STALE, STATES, State
+from tomr_fault_diag.classifier.states import (
+    DISOBEYS,
+    NOT_OBSERVABLE,
+    STALE,
+    STATES,
+    WAITING,
+    State,
+)
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_power_model.cli import EXIT_BAD_INPUT, run_main
 
@@ -146,11 +153,13 @@ def test_two_seconds_after_a_bump_are_left_out() -> None:
 
 
 def test_states_are_scored_by_their_names_and_first_stamps() -> None:
-    names = [scored_name(state.name) for state in (*STATES, NOT_OBSERVABLE, STALE, DISOBEYS)]
+    names = [
+        scored_name(state.name) for state in (*STATES, NOT_OBSERVABLE, STALE, DISOBEYS, WAITING)
+    ]
     assert names == [
         *("normal", "slip", "control_system"),
         *("motor_system_1", "motor_system_2", "motor_system_3", "not_observable", "stale"),
-        "unknown",
+        *("unknown", "stale"),
     ]
 
     def said(seconds: int, state: State, wheel: int | None) -> Diagnosis:

@@ -12,7 +12,7 @@ from stages import as_arrays, pipeline_of, steps_of
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.stage import Diagnosis
-from tomr_fault_diag.classifier.states import DISOBEYS, NOT_OBSERVABLE
+from tomr_fault_diag.classifier.states import DISOBEYS, NOT_OBSERVABLE, WAITING
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, ResidualFrame
 from tomr_power_model.model.ticks import NANOSECONDS
 
@@ -21,7 +21,11 @@ Change = tuple[float, str, int | None]  # stamp [s], state, wheel 1..3
 
 JOBS = 2
 # The score knows no state of a robot that does not follow: none of its faults is known.
-_SCORED = {NOT_OBSERVABLE.name: "not_observable", DISOBEYS.name: "unknown"}
+_SCORED = {
+    NOT_OBSERVABLE.name: "not_observable",
+    DISOBEYS.name: "unknown",
+    WAITING.name: "stale",
+}
 
 
 @frozen

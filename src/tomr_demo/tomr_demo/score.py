@@ -17,6 +17,7 @@ from tomr_fault_diag.classifier.states import (
     STALE,
     STATES,
     UNKNOWN,
+    WAITING,
 )
 from tomr_power_model.messages.plain import NANOSECONDS
 
@@ -27,7 +28,7 @@ DIAGNOSTICS = "/diagnostics"
 TRUTH = "/ground_truth/faults"
 HEALTHY = "healthy"
 NORMAL_STATE = STATES[NORMAL].name
-_NO_FAULTS = (NORMAL_STATE, STALE.name)
+_NO_FAULTS = (NORMAL_STATE, WAITING.name, STALE.name)
 
 
 @frozen

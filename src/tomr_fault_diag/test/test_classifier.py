@@ -13,9 +13,9 @@ from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
-from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STALE, STATES
+from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STALE, STATES, WAITING
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
-from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
+from tomr_fault_diag.residuals.frame import NO_COMMAND, Residual, ResidualFrame
 from tomr_fault_diag.residuals.settings import ResidualSettings
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.plain import Level
@@ -45,6 +45,12 @@ def _frame(tick: int, codes: tuple[int, ...], stale: bool = False) -> ResidualFr
 def _classifier() -> FaultClassifier:
     """The paper's, which codes alone decide."""
     return FaultClassifier(make_judge(ClassifierSettings(classifier="wang2024")))
+
+
+def _classify(frames: list[ResidualFrame]) -> list[Diagnosis]:
+    classifier = _classifier()
+    found = [classifier.classify(frame) for frame in frames]
+    return [diagnosis for diagnosis in found if diagnosis is not None]
 
 
 def _run(*spells: tuple[tuple[int, ...], int]) -> list[Diagnosis]:
@@ -137,6 +143,21 @@ def test_nothing_to_compare_is_stale_not_normal() -> None:
     assert diagnosis is not None
     assert diagnosis.state is STALE
     assert diagnosis.state.level is Level.STALE
+
+
+def test_a_robot_that_has_not_been_told_anything_waits() -> None:
+    nan = float("nan")
+    unknown = Residual(nan, nan, nan, missing=NO_COMMAND)
+    (waiting,) = _classify([ResidualFrame(BASE + 50 * MS, (unknown,) * 10)])
+    assert waiting.state is WAITING
+    assert waiting.state.level is Level.OK
+    robot = shipped_robot("reference")
+    status = diagnosis_message(robot, waiting, "").statuses[0]
+    assert status.message == "waiting: no command has come yet"
+    # Without any power there is more amiss than that.
+    lost = Residual(nan, nan, nan, missing="no fresh wheel_1/power")
+    (stale,) = _classify([ResidualFrame(BASE + 50 * MS, (unknown, lost, *(unknown,) * 8))])
+    assert stale.state is STALE
 
 
 def test_a_clock_that_goes_back_starts_afresh() -> None:

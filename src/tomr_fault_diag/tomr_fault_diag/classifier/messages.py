@@ -1,7 +1,7 @@
 """A diagnosis as a DiagnosticArray (REP-107)."""
 
 from tomr_fault_diag.classifier.stage import Diagnosis
-from tomr_fault_diag.classifier.states import NORMAL, NOT_OBSERVABLE, STALE, STATES
+from tomr_fault_diag.classifier.states import NORMAL, NOT_OBSERVABLE, STALE, STATES, WAITING
 from tomr_fault_diag.residuals.frame import residual_names
 from tomr_fault_diag.residuals.messages import sentence
 from tomr_power_model.messages.outgoing import DiagnosticMessage
@@ -43,6 +43,8 @@ def _headline(robot: Robot, diagnosis: Diagnosis) -> str:
     if state == STALE:
         missing = next((r.missing for r in diagnosis.frame.residuals if r.stale), "too little seen")
         return f"{state.name}: {missing}"
+    if state == WAITING:
+        return f"{state.name}: no command has come yet"
     if state == NOT_OBSERVABLE:
         return f"{state.name}: the robot stands still"
     if diagnosis.wheel is not None:

@@ -14,9 +14,10 @@ from tomr_fault_diag.classifier.states import (
     STALE,
     STATES,
     UNKNOWN,
+    WAITING,
     State,
 )
-from tomr_fault_diag.residuals.frame import MOTORS, TOTAL, ResidualFrame
+from tomr_fault_diag.residuals.frame import MOTORS, NO_COMMAND, TOTAL, ResidualFrame
 
 
 @frozen
@@ -34,7 +35,7 @@ class Diagnosis:
 
 
 # Whatever comes next may follow at once.
-_QUIET = (None, STALE, NOT_OBSERVABLE, STATES[NORMAL])
+_QUIET = (None, WAITING, STALE, NOT_OBSERVABLE, STATES[NORMAL])
 
 
 class FaultClassifier:
@@ -116,7 +117,7 @@ class FaultClassifier:
             self._judge.clear()
             self._opinion = None
             self._candidate = STALE
-            self._enter(STALE, frame.stamp_ns, None)
+            self._enter(WAITING if _is_waiting(frame) else STALE, frame.stamp_ns, None)
             return
         if misfit.disobeys:
             # No fault of one wheel looks like this; what the judge makes of it says nothing.
@@ -153,6 +154,11 @@ class FaultClassifier:
         self._wheel = wheel
         if state != self._state:
             self._state, self._since = state, since
+
+
+def _is_waiting(frame: ResidualFrame) -> bool:
+    """Whether all that is missing is a first command."""
+    return all(frame.residuals[index].missing == NO_COMMAND for index in MOTORS)
 
 
 def _is_decidable(frame: ResidualFrame) -> bool:

@@ -18,6 +18,9 @@ INPUT_ORDERS: Mapping[str, tuple[int, ...]] = {
     "powers_first": (TOTAL, *MOTORS, *ENCODERS, *SPEEDS),
 }
 
+# Why a motor's residual is unknown until the first command.
+NO_COMMAND = "no fresh cmd_vel for the model"
+
 Unit = Literal["W", "A", "rad/s"]
 UNITS: dict[str, Unit] = {"W": "W", "A": "A", "rad/s": "rad/s"}
 

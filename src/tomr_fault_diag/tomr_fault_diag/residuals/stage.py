@@ -6,7 +6,7 @@ from typing import Self
 
 from attrs import evolve, frozen
 
-from tomr_fault_diag.residuals.frame import Residual, ResidualFrame, Unit, rounded
+from tomr_fault_diag.residuals.frame import NO_COMMAND, Residual, ResidualFrame, Unit, rounded
 from tomr_fault_diag.residuals.measured import Measured, SupplyWindow
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_power_model.drive.sources import TOTAL, TOTAL_TOPIC, PowerReading
@@ -156,8 +156,9 @@ class ResidualStage:
         models = [past.of_unit(measured.unit)[WHEELS + 1 + wheel] for past in self._recent]
         missing = f"no fresh {self._topics[wheel]}/power"
         least = self._least(measured.unit)
+        unmodelled = "no fresh joint_states for the model"
         return self._residual(
-            measured.value, models, measured.unit, least, missing, absent, "joint_states"
+            measured.value, models, measured.unit, least, missing, absent, unmodelled
         )
 
     def _speeds(self, tick: int, absent: str) -> list[Residual]:
@@ -191,13 +192,13 @@ class ResidualStage:
         least: float,
         missing: str,
         absent: str,
-        source: str = "cmd_vel",
+        unmodelled: str = NO_COMMAND,
         relative: float | None = None,
     ) -> Residual:
         bands, model = self.settings.bands, models[-1]
         share = bands.relative if relative is None else relative
         band = max(least, share * abs(model)) + bands.transient * _spread(models)
-        reason = _missing(value, model, missing, absent, source)
+        reason = _missing(value, model, missing, absent, unmodelled)
         return Residual(rounded(value - model), rounded(band), rounded(model), unit, reason)
 
 
@@ -209,11 +210,11 @@ def _spread(models: list[float]) -> float:
 
 
 def _missing(
-    value: float, model: float, measured: str, absent: str, source: str = "cmd_vel"
+    value: float, model: float, measured: str, absent: str, unmodelled: str = NO_COMMAND
 ) -> str:
     """Why a residual is unknown, empty if it is known."""
     if math.isnan(value):
         return measured
     if math.isnan(model):
-        return absent or f"no fresh {source} for the model"
+        return absent or unmodelled
     return ""
