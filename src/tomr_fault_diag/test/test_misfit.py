@@ -8,7 +8,14 @@ from tomr_fault_diag.classifier.misfit import MisfitWatch
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
-from tomr_fault_diag.classifier.states import CONTROL, NORMAL
+from tomr_fault_diag.classifier.states import (
+    CONTROL,
+    DISOBEYS,
+    FAULTLESS,
+    NORMAL,
+    UNKNOWN,
+    WAITING,
+)
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_power_model.messages.plain import Level
 
@@ -38,9 +45,10 @@ class Sure:
 
     def __init__(self, state: int) -> None:
         self.state = state
+        self.cleared = 0
 
     def clear(self) -> None:
-        """Nothing to forget."""
+        self.cleared += 1
 
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         return Opinion(np.eye(6)[self.state], sure=True)
@@ -112,6 +120,50 @@ def test_a_short_stray_is_not_unknown() -> None:
         for t in range(50, 5000, 50)
     ]
     assert [state for _, state in named(frames)] == ["normal"]
+
+
+def test_two_wheels_that_stand_are_enough_where_the_third_is_not_known() -> None:
+    stopped = [frame(t, TURNING, (0.0, NAN, 0.0)) for t in range(50, 1000, 50)]
+    assert [state for _, state in named(stopped)] == ["normal", "does not follow its commands"]
+
+
+def test_what_a_judge_took_from_ignored_commands_is_forgotten() -> None:
+    judge = Sure(CONTROL)
+    classifier = FaultClassifier(judge)
+    for t in range(50, 1000, 50):
+        before = judge.cleared
+        classifier.classify(frame(t, TURNING, (0.0, 0.0, 0.0)))
+    assert judge.cleared == before + 1
+
+
+def test_a_fault_that_is_fading_stays_named_and_is_not_called_unknown() -> None:
+    judge = Sure(CONTROL)
+    classifier, states = FaultClassifier(judge), []
+    for t in range(50, 4000, 50):
+        judge.state = CONTROL if t < 2000 else NORMAL
+        diagnosis = classifier.classify(frame(t, TURNING, TURNING, total=9.0))
+        if diagnosis is not None and diagnosis.changed:
+            states.append(diagnosis.state.name)
+    assert states == ["control system fault"]
+
+
+def test_after_a_clock_goes_back_time_counts_anew() -> None:
+    far = [frame(t, TURNING, TURNING, total=9.0) for t in range(50, 1000, 50)]
+    back = [frame(t - 50_000, TURNING, TURNING, total=9.0) for t in range(1000, 2500, 50)]
+    changes = named(far + back)
+    # The robot is normal anew, and a second later it is not: not when the old time is reached.
+    assert changes[-1] == (2000 - 50_000, "unknown")
+
+
+@pytest.mark.parametrize("measured", [(0.0, 0.0, 0.0), TURNING])
+def test_a_silence_does_not_count(measured: Three) -> None:
+    frames = [frame(t, TURNING, measured, total=9.0) for t in (50, 5000, 5050, 5100)]
+    assert [state for _, state in named(frames)] == ["normal"]
+
+
+def test_waiting_is_no_fault_and_not_following_is_one() -> None:
+    assert WAITING.name in FAULTLESS
+    assert not {DISOBEYS.name, UNKNOWN.name} & FAULTLESS
 
 
 def test_levels() -> None:

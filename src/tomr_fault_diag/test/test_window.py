@@ -24,7 +24,7 @@ from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
-from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NOT_OBSERVABLE, STATES
+from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, NOT_OBSERVABLE, STATES
 from tomr_fault_diag.classifier.window_network import WindowNetwork
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_power_model.errors import InputError
@@ -250,6 +250,13 @@ def test_what_is_named_does_not_hang_on_the_rate_of_decisions(hz: int) -> None:
     changes = [((d.stamp_ns - BASE) // MS, d.state.name) for d in found if d.changed]
     assert [state for _, state in changes] == ["normal", "motor system fault 2"]
     assert changes[1][0] - start <= 300 + period
+
+
+def test_after_a_gap_one_tick_counts_once() -> None:
+    """Not as often as would have fitted into the gap."""
+    healthy = [frame(tick) for tick in range(1, 40)]
+    (*_, last) = run([*healthy, frame(400, **LOST)])
+    assert last.state is STATES[NORMAL]
 
 
 @pytest.mark.parametrize("hz", [5, 10, 20, 40, 100])

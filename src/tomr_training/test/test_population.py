@@ -58,7 +58,30 @@ def test_another_kind_is_known_as_well_as_the_others(seed: int) -> None:
             for effect in ("friction.coulomb", "friction.stribeck")
         ]
         assert ratios == pytest.approx([1.0, 1.0], abs=0.05)
-    assert {bump.duration <= 0.24 for bump in later(drive.bumps, plain.bumps)} <= {True}
+
+
+def test_oil_of_other_kinds_is_thicker_or_thinner() -> None:
+    def viscous(robot: Robot) -> float:
+        values = robot.physics["friction.viscous"][0]
+        assert values is not None
+        return values["coefficient"]
+
+    scales = [
+        viscous(training_drive(REFERENCE, seed).believed)
+        / viscous(random_drive(REFERENCE, seed).believed)
+        for seed in range(0, 200, 4)
+    ]
+    assert 0.5 <= min(scales) < 1.0 < 4.0 < max(scales) <= 6.0
+
+
+def test_other_kinds_are_pushed_about_more_and_longer() -> None:
+    more: list[Bump] = []
+    for seed in range(0, 80, 4):
+        drive, plain = training_drive(REFERENCE, seed), random_drive(REFERENCE, seed)
+        # Those before the start, of at most 0.12 s, befall every kind.
+        more += [bump for bump in later(drive.bumps, plain.bumps) if bump.start >= 1.0]
+    assert len(more) > 5
+    assert 0.12 < max(bump.duration for bump in more) <= 0.24
 
 
 def test_other_kinds_stick_more() -> None:

@@ -15,6 +15,7 @@ _AT_LEAST = 2  # wheels that must be expected to turn: one alone may have a faul
 _IGNORED_FOR = to_ns(0.3)
 _FAR = 3.0  # bands
 _FAR_FOR = to_ns(1.0)
+_GAP = to_ns(1.0)  # a longer silence says nothing of what lay in it
 
 
 @frozen
@@ -36,10 +37,14 @@ class MisfitWatch:
         """Forget what was seen."""
         self._ignored_since: int | None = None
         self._far_since: dict[int, int] = {}
+        self._last = 0  # ns
 
     def take(self, frame: ResidualFrame) -> Misfit:
         """Take the newest tick."""
         now = frame.stamp_ns
+        if now - self._last > _GAP:
+            self.clear()
+        self._last = now
         ignores = _ignores_commands([frame.residuals[index] for index in SPEEDS])
         if not ignores:
             self._ignored_since = None
