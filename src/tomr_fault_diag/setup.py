@@ -28,6 +28,7 @@ setup(
         "console_scripts": [
             f"power_residuals = {NAME}.nodes.power_residuals_node:main",
             f"fault_classifier = {NAME}.nodes.fault_classifier_node:main",
+            f"tomr_diagnosis = {NAME}.nodes.diagnosis_node:main",
             f"tomr_diagnose = {NAME}.cli.diagnose:main",
         ],
     },

@@ -8,7 +8,7 @@ from attrs import frozen
 from tomr_fault_diag.residuals.frame import INPUT_ORDERS
 from tomr_power_model.errors import InputError
 from tomr_power_model.model.ticks import to_ns
-from tomr_power_model.robot.parameters import ParameterSpec
+from tomr_power_model.robot.parameters import HARDWARE_ID, NAMELESS, ParameterSpec
 
 _S = ParameterSpec
 
@@ -35,7 +35,7 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
         "speeds_first",
         choices=tuple(INPUT_ORDERS),
     ),
-    _S("hardware_id", "of this robot, in every diagnostic status", "str", "tomr"),
+    HARDWARE_ID,
     _S("evidence_weight", "of window: what one window counts", "float", 0.4, "", 0.01, 1.0),
     _S(
         "caution",
@@ -77,7 +77,7 @@ class ClassifierSettings:
     confirm_time: int = to_ns(0.15)
     recovery_time: int = to_ns(1.0)
     report_period: int = to_ns(1.0)
-    hardware_id: str = "tomr"
+    hardware_id: str = NAMELESS
     input_order: str = "speeds_first"
 
     @classmethod
@@ -102,6 +102,6 @@ class ClassifierSettings:
             confirm_time=to_ns(number("confirm_time")),
             recovery_time=to_ns(number("recovery_time")),
             report_period=to_ns(number("report_period")),
-            hardware_id=str(values["hardware_id"]),
+            hardware_id=str(values["hardware_id"]) or NAMELESS,
             input_order=str(values["input_order"]),
         )

@@ -16,7 +16,6 @@ from tomr_power_model.messages.types import BATTERY, JOINT_STATE
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.nodes.command_line import node_arguments
 from tomr_power_model.nodes.stage_node import STAGE_QOS, StageNode, run_node
-from tomr_power_model.robot.parameters import ParameterSpec
 from tomr_power_model.topics.inputs import Input, guarded
 from tomr_power_model.topics.predictions import (
     EXPECTED,
@@ -24,15 +23,12 @@ from tomr_power_model.topics.predictions import (
     prediction_topics,
 )
 
-HARDWARE_ID = ParameterSpec("hardware_id", "of this robot, in every status", "str", "tomr")
-PARAMETERS = (*RESIDUAL_PARAMETERS, HARDWARE_ID)
-
 
 class PowerResidualsNode(StageNode):
     """Publishes the residuals of each tick as one DiagnosticArray."""
 
     def __init__(self) -> None:
-        super().__init__("power_residuals", PARAMETERS)
+        super().__init__("power_residuals", RESIDUAL_PARAMETERS)
         self.stage = ResidualStage(self._robot, ResidualSettings.of(self.values))
         self._assembler = PredictionAssembler(self._robot)
         self.offer(TOPIC, DiagnosticMessage)
@@ -57,5 +53,5 @@ class PowerResidualsNode(StageNode):
 def main() -> int:
     """Entry point of `power_residuals`."""
     description = "Compare the measured power of each motor with the predicted."
-    given = node_arguments("power_residuals", description, PARAMETERS)
+    given = node_arguments("power_residuals", description, RESIDUAL_PARAMETERS)
     return run_node(PowerResidualsNode, given)
