@@ -101,7 +101,7 @@ def operator() -> Iterator[Operator]:
 
 
 def test_robot_on_topics(operator: Operator, spawn: Callable, wait_until: Callable) -> None:
-    bridge = spawn(command_of("start_time:=100.0"))
+    bridge = spawn(command_of("start_time:=100.0", "publish_clock:=true"))
     wait_until(lambda: operator.spin() or all(operator.heard.values()), "a message on every topic")
     assert 100 <= operator.heard["joint_states"][0].header.stamp.sec < 115
     assert operator.heard["joint_states"][0].name == [f"wheel_{n}_joint" for n in (1, 2, 3)]
