@@ -34,7 +34,7 @@ def test_masses_add_up_and_inertias_are_physical(name: str) -> None:
     for inertial in inertials:
         given = inertial.find("inertia")
         x, y, z = sorted(float(given.get(key)) for key in ("ixx", "iyy", "izz"))
-        assert 0.0 < x
+        assert x > 0.0
         assert z <= x + y + 1e-12  # of any body
 
 

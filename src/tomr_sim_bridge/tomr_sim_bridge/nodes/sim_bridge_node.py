@@ -14,22 +14,22 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from tomr_power_model.cli import run_main
+from tomr_power_model.errors import InputError
 from tomr_power_model.messages import plain
 from tomr_power_model.messages.intake import Unusable, stamp_of, twist_of
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.messages.types import TEXT
 from tomr_power_model.nodes.command_line import node_arguments
+from tomr_power_model.nodes.command_type import CommandType
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
 from tomr_power_model.nodes.stage_node import (
-    CMD_VEL_TYPE,
     SENSOR_QOS,
     STAGE_QOS,
-    TWIST_TYPES,
     message_class,
     run_node,
     to_ros,
 )
-from tomr_power_model.robot.parameters import ParameterSpec, Value
+from tomr_power_model.robot.parameters import CMD_VEL_TYPE, ParameterSpec, Value
 from tomr_power_model.robot.urdf import urdf_of
 from tomr_sim_bridge.faults import all_parameters, split_name
 from tomr_sim_bridge.plant.samples import Sample, transform_of
@@ -124,6 +124,7 @@ class SimBridge(Node):
         )
         self._factor = _number(values, "real_time_factor")
         self._slowed_ns = 0
+        self.failure: InputError | None = None
         for fault_id in {split_name(name)[0] for name in FAULT_PARAMETERS}:
             self._set_fault(fault_id)
         self.add_post_set_parameters_callback(self._parameters_set)
@@ -136,8 +137,14 @@ class SimBridge(Node):
         self._has_tf = bool(values["publish_tf"]) and find_spec("tf2_msgs") is not None
         described = self.create_publisher(message_class(TEXT), "robot_description", LATCHED_QOS)
         described.publish(message_class(TEXT)(data=urdf_of(robot)))
-        kind = TWIST_TYPES[str(values["cmd_vel_type"])]
-        self.create_subscription(message_class(kind), "cmd_vel", self._command, SENSOR_QOS)
+        CommandType(
+            self,
+            "cmd_vel",
+            str(values["cmd_vel_type"]),
+            lambda name: self.create_subscription(
+                message_class(name), "cmd_vel", self._command, SENSOR_QOS
+            ),
+        )
         self._anchor()
         # A timer on the node's own clock would wait for the /clock that it makes.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -148,6 +155,12 @@ class SimBridge(Node):
         self._wall_ns, self._plant_ns = time.monotonic_ns(), self._simulation.stamp_ns
 
     def _advance(self) -> None:
+        try:
+            self._run()
+        except InputError as error:  # the plant has become unstable
+            self.failure = error
+
+    def _run(self) -> None:
         now = time.monotonic_ns()
         simulation = self._simulation
         target = self._reachable(now)
