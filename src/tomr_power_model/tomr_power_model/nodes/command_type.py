@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection
 from typing import Any
 
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
@@ -38,12 +39,18 @@ class CommandType:
         node.create_timer(_LOOK_PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _look(self) -> None:
+        if self._subscription is None:
+            try:
+                self._subscription = self._subscribe(self._type)
+            except RCLError:  # the old one is still there
+                return
         publishers = self._node.get_publishers_info_by_topic(self._topic)
         found = {publisher.topic_type for publisher in publishers}
         wanted = chosen_type(self._type, found) if self._is_auto else self._type
         if wanted != self._type:
+            # A participant has a topic in one type; the old one is gone at the next look.
             self._node.destroy_subscription(self._subscription)
-            self._type, self._subscription = wanted, self._subscribe(wanted)
+            self._type, self._subscription = wanted, None
             self._node.get_logger().info(f"{self._topic} is a {wanted}: listening to that")
         unheard = found - {self._type}
         if unheard - self._unheard:
