@@ -30,6 +30,7 @@ class WheelDrivers:
         self._delay_ns = round(controller.delay * NANOSECONDS)
         self._full = robot.supply.nominal_voltage
         self._rows = rolling_rows(robot) / robot.wheel_radius
+        self.obedience = 1.0  # share of the commanded twist that is acted upon
         self._pending: deque[tuple[int, Vector]] = deque()
         self._wanted = np.zeros(3)
         self._twist = np.zeros(3)
@@ -59,10 +60,11 @@ class WheelDrivers:
         return np.clip(voltage / self._full, -1.0, 1.0)
 
     def _ramp(self) -> None:
+        wanted = self._wanted * self.obedience
         if self._limit == 0.0:
-            self._twist = self._wanted
+            self._twist = wanted
             return
-        step_x, step_y, step_yaw = self._wanted - self._twist
+        step_x, step_y, step_yaw = wanted - self._twist
         length = math.hypot(step_x, step_y)
         share = min(1.0, self._limit * self._period / length) if length > 0 else 1.0
         most = self._yaw_limit * self._period
