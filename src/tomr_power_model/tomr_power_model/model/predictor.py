@@ -8,12 +8,14 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
+from tomr_power_model.drive.plausible import fastest_wheel
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.body import Body
 from tomr_power_model.dynamics.vehicle import plant_numbers, vehicle_of
 from tomr_power_model.effects import EFFECTS
 from tomr_power_model.messages.readings import NAN, UNKNOWN_READING, SupplyReading
 from tomr_power_model.model.commanded import Commanded, CommandPath, CommandTiming, Seen
+from tomr_power_model.model.continuity import COMMAND_TOLERANCE, Continuity
 from tomr_power_model.model.encoders import (
     UNKNOWN,
     UNKNOWN_MOTION,
@@ -60,7 +62,10 @@ class PowerPredictor:
         timing = CommandTiming(given.ticks.period, given.command_timeout, given.stale)
         self._path = CommandPath(robot, timing, is_compiled=is_compiled)
         self._resting = RestingDrivers(robot.controller, WHEELS)
-        self._encoders = EncoderWindow(given.encoder_window, given.ticks.period, given.stale)
+        self._encoders = EncoderWindow(
+            given.encoder_window, given.ticks.period, given.stale, fastest_wheel(robot)
+        )
+        self._commands = Continuity(COMMAND_TOLERANCE)
         self._window = to_ns(robot.sensors.power_window)
         self._reads_motor = robot.measurement.quantity == "motor_current"
         numbers = plant_numbers(vehicle_of(robot))
@@ -77,6 +82,8 @@ class PowerPredictor:
         self._path.clear()
         self._resting.clear()
         self._encoders.clear()
+        self._commands.clear()
+        self._was_silent = False
         self._gyro: tuple[int, float] | None = None
         self._heading = 0.0  # at the start of the next tick, against the first [rad]
         self._model.clear()
@@ -89,6 +96,9 @@ class PowerPredictor:
         arrival = self._arrive(COMMANDS, stamp_ns, periodic=False)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
             self._path.command(stamp_ns, twist)
+            self._commands.take(stamp_ns)
+        elif arrival is Arrival.REPEATED:
+            self._commands.precedes(stamp_ns)
         return arrival
 
     def encoders(self, stamp_ns: int, position: Triple, velocity: Triple) -> Arrival:
@@ -96,6 +106,8 @@ class PowerPredictor:
         arrival = self._arrive(ENCODERS, stamp_ns)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
             self._encoders.add(EncoderSample(stamp_ns, position, velocity))
+        elif arrival is Arrival.REPEATED:
+            self._encoders.continuity.precedes(stamp_ns)
         return arrival
 
     def imu(self, stamp_ns: int, yaw_rate: float) -> Arrival:
@@ -151,7 +163,7 @@ class PowerPredictor:
         self._heading += turned
         measured = self._model.measured(motion)
         from_encoders = self._readings(self._where_known(measured, motion), self._measured)
-        if commanded is None:
+        if commanded is None or self._is_silent(tick, commanded, speed):
             return Prediction(tick, UNKNOWN, UNKNOWN, _UNKNOWN, UNKNOWN_READING, from_encoders)
         means = self._model.commanded(commanded, windows)
         return Prediction(
@@ -162,6 +174,25 @@ class PowerPredictor:
             total=self._total(means),
             from_encoders=from_encoders,
         )
+
+    def _is_silent(self, tick: int, commanded: Commanded, speed: Sequence[float]) -> bool:
+        """Whether the commands paused lately, so that what the robot was told is not known.
+
+        After `command_timeout` it was told to stop; that it stands as it should ends the doubt.
+        Without a timeout commands may come when they change only, and no silence means anything.
+        """
+        timeout = self.settings.command_timeout
+        if not timeout:
+            return False
+        silent = self._commands.is_broken(tick)
+        stands = all(abs(value) < _RESTS for value in (*commanded.speed, *speed))
+        if silent and stands and tick - self._commands.last(tick) > timeout:
+            self._commands.excuse(tick)
+            silent = False
+        if self._was_silent and not silent:
+            self._resting.clear()  # the driver's integral went its own way
+        self._was_silent = silent
+        return silent
 
     @staticmethod
     def _moved(estimate: WheelEstimate, seconds: float) -> list[float]:

@@ -22,9 +22,9 @@ MODEL_PARAMETERS: tuple[ParameterSpec, ...] = (
     _S("encoder_window", "span of the fit to the encoders", "float", 0.07, "s", 0.01, 1.0),
     _S(
         "command_timeout",
-        "a command this old counts as a stop; 0: it is held",
+        "a command this old counts as a stop; 0: it is held, and may come on a change only",
         "float",
-        0.0,
+        0.5,
         "s",
         0.0,
         60.0,
@@ -62,7 +62,7 @@ class ModelSettings:
     ticks: TickSettings = field(factory=TickSettings)
     stale: int = to_ns(0.5)
     encoder_window: int = to_ns(0.07)
-    command_timeout: int = 0
+    command_timeout: int = to_ns(0.5)
     use_imu: bool = False
     power_model: str = "physical"
     model_values: Mapping[str, object] = field(factory=dict)  # of the models' own parameters
