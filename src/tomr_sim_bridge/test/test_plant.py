@@ -141,7 +141,7 @@ def test_a_command_is_held_or_times_out(
     moving = drive(simulation, 0.5, (0.0, 0.4, 0.0), skip=0.4).joints()
     later = drive(simulation, 1.0, skip=0.8).joints()
     assert np.abs(moving).max() > 7.0
-    assert (np.abs(later).max() < 0.05) is standing
+    assert (np.abs(later).max() < 0.05) == standing
 
 
 def test_energy_is_accounted_for(make_robot: MakeRobot) -> None:

@@ -9,6 +9,7 @@ from attrs import evolve, frozen
 from tomr_fault_diag.residuals.frame import (
     FROZEN,
     GAP,
+    MOTORS,
     NO_COMMAND,
     NOT_MEASURED,
     Residual,
@@ -21,9 +22,11 @@ from tomr_fault_diag.residuals.repeats import RepeatWatch, Work
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_power_model.drive.plausible import PowerLimits, fastest_wheel
 from tomr_power_model.drive.sources import TOTAL, TOTAL_TOPIC, PowerReading, motor_topics
+from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.readings import NAN, UNKNOWN_READING
 from tomr_power_model.model.continuity import POWER_TOLERANCE, Continuity
 from tomr_power_model.model.encoders import UNKNOWN, EncoderSample, EncoderWindow, Triple
+from tomr_power_model.model.input_health import InputReporter, InputState
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.ticks import Arrival, TickClock
 from tomr_power_model.robot import WHEELS, Robot
@@ -83,6 +86,7 @@ class ResidualStage:
         self._flows = [Continuity(POWER_TOLERANCE) for _ in self._supplies]
         self._repeats = [RepeatWatch() for _ in self._topics]
         self._limits = PowerLimits.of(robot)
+        self._health = InputReporter()
         self._encoders = EncoderWindow(
             self.settings.encoder_window, ticks.period, self.settings.stale, fastest_wheel(robot)
         )
@@ -106,6 +110,7 @@ class ResidualStage:
         arrival = self._arrive(ENCODERS, stamp_ns)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
             if not self._encoders.add(EncoderSample(stamp_ns, position, velocity)):
+                self._encoders.continuity.refuse()
                 return "no wheel can turn so far so fast; the sample is ignored"
         elif arrival is Arrival.REPEATED:
             self._encoders.continuity.precedes(stamp_ns)
@@ -130,7 +135,28 @@ class ResidualStage:
 
     def due(self) -> list[ResidualFrame]:
         """Residuals for the ticks that the stamps have reached, in order."""
-        return [self._frame(tick) for tick in self._clock.due()]
+        found = []
+        for tick in self._clock.due():
+            found.append(self._frame(tick))
+            self._health.take(tick, self._inputs(tick, found[-1]), self.settings.hardware_id)
+        return found
+
+    def reports(self) -> list[DiagnosticMessage]:
+        """How the sensors do, as far as it is to be said anew; after `due`."""
+        return self._health.due()
+
+    def _inputs(self, tick: int, frame: ResidualFrame) -> list[InputState]:
+        absent = [self._robot.wheel_names[wheel] for wheel in self._encoders.absent(tick)]
+        without = f"no {', '.join(absent)} among its names" if absent else ""
+        found = [InputState(ENCODERS, self._encoders.continuity, without)]
+        if self._has_motor_power:
+            for wheel, topic in enumerate(self._topics):
+                missing = frame.residuals[MOTORS[wheel]].missing
+                ailment = FROZEN.strip() if missing.endswith(FROZEN) else ""
+                found.append(InputState(f"{topic}/power", self._flows[wheel], ailment))
+        if self._robot.measurement.total == TOTAL_TOPIC:
+            found.append(InputState(TOTAL_TOPIC, self._flows[TOTAL]))
+        return found
 
     def _arrive(self, stream: str, stamp_ns: int) -> Arrival:
         arrival = self._clock.arrive(stream, stamp_ns)

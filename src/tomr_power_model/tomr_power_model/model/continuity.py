@@ -59,6 +59,9 @@ class Continuity:
         self._back, self._strays = 0, 0
         self._excused = 0
         self.refused = 0  # messages up to the last tick
+        self.refused_at = 0  # newest stamp before the last of them, 0: there was none
+        self.refused_since = 0  # the newest sample
+        self.gaps = 0
         self.resumed = 0  # first stamp after the last gap, 0: there was none
         self._until = 0
 
@@ -92,8 +95,12 @@ class Continuity:
 
     def is_broken(self, tick_ns: int) -> bool:
         """Whether at a tick the stream pauses, or went on only just before."""
+        return self.is_silent(tick_ns) or tick_ns < self._until
+
+    def is_silent(self, tick_ns: int) -> bool:
+        """Whether at a tick nothing has come for longer than usual."""
         last = self.last(tick_ns)
-        return bool(last) and (tick_ns < self._until or tick_ns - last > self._tolerated)
+        return bool(last) and tick_ns - last > self._tolerated
 
     def rate(self, tick_ns: int) -> float:
         """Samples per second of the last moments [Hz]."""
@@ -103,7 +110,8 @@ class Continuity:
 
     def _follow(self, stamp: int, back: int) -> None:
         if back:
-            self.refused += 1
+            self.refused, self.refused_at = self.refused + 1, stamp
+            self.refused_since += 1
             if back > 0:
                 self._back, self._strays = max(self._back, back), self._strays + 1
             return
@@ -117,6 +125,7 @@ class Continuity:
         elif silence:
             self._intervals.append(silence)
         self._back, self._strays, self._last = 0, 0, stamp
+        self.refused_since = 0
         self._count += 1
         self._counted.append(stamp)
         while self._counted[0] <= stamp - _RATED:
@@ -128,5 +137,5 @@ class Continuity:
 
     def _break_off(self, stamp: int, silence: int) -> None:
         given = self._tolerance
-        self.resumed = stamp
+        self.resumed, self.gaps = stamp, self.gaps + 1
         self._until = stamp + given.after + round(given.share * min(silence, _LONGEST))

@@ -137,6 +137,14 @@ class EncoderWindow:
         self.continuity.take(sample.stamp_ns)
         return True
 
+    def absent(self, tick_ns: int) -> list[int]:
+        """Wheels of which the newest message up to a tick says nothing."""
+        for sample in reversed(self._samples):
+            if sample.stamp_ns <= tick_ns:
+                pairs = zip(sample.position, sample.velocity, strict=True)
+                return [wheel for wheel, (p, v) in enumerate(pairs) if p != p and v != v]  # NaN
+        return []
+
     def _leaps_to(self, sample: EncoderSample) -> bool:
         """Whether no wheel can have turned so far since the last sample, or turns so fast."""
         if any(abs(speed) > self._fastest for speed in sample.velocity):

@@ -13,6 +13,7 @@ from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.body import Body
 from tomr_power_model.dynamics.vehicle import plant_numbers, vehicle_of
 from tomr_power_model.effects import EFFECTS
+from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.readings import NAN, UNKNOWN_READING, SupplyReading
 from tomr_power_model.model.commanded import Commanded, CommandPath, CommandTiming, Seen
 from tomr_power_model.model.continuity import COMMAND_TOLERANCE, Continuity
@@ -24,6 +25,7 @@ from tomr_power_model.model.encoders import (
     Triple,
     WheelEstimate,
 )
+from tomr_power_model.model.input_health import InputReporter, InputState
 from tomr_power_model.model.means import Means
 from tomr_power_model.model.monitors import Monitors
 from tomr_power_model.model.power_models import POWER_MODELS, MeasuredMotion, Windows
@@ -66,6 +68,7 @@ class PowerPredictor:
             given.encoder_window, given.ticks.period, given.stale, fastest_wheel(robot)
         )
         self._commands = Continuity(COMMAND_TOLERANCE)
+        self._health = InputReporter()
         self._window = to_ns(robot.sensors.power_window)
         self._reads_motor = robot.measurement.quantity == "motor_current"
         numbers = plant_numbers(vehicle_of(robot))
@@ -126,7 +129,16 @@ class PowerPredictor:
 
     def due(self) -> list[Prediction]:
         """Predictions for the ticks that the stamps have reached, in order."""
-        return [self._predict(tick) for tick in self._clock.due()]
+        found = []
+        for tick in self._clock.due():
+            found.append(self._predict(tick))
+            commands = InputState(COMMANDS, self._commands, is_optional=True)
+            self._health.take(tick, (commands,), self.settings.hardware_id)
+        return found
+
+    def reports(self) -> list[DiagnosticMessage]:
+        """How the commands come, as far as it is to be said anew; after `due`."""
+        return self._health.due()
 
     def _arrive(self, stream: str, stamp_ns: int, periodic: bool = True) -> Arrival:
         arrival = self._clock.arrive(stream, stamp_ns, periodic)

@@ -16,7 +16,6 @@ from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_sim_bridge.plant.wheels import Vector, rolling_rows
 
-
 COMMAND_TIMEOUT = 0.5  # s, as the diagnosis expects of a robot
 
 
