@@ -7,6 +7,7 @@ from attrs import frozen
 
 from tomr_fault_diag.residuals.frame import INPUT_ORDERS
 from tomr_power_model.errors import InputError
+from tomr_power_model.model.settings import HARDWARE_ID
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot.parameters import ParameterSpec
 
@@ -35,7 +36,7 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
         "speeds_first",
         choices=tuple(INPUT_ORDERS),
     ),
-    _S("hardware_id", "of this robot, in every diagnostic status", "str", "tomr"),
+    HARDWARE_ID,
     _S("evidence_weight", "of window: what one window counts", "float", 0.4, "", 0.01, 1.0),
     _S(
         "caution",

@@ -1,5 +1,6 @@
 """Speed and acceleration of the wheels from encoder samples of the last moments."""
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from functools import lru_cache
@@ -11,6 +12,7 @@ from attrs import field, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.drive.dejitter import Grid, grid_of, is_jitter
+from tomr_power_model.model.continuity import ENCODER_TOLERANCE, Continuity
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -19,6 +21,8 @@ _LEAST = 50
 _EVERY = 25  # samples: how often
 LONG_S = 0.2  # of the fit beside a simulation
 _FIT = 5  # samples that it takes
+_LEEWAY = 0.05  # s that a stamp may be late: angles that no motor reaches till then are bad
+_NEW_ZERO = 3  # such angles in a row are those of an encoder that counts from elsewhere
 UNKNOWN: Triple = (float("nan"), float("nan"), float("nan"))
 
 
@@ -97,25 +101,62 @@ class EncoderWindow:
 
     Least squares over the samples in (t - span, t]: positions by p + v s + a s^2 / 2, or, where a
     robot gives no positions, velocities by v + a s; evaluated at t - period / 2. Stamps that only
-    jitter are put on their grid first.
+    jitter are put on their grid first. Around a gap nothing is known, and no fit spans one.
     """
 
-    def __init__(self, span_ns: int, period_ns: int, stale_ns: int) -> None:
+    def __init__(
+        self, span_ns: int, period_ns: int, stale_ns: int, fastest: float = math.inf
+    ) -> None:
+        """Times in nanoseconds; `fastest` that a wheel can turn [rad/s]."""
         self._span = span_ns
         self._period = period_ns
         self._stale = stale_ns
+        self._fastest = fastest
         self._samples: deque[EncoderSample] = deque()
         self._stamps = RecentStamps()
+        self.continuity = Continuity(ENCODER_TOLERANCE)
+        self._leaps = 0
 
     def clear(self) -> None:
         """Forget all samples."""
         self._samples.clear()
         self._stamps = RecentStamps()
+        self.continuity.clear()
+        self._leaps = 0
 
-    def add(self, sample: EncoderSample) -> None:
-        """Take a sample newer than those before."""
+    def add(self, sample: EncoderSample) -> bool:
+        """Take a sample newer than those before; returns whether it can be true."""
+        if self._leaps_to(sample):
+            self._leaps += 1
+            if self._leaps < _NEW_ZERO:
+                return False
+            self.continuity.restart(sample.stamp_ns)
+        self._leaps = 0
         self._samples.append(sample)
         self._stamps.add(sample.stamp_ns, sample.position)
+        self.continuity.take(sample.stamp_ns)
+        return True
+
+    def absent(self, tick_ns: int) -> list[int]:
+        """Wheels of which the newest message up to a tick says nothing."""
+        for sample in reversed(self._samples):
+            if sample.stamp_ns <= tick_ns:
+                pairs = zip(sample.position, sample.velocity, strict=True)
+                return [wheel for wheel, (p, v) in enumerate(pairs) if p != p and v != v]  # NaN
+        return []
+
+    def _leaps_to(self, sample: EncoderSample) -> bool:
+        """Whether no wheel can have turned so far since the last sample, or turns so fast."""
+        if any(abs(speed) > self._fastest for speed in sample.velocity):
+            return True
+        if not self._samples:
+            return False
+        last = self._samples[-1]
+        furthest = self._fastest * (1e-9 * (sample.stamp_ns - last.stamp_ns) + _LEEWAY)
+        return any(
+            abs(now - before) > furthest
+            for now, before in zip(sample.position, last.position, strict=True)
+        )
 
     def at(self, tick_ns: int) -> WheelEstimate:
         """Estimate for the window that ends at a tick; NaN if its samples are missing or stale."""
@@ -151,12 +192,15 @@ class EncoderWindow:
 
     def _until(self, tick_ns: int, span: int | None = None) -> list[EncoderSample]:
         """Samples of the window, and the two newest where encoders are slower than it."""
+        if self.continuity.is_broken(tick_ns):
+            return []
         oldest = tick_ns - (self._span if span is None else span)
+        joined = self.continuity.resumed
         while len(self._samples) > 2 and self._samples[1].stamp_ns <= tick_ns - self._stale:
             self._samples.popleft()
         window: list[EncoderSample] = []
         for sample in reversed(self._samples):
-            if len(window) > 2 and sample.stamp_ns <= oldest:
+            if sample.stamp_ns < joined or (len(window) > 2 and sample.stamp_ns <= oldest):
                 break
             if sample.stamp_ns <= tick_ns:
                 window.append(sample)
