@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
-import yaml
 from attrs import frozen
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import load_yaml, read_text
 from tomr_power_model.robot import Robot
 from tomr_power_model.robot.parameters import ParameterSpec
 from tomr_sim_bridge.missions.schema import (
@@ -145,12 +145,10 @@ def load_mission(source: Path | str) -> Mission:
         resource = files("tomr_sim_bridge").joinpath("missions").joinpath(f"{place}.yaml")
         return parse_mission(resource.read_text(encoding="utf-8"), f"{place}.yaml")
     try:
-        text = Path(source).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or error
+        text = read_text(Path(source))
+    except InputError as error:
         raise InputError(
-            f"{place}: cannot be read ({reason}): give a mission file or one of "
-            f"{', '.join(shipped_missions())}"
+            f"{error}: give a mission file or one of {', '.join(shipped_missions())}"
         ) from None
     return parse_mission(text, place)
 
@@ -190,13 +188,7 @@ def parse_mission(text: str, place: str) -> Mission:
 
 
 def _document(text: str, place: str) -> Mapping[str, object]:
-    try:
-        document = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f" line {mark.line + 1}:" if mark is not None else ""
-        problem = getattr(error, "problem", None) or "not YAML"
-        raise InputError(f"{place}:{line} {problem}: mend the YAML") from None
+    document = load_yaml(text, place)
     if not isinstance(document, Mapping):
         raise InputError(f"{place}: is no mapping: start with name: and phases:")
     return cast(Mapping[str, object], document)
