@@ -52,7 +52,7 @@ def run_main(main: Main, arguments: Sequence[str] | None = None) -> int:
 
 def run_module(name: str) -> int:
     """Run `main` of a module; loading it is interrupted as cleanly as running it."""
-    return run_main(lambda arguments: int(import_module(name).main(arguments)))
+    return run_main(lambda _: int(import_module(name).main()))
 
 
 def _told(error: Exception) -> tuple[int, str]:

@@ -42,6 +42,8 @@ class Limits:
     message_bytes: int = _limit(64 * _MEGA, "a message of a recording")
     messages: int = _limit(20_000_000, "messages of a recording that are read")
     samples: int = _limit(2_000_000, "samples of one topic that a fit holds")
+    mission_phases: int = _limit(100_000, "phases of a mission, repeats counted")
+    mission_seconds: int = _limit(86_400, "a mission")
     drive_seconds: int = _limit(7_200, "a recording that is fitted as a whole")
     stamp_jump_seconds: int = _limit(60, "a step between the stamps of a topic, in a fit")
 

@@ -27,7 +27,7 @@ def check_definition(connection: Connection, place: str) -> None:
             f"{place}: {topic} is a {kind}, which is no standard message of ROS 2 Jazzy: leave "
             "the topic out, or record another"
         )
-    if connection.msgdef.format == MessageDefinitionFormat.NONE:
+    if connection.msgdef.format == MessageDefinitionFormat.NONE or not connection.msgdef.data:
         return
     # As in Recording._read: only library code runs in the block, and its errors have no base.
     try:

@@ -173,6 +173,11 @@ def open_recording(path: Path | str) -> Iterator[Recording]:
                 "sqlite3 recording was never closed: record again, to mcap"
             )
         topics = {item.topic: item.msgtype for item in storage.connections()}
+        if not topics:
+            raise InputError(
+                f"{source} holds messages, but no topic that they belong to: its index is damaged, "
+                f"{_ANOTHER_COPY}"
+            )
         yield Recording(
             path=source,
             topics=dict(sorted(topics.items())),
