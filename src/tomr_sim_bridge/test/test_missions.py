@@ -109,7 +109,7 @@ def test_base_is_taken_over_and_changed(tmp_path: Path) -> None:
         ("name: test\n", "phases is missing or empty"),
         ("phases: [{pause: 1.0}]\n", "name is missing: add it"),
         (PAUSE + "speed: 3\n", "speed is unknown: give name, description"),
-        (PAUSE + "command_rate: 0.0\n", "command_rate = 0 Hz: out of range, give above 0"),
+        (PAUSE + "command_rate: 0.0\n", "command_rate = 0 Hz: out of range, give at least 0.1"),
         (PAUSE + "command_rate: .nan\n", "give a finite number"),
         (PAUSE + "payload: heavy\n", "payload = 'heavy': give a number"),
         (PAUSE + "base: nowhere\n", "base = 'nowhere' is no shipped mission"),
