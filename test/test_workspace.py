@@ -208,6 +208,19 @@ def test_only_nodes_import_rclpy(package: Path) -> None:
             assert not [name for name in imports(file) if name.split(".")[0] == "rclpy"], file
 
 
+@pytest.mark.parametrize(
+    "node", ["power_model", "power_residuals", "fault_classifier", "diagnosis"]
+)
+def test_nodes_import_nothing_large(node: str) -> None:
+    """Each would add seconds and tens of megabytes to a node on a small computer."""
+    package = "tomr_power_model" if node == "power_model" else "tomr_fault_diag"
+    program = f"import {package}.nodes.{node}_node, sys; print(*sys.modules)"
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert not {"scipy", "numba", "matplotlib", "rosbags", "torch"} & set(run.stdout.split())
+
+
 def test_launch_files_start_commands_that_exist() -> None:
     known = {(package.name, name) for package in PACKAGES for name in commands(package)}
     started = set()
@@ -218,7 +231,7 @@ def test_launch_files_start_commands_that_exist() -> None:
                 named = [given.get("package"), given.get("executable")]
                 if all(isinstance(value, ast.Constant) for value in named):
                     started.add(tuple(value.value for value in named))
-    nodes = {"power_model", "power_residuals", "fault_classifier", "sim_bridge"}
+    nodes = {"power_model", "power_residuals", "fault_classifier", "tomr_diagnosis", "sim_bridge"}
     assert {command for _, command in started} == nodes
     assert started <= known
 

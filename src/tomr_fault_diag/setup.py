@@ -29,6 +29,7 @@ setup(
             f"power_residuals = {NAME}.entry:power_residuals",
             f"fault_classifier = {NAME}.entry:fault_classifier",
             f"tomr_diagnose = {NAME}.entry:tomr_diagnose",
+            f"tomr_diagnosis = {NAME}.entry:tomr_diagnosis",
         ],
     },
 )

@@ -9,7 +9,7 @@ from tomr_fault_diag.residuals.frame import INPUT_ORDERS
 from tomr_power_model.errors import InputError
 from tomr_power_model.model.settings import HARDWARE_ID
 from tomr_power_model.model.ticks import to_ns
-from tomr_power_model.robot.parameters import ParameterSpec
+from tomr_power_model.robot.parameters import HARDWARE_ID, NAMELESS, ParameterSpec
 
 _S = ParameterSpec
 
@@ -78,7 +78,7 @@ class ClassifierSettings:
     confirm_time: int = to_ns(0.15)
     recovery_time: int = to_ns(1.0)
     report_period: int = to_ns(1.0)
-    hardware_id: str = "tomr"
+    hardware_id: str = NAMELESS
     input_order: str = "speeds_first"
 
     @classmethod
@@ -103,6 +103,6 @@ class ClassifierSettings:
             confirm_time=to_ns(number("confirm_time")),
             recovery_time=to_ns(number("recovery_time")),
             report_period=to_ns(number("report_period")),
-            hardware_id=str(values["hardware_id"]),
+            hardware_id=str(values["hardware_id"]) or NAMELESS,
             input_order=str(values["input_order"]),
         )

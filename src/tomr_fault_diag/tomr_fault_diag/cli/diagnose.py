@@ -12,7 +12,12 @@ from tqdm import tqdm
 from tomr_fault_diag.classifier.messages import evidence_of
 from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
-from tomr_fault_diag.diagnosis.settings import PARAMETERS, DiagnosisSettings, parse_assignments
+from tomr_fault_diag.diagnosis.settings import (
+    PARAMETERS,
+    STAGE_NODES,
+    DiagnosisSettings,
+    parse_assignments,
+)
 from tomr_fault_diag.diagnosis.summary import Summariser, Summary
 from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK, run_main
 from tomr_power_model.messages.bag import to_bag
@@ -20,8 +25,6 @@ from tomr_power_model.messages.outgoing import TYPES
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.recordings import Recording, RecordingWriter, open_recording
 from tomr_power_model.robot import load_robot, read_node_sections, shipped_robots
-
-STAGE_NODES = ("power_model", "power_residuals", "fault_classifier")
 
 _EPILOG = """\
 examples:

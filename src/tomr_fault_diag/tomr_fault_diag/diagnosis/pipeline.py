@@ -1,7 +1,7 @@
 """The three stages in one process: messages in, the suite's messages out.
 
-The nodes run the same stages apart; both give the same numbers, because the stages are driven by
-stamps and whatever crosses a topic is rounded as its message rounds it.
+The three nodes run the same stages apart; both give the same numbers, because the stages are driven
+by stamps and whatever crosses a topic is rounded as its message rounds it.
 """
 
 from collections.abc import Callable, Iterator
@@ -44,18 +44,30 @@ _NOTHING = Step()
 
 
 class Pipeline:
-    """Model, residuals and classifier of one robot, fed with recorded messages."""
+    """Model, residuals and classifier of one robot, fed with recorded or live messages."""
 
-    def __init__(self, robot: Robot, settings: DiagnosisSettings) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        settings: DiagnosisSettings,
+        *,
+        twist_type: str = TWIST_STAMPED,
+        is_compiled: bool | None = None,
+        warn: Callable[[str], object] | None = None,
+    ) -> None:
+        """`is_compiled`: run the dynamics compiled, None where that can be had; `warn` hears the
+        complaints that are worth a line."""
         self.robot = robot
         self.settings = settings
         self.complaints = Complaints()
-        self._predictor = PowerPredictor(robot, settings.model, is_compiled=has_numba())
+        self._warn = warn
+        compiled = has_numba() if is_compiled is None else is_compiled
+        self._predictor = PowerPredictor(robot, settings.model, is_compiled=compiled)
         self._residuals = ResidualStage(robot, settings.residuals)
         self._classifier = FaultClassifier(make_judge(settings.classifier))
         wheels = WheelFinder(robot.wheel_names)
         self.inputs: tuple[Input, ...] = (
-            *model_inputs(robot, self._predictor, TWIST_STAMPED, wheels),
+            *model_inputs(robot, self._predictor, twist_type, wheels),
             *residual_inputs(robot, self._residuals, wheels),
         )
         self._takers: dict[str, list[Take]] = {}
@@ -68,7 +80,9 @@ class Pipeline:
         for take in self._takers[topic]:
             problem = take(message, receive_ns)
             if problem is not None and problem != heard:  # two stages may say the same
-                self.complaints.note(topic, problem)
+                line = self.complaints.note(topic, problem)
+                if line is not None and self._warn is not None:
+                    self._warn(line)
             heard = problem
         predictions = self._predictor.due()
         for prediction in predictions:
@@ -83,6 +97,12 @@ class Pipeline:
             tuple(d for d in diagnoses if d is not None),
             (*self._predictor.reports(), *self._residuals.reports()),
         )
+
+    def retune(self, settings: DiagnosisSettings) -> None:
+        """Change what may be changed while running: bands, and times of the classifier."""
+        self.settings = settings
+        self._residuals.retune(settings.residuals.bands)
+        self._classifier.settings = settings.classifier
 
     def messages(self, step: Step) -> Iterator[Outgoing]:
         """The messages that the nodes publish at such a step."""

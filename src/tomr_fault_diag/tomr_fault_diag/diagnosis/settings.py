@@ -13,6 +13,9 @@ from tomr_power_model.model.settings import MODEL_PARAMETERS, ModelSettings
 from tomr_power_model.robot.description import closest
 from tomr_power_model.robot.parameters import ParameterSpec, check_all
 
+# Whose sections of a robot.yaml hold settings of the diagnosis; a later one counts more.
+STAGE_NODES = ("power_model", "power_residuals", "fault_classifier", "tomr_diagnosis")
+
 # The stages share some parameters by name and meaning; a name stands once.
 PARAMETERS: Mapping[str, ParameterSpec] = {
     spec.name: spec for spec in (*MODEL_PARAMETERS, *RESIDUAL_PARAMETERS, *CLASSIFIER_PARAMETERS)

@@ -7,7 +7,7 @@ from attrs import field, frozen
 
 from tomr_power_model.model.settings import HARDWARE_ID, TICK_PARAMETERS, tick_settings
 from tomr_power_model.model.ticks import TickSettings, to_ns
-from tomr_power_model.robot.parameters import ParameterSpec
+from tomr_power_model.robot.parameters import HARDWARE_ID, ParameterSpec
 
 
 def _live(name: str, description: str, default: float, unit: str = "") -> ParameterSpec:
@@ -27,6 +27,7 @@ RESIDUAL_PARAMETERS: tuple[ParameterSpec, ...] = (
     _live("band.speed", "least band of a wheel speed", 0.1, "rad/s"),
     _live("band.speed_relative", "of the expected wheel speed", 0.01),
     _live("band.speed_transient", "part of the expected speed's change over the last ticks", 0.1),
+    HARDWARE_ID,
 )
 
 

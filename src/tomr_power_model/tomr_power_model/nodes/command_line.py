@@ -3,9 +3,13 @@
 import argparse
 import sys
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from pathlib import Path
 
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.utilities import remove_ros_args
 
+from tomr_power_model.cli import EXIT_BAD_INPUT
 from tomr_power_model.robot.parameters import ParameterSpec
 
 _PARAMETERS = """
@@ -20,7 +24,8 @@ def node_arguments(
     epilog: str = "",
     arguments: Sequence[str] | None = None,
 ) -> list[str]:
-    """The arguments to start ROS with; `--help` and what no node knows end the process."""
+    """The arguments to start ROS with; `--help` and what no node knows end the process, and so
+    does what ROS cannot read, with one line."""
     given = list(sys.argv if arguments is None else [name, *arguments])
     parser = argparse.ArgumentParser(
         prog=name,
@@ -31,5 +36,22 @@ def node_arguments(
         epilog=epilog,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.parse_args(remove_ros_args(given)[1:])
+    try:
+        parser.parse_args(remove_ros_args(given)[1:])
+    except RCLError as error:
+        print(f"error: {_cause(given, error)}", file=sys.stderr)
+        raise SystemExit(EXIT_BAD_INPUT) from None
     return given
+
+
+def _cause(arguments: Sequence[str], error: RCLError) -> str:
+    """Why ROS refuses its arguments; its own text ends with where it was in C."""
+    for file in parameter_files(arguments):
+        if not Path(file).is_file():
+            return f"--params-file {file}: no such file: give a robot.yaml"
+    return f"{' '.join(str(error).partition(', at ')[0].split())}: mend it"
+
+
+def parameter_files(arguments: Sequence[str]) -> list[str]:
+    """The files given as --params-file."""
+    return [file for flag, file in pairwise(arguments) if flag == "--params-file"]

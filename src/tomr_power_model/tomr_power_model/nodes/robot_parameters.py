@@ -100,11 +100,16 @@ def _spec_of(name: str, wheels: tuple[str, str, str]) -> ParameterSpec | None:
     return None
 
 
-def declare_specs(node: Node, specs: Iterable[ParameterSpec]) -> dict[str, Value]:
-    """Declare a node's own parameters; returns their checked values by name."""
+def declare_specs(
+    node: Node, specs: Iterable[ParameterSpec], fallback: Mapping[str, object] | None = None
+) -> dict[str, Value]:
+    """Declare a node's own parameters; returns their checked values by name.
+
+    `fallback`: values of parameters that are not given to the node, in place of their defaults.
+    """
     table = {spec.name: spec for spec in specs}
     place = node.get_name()
-    given = given_parameters(node)
+    given = {**(fallback or {}), **given_parameters(node)}
     values: dict[str, Value] = {}
     for name, spec in table.items():
         if name not in given and spec.default is None:

@@ -118,6 +118,15 @@ def _text(value: object) -> str:
     return value
 
 
+NAMELESS = "tomr"  # the robot outside of any namespace
+HARDWARE_ID = ParameterSpec(
+    "hardware_id",
+    f"of this robot, in every status; empty: its namespace, else {NAMELESS}",
+    "str",
+    "",
+)
+
+
 def check_all(
     specs: Iterable[ParameterSpec], values: Mapping[str, object], place: str
 ) -> dict[str, Value]:
