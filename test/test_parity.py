@@ -120,16 +120,11 @@ def test_nodes_and_offline_tool_publish_the_same(
 
         def connected() -> bool:
             executor.spin_once(0.01)
-<<<<<<< HEAD
             published = all(
-                node.count_publishers(topic) == (3 if topic == DIAGNOSTICS else 1)
+                node.count_publishers(topic) == (len(commands) if topic == DIAGNOSTICS else 1)
                 for topic in types
             )
-            heard = all(node.count_subscribers(t) == 2 for t in types if t != DIAGNOSTICS)
-=======
-            published = all(node.count_publishers(topic) == 1 for topic in types)
-            heard = all(node.count_subscribers(t) == readers for t in types if t != "/diagnostics")
->>>>>>> h_view
+            heard = all(node.count_subscribers(t) == readers for t in types if t != DIAGNOSTICS)
             return published and heard
 
         wait_until(connected, "nodes that found each other")

@@ -75,17 +75,11 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             *ARGUMENTS,
-<<<<<<< HEAD
-            stage(rate, hardware_id, package="tomr_power_model", executable="power_model"),
-            stage(rate, hardware_id, package="tomr_fault_diag", executable="power_residuals"),
-            stage(hardware_id, package="tomr_fault_diag", executable="fault_classifier"),
-=======
-            stage(rate, package="tomr_power_model", executable="power_model"),
+            stage(rate, name, package="tomr_power_model", executable="power_model"),
             stage(rate, name, package="tomr_fault_diag", executable="power_residuals"),
             stage(name, package="tomr_fault_diag", executable="fault_classifier"),
             stage(
                 rate, name, package="tomr_fault_diag", executable="tomr_diagnosis", composed=True
             ),
->>>>>>> h_view
         ]
     )

@@ -7,7 +7,6 @@ from attrs import frozen
 
 from tomr_fault_diag.residuals.frame import INPUT_ORDERS
 from tomr_power_model.errors import InputError
-from tomr_power_model.model.settings import HARDWARE_ID
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot.parameters import HARDWARE_ID, NAMELESS, ParameterSpec
 

@@ -5,9 +5,9 @@ from typing import Self, cast
 
 from attrs import field, frozen
 
-from tomr_power_model.model.settings import HARDWARE_ID, TICK_PARAMETERS, tick_settings
+from tomr_power_model.model.settings import TICK_PARAMETERS, tick_settings
 from tomr_power_model.model.ticks import TickSettings, to_ns
-from tomr_power_model.robot.parameters import HARDWARE_ID, ParameterSpec
+from tomr_power_model.robot.parameters import HARDWARE_ID, NAMELESS, ParameterSpec
 
 
 def _live(name: str, description: str, default: float, unit: str = "") -> ParameterSpec:
@@ -27,7 +27,6 @@ RESIDUAL_PARAMETERS: tuple[ParameterSpec, ...] = (
     _live("band.speed", "least band of a wheel speed", 0.1, "rad/s"),
     _live("band.speed_relative", "of the expected wheel speed", 0.01),
     _live("band.speed_transient", "part of the expected speed's change over the last ticks", 0.1),
-    HARDWARE_ID,
 )
 
 
@@ -84,7 +83,7 @@ class ResidualSettings:
     stale: int = to_ns(0.5)
     encoder_window: int = to_ns(0.07)
     bands: BandSettings = field(factory=BandSettings)
-    hardware_id: str = "tomr"
+    hardware_id: str = NAMELESS
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:
@@ -94,5 +93,5 @@ class ResidualSettings:
             stale=to_ns(cast(float, values["stale_after"])),
             encoder_window=to_ns(cast(float, values["encoder_window"])),
             bands=BandSettings.of(values),
-            hardware_id=str(values["hardware_id"]),
+            hardware_id=str(values["hardware_id"]) or NAMELESS,
         )

@@ -7,7 +7,7 @@ from attrs import field, frozen
 
 from tomr_power_model.model.power_models import POWER_MODELS, own_parameters
 from tomr_power_model.model.ticks import TickSettings, to_ns
-from tomr_power_model.robot.parameters import ParameterSpec
+from tomr_power_model.robot.parameters import HARDWARE_ID, NAMELESS, ParameterSpec
 
 _S = ParameterSpec
 TICK_PARAMETERS: tuple[ParameterSpec, ...] = (
@@ -17,7 +17,6 @@ TICK_PARAMETERS: tuple[ParameterSpec, ...] = (
     _S("gap", "a silence or jump of stamps that starts afresh", "float", 1.0, "s", 0.1, 60.0),
     _S("stale_after", "age at which an input counts as missing", "float", 0.5, "s", 0.01, 10.0),
 )
-HARDWARE_ID = _S("hardware_id", "of this robot, in every diagnostic status", "str", "tomr")
 MODEL_PARAMETERS: tuple[ParameterSpec, ...] = (
     *TICK_PARAMETERS,
     HARDWARE_ID,
@@ -67,7 +66,7 @@ class ModelSettings:
     command_timeout: int = to_ns(0.5)
     use_imu: bool = False
     power_model: str = "physical"
-    hardware_id: str = "tomr"
+    hardware_id: str = NAMELESS
     model_values: Mapping[str, object] = field(factory=dict)  # of the models' own parameters
 
     @classmethod
@@ -80,6 +79,6 @@ class ModelSettings:
             command_timeout=to_ns(cast(float, values["command_timeout"])),
             use_imu=bool(values["use_imu"]),
             power_model=str(values["power_model"]),
-            hardware_id=str(values["hardware_id"]),
+            hardware_id=str(values["hardware_id"]) or NAMELESS,
             model_values={spec.name: values[spec.name] for spec in own_parameters()},
         )
