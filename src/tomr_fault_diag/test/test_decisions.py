@@ -1,18 +1,20 @@
 """When a fault is named and let go of, and what a motor's own data have to do with it."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_fault_diag.classifier.judges import Opinion, make_judge
+from tomr_fault_diag.classifier.belief import CONTROLS, HYPOTHESES
+from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
-from tomr_fault_diag.classifier.states import MOTOR, NORMAL, POWER_SENSOR, STATES
+from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, POWER_SENSOR, SLIP, STATES
+from tomr_fault_diag.classifier.window_network import WindowNetwork
 from tomr_fault_diag.residuals.frame import (
     ENCODERS,
     GAP,
@@ -177,22 +179,55 @@ def test_states_do_not_hang_on_rate_or_phase(hz: int, phase: int) -> None:
     assert found[2][0] - 6000 <= 1600 + 2 * period
 
 
+def test_a_gap_is_no_time_in_which_a_fault_recovers() -> None:
+    healthy = [*ticks(4000, 4900), *ticks(8000, 10_000)]
+    found = changes(classified([*FAULTY, *healthy]))
+    assert [name for _, name in found] == ["normal", FAULT, "normal"]
+    assert found[-1][0] >= 8000 + 1000
+
+
 class Fixed:
     """A judge that is sure of one wheel, whatever it sees."""
 
     settings = ClassifierSettings()
+    wheel = 0
 
     def clear(self) -> None: ...
 
     def interrupt(self) -> None: ...
 
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
-        return Opinion(np.eye(6)[MOTOR + 1], sure=True, wheel=1)
+        return Opinion(np.eye(6)[MOTOR + self.wheel], sure=True, wheel=self.wheel)
 
 
-def test_whatever_a_judge_says_a_blind_motor_is_not_named() -> None:
-    classifier = FaultClassifier(Fixed())
-    for item in ticks(50, 1000):
+@pytest.mark.parametrize("before", [None, 0])
+def test_whatever_a_judge_says_a_blind_motor_is_not_named(before: int | None) -> None:
+    judge = Fixed()
+    classifier = FaultClassifier(judge)
+    if before is not None:
+        classifier.classify(frame(50))
+    judge.wheel = 1
+    for item in ticks(100, 1500):
         blind = without(item, [MOTORS[1], ENCODERS[1]], f"{GAP}wheel_2/power")
         diagnosis = classifier.classify(blind)
-        assert diagnosis is None or diagnosis.state in (STATES[NORMAL],)
+        expected = STATES[NORMAL] if before is None else STATES[MOTOR]
+        assert diagnosis is None or diagnosis.state is expected
+
+
+class Likely:
+    """A network to which wheel 2's signal is lost, and if not that, the floor is slippery."""
+
+    def log_likelihoods(self, window: np.ndarray) -> np.ndarray:
+        found = np.full(HYPOTHESES, -20.0)
+        found[[CONTROLS.start + 1, SLIP]] = 20.0, 0.0
+        return found
+
+
+def test_what_looks_like_a_blind_motors_fault_is_no_evidence_of_another() -> None:
+    judge = WindowJudge(cast(WindowNetwork, Likely()), ClassifierSettings())
+    for t in range(50, 5000, 50):
+        opinion = judge.judge(frame(t), to_ns(0.05), Unseen(blind=((1, "power sensor dead"),)))
+    assert int(opinion.probabilities.argmax()) == NORMAL
+    for t in range(5000, 9000, 50):
+        opinion = judge.judge(frame(t), to_ns(0.05), Unseen())
+    assert (int(opinion.probabilities.argmax()), opinion.wheel) == (CONTROL, 1)

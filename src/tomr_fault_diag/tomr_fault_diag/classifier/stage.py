@@ -167,9 +167,8 @@ class FaultClassifier:
             (misfit.ignores_commands or is_blind) and self._state in _QUIET
         ):
             self._settle(stamp)
-        elif held and (leading != self._state or opinion.wheel != self._wheel):
-            if not is_blind:
-                self._enter(leading, self._candidate_since, opinion.wheel)
+        elif held and not is_blind and (leading != self._state or opinion.wheel != self._wheel):
+            self._enter(leading, self._candidate_since, opinion.wheel)
         elif self._state is None:
             self._enter(STALE, stamp, None)
 

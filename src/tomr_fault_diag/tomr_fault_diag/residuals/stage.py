@@ -36,15 +36,16 @@ from tomr_power_model.model.encoders import (
 )
 from tomr_power_model.model.input_health import InputReporter, InputState
 from tomr_power_model.model.prediction import Prediction
-from tomr_power_model.model.ticks import Arrival, TickClock
+from tomr_power_model.model.ticks import Arrival, TickClock, to_ns
 from tomr_power_model.robot import WHEELS, Robot
 
 PREDICTIONS = "predictions"
 ENCODERS = "joint_states"
 
-# The model's change over so many ticks widens the band: where power jumps, a lag of a few
+# The model's change over so long, in ticks, widens the band: where power jumps, a lag of a few
 # milliseconds between the streams is a large residual.
-_TRANSIENT_TICKS = 3
+_TRANSIENT = to_ns(0.15)
+_FEWEST = 2  # ticks, of slow decisions
 
 _UNSURE = 0.5  # bands: a speed is not known whose standard deviation is larger
 _SCATTERS = 20  # ticks over which the scatter of stamps is looked at
@@ -102,7 +103,8 @@ class ResidualStage:
         )
         self._has_motor_power = bool(motor_topics(robot))
         self._predictions: dict[int, Prediction] = {}
-        self._recent: deque[_Modelled] = deque(maxlen=_TRANSIENT_TICKS)
+        lately = max(_FEWEST, round(_TRANSIENT / ticks.period))
+        self._recent: deque[_Modelled] = deque(maxlen=lately)
         self._scatter: deque[float] = deque(maxlen=_SCATTERS)
 
     def retune(self, bands: BandSettings) -> None:
