@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from copy import copy
 from functools import cache, partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,7 @@ from tomr_sim_bridge.missions.mission import load_mission
 
 _START = 1_700_000_000 * NANOSECONDS
 _AGAIN = 2.0  # s in which a fault must be named again
+FAULTY = ("circle_encoder_lost", "circle_control_signal_lost", "square_encoder_lost")
 _LATEST = 26.0  # s of a drive that is played
 POWER = ("wheel_1/power", "wheel_2/power", "wheel_3/power")
 STREAMS: dict[str, tuple[str, ...]] = {
@@ -171,29 +173,37 @@ def both(*changes: Change) -> Change:
 
 @frozen
 class Case:
-    """A disturbance of a drive, and when what it takes away is back [s]."""
+    """A disturbance of a drive, when what it takes away is back [s], and the seed of its chance."""
 
     kind: str
     change: Change
     back: float = 0.0
+    seed: int = 0
+
+
+def gaps(places: Sequence[float]) -> Iterator[Case]:
+    """Pauses and leaps at some times [s]."""
+    for streams in STREAMS:
+        for length in (0.2, 0.3, 0.5, 1.5):
+            for at in places:
+                yield Case(f"pause {length} s, {streams}", pause(streams, at, length), at + length)
+    for by in (0.3, -0.3):
+        for at in places:
+            yield Case(f"stamps leap {by:+} s", leap(at, by), at + abs(by))
 
 
 def cases(placements: int) -> Iterator[Case]:
     """All disturbances, those in one place at many."""
-    places = np.linspace(2.0, 20.0, placements)
-    for streams in STREAMS:
-        for length in (0.2, 0.3, 0.5, 1.5):
-            for at in places.tolist():
-                yield Case(f"pause {length} s, {streams}", pause(streams, at, length), at + length)
-    for by in (0.3, -0.3):
-        for at in places.tolist():
-            yield Case(f"stamps leap {by:+} s", leap(at, by), at + abs(by))
-    for share in (0.02, 0.2, 0.5, 0.67, 0.9):
-        yield Case(f"{share:.0%} lost", loss(share))
-    for std in (0.002, 0.005, 0.01):
-        yield Case(f"stamps scatter {1e3 * std:g} ms", scatter(std))
-    yield Case("2 % lost, 5 ms, a pause", both(loss(0.02), scatter(0.005), pause("motors", 9, 1)))
-    for at in places[::3].tolist():
+    places = np.linspace(2.0, 20.0, placements).tolist()
+    yield from gaps(places)
+    for seed in range(placements // 2):
+        for share in (0.02, 0.2, 0.5, 0.67, 0.9):
+            yield Case(f"{share:.0%} lost", loss(share), seed=seed)
+        for std in (0.002, 0.005, 0.01):
+            yield Case(f"stamps scatter {1e3 * std:g} ms", scatter(std), seed=seed)
+        worn = both(loss(0.02), scatter(0.005), pause("motors", 4.0 + 2 * seed, 1.0))
+        yield Case("2 % lost, 5 ms, 1 s without power", worn, seed=seed)
+    for at in places[::3]:
         for wheel in range(3):
             yield Case("power frozen", power(wheel, at, _frozen))
             yield Case("power reads zero", power(wheel, at, _dead))
@@ -228,19 +238,48 @@ def accused(found: Sequence[Diagnosis]) -> list[str]:
 
 def healthy(case: Case, mission: str, seed: int) -> tuple[str, list[str], float]:
     """The kind of a case, what it made to be named, and the share of time that was decided."""
-    found = states(case.change(recorded(mission, seed), np.random.default_rng(seed)))
+    found = states(case.change(recorded(mission, seed), np.random.default_rng(case.seed)))
     periodic = [d for d in found if not d.changed]
     decided = [d for d in periodic if d.state.name == "normal" or d.state.name not in FAULTLESS]
     return case.kind, accused(found), len(decided) / max(len(periodic), 1)
+
+
+def faulty(case: Case, mission: str, seed: int) -> tuple[str, list[str], float]:
+    """As `healthy` of a drive with a fault: what became of the fault's name, if not what should."""
+    usual = usually(mission, seed)
+    found = states(case.change(recorded(mission, seed), np.random.default_rng(case.seed)))
+    wrong = [f"{name} for {usual}" for name in accused(found) if name != usual]
+    first, last = fault_times(mission)
+    until = max(case.back, first) + _AGAIN
+    named = [d.state.name for d in found if d.stamp_ns <= _START + to_ns(until)]
+    if until < last and named[-1] != usual:
+        wrong.append(f"{usual} not found again")
+    inside = [d.state.name for d in found if first < 1e-9 * (d.stamp_ns - _START) < last]
+    after = inside[inside.index(usual) :] if usual in inside else []
+    if any(name != usual for name in after):
+        wrong.append(f"{usual} cleared")
+    return f"faulty: {case.kind}", wrong, 1.0
+
+
+@cache
+def usually(mission: str, seed: int) -> str:
+    """The fault that is named where nothing is disturbed."""
+    return (accused(states(recorded(mission, seed))) or ["nothing"])[0]
+
+
+def fault_times(mission: str) -> tuple[float, float]:
+    """When the fault of a mission begins and ends [s]."""
+    (fault,) = load_mission(mission).faults
+    return fault.start, fault.end or _LATEST
 
 
 def table(results: Sequence[tuple[str, list[str], float]]) -> dict[str, dict[str, Any]]:
     """Drives, accusations and shares decided by kind."""
     found: dict[str, dict[str, Any]] = {}
     for kind, names, decided in results:
-        row = found.setdefault(kind, {"drives": 0, "accused": 0, "decided": [], "names": {}})
+        row = found.setdefault(kind, {"drives": 0, "wrong": 0, "decided": [], "names": {}})
         row["drives"] += 1
-        row["accused"] += bool(names)
+        row["wrong"] += bool(names)
         row["decided"].append(decided)
         for name in names:
             row["names"][name] = row["names"].get(name, 0) + 1
@@ -249,8 +288,23 @@ def table(results: Sequence[tuple[str, list[str], float]]) -> dict[str, dict[str
     return found
 
 
-def _run(index: int, placements: int, mission: str, seed: int) -> tuple[str, list[str], float]:
-    return healthy(list(cases(placements))[index], mission, seed)
+Play = tuple[Callable[[Case, str, int], tuple[str, list[str], float]], Case, str, int]
+
+
+def plays(placements: int, seeds: int) -> Iterator[Play]:
+    """All drives to play: healthy ones, and those with a fault."""
+    for seed in range(seeds):
+        for case in cases(placements):
+            yield healthy, case, "random_tour", 100 + seed
+        for mission in FAULTY:
+            first, _ = fault_times(mission)
+            for case in gaps([first - 0.2, first + 1.0, first + 1.7]):
+                yield faulty, case, mission, 100 + seed
+
+
+def _play(index: int, placements: int, seeds: int) -> tuple[str, list[str], float]:
+    judge, case, mission, seed = next(islice(plays(placements, seeds), index, None))
+    return judge(case, mission, seed)
 
 
 def main(arguments: Sequence[str] | None) -> int:
@@ -258,24 +312,21 @@ def main(arguments: Sequence[str] | None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--placements", type=int, default=24)
     parser.add_argument("--seeds", type=int, default=1)
-    parser.add_argument("--mission", default="random_tour")
     parser.add_argument("--only", default="", help="cases whose kind holds this word")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)))
     options = parser.parse_args(arguments)
-    chosen = [k for k, case in enumerate(cases(options.placements)) if options.only in case.kind]
-    results = []
-    for seed in range(options.seeds):
-        recorded(options.mission, 100 + seed)  # the workers inherit it
+    amount = options.placements, options.seeds
+    told = list(plays(*amount))
+    chosen = [k for k, (_, case, *_) in enumerate(told) if options.only in case.kind]
+    for mission, seed in sorted({(told[k][2], told[k][3]) for k in chosen}):
+        usually(mission, seed)  # the workers inherit it, and the drive
+    play = partial(_play, placements=amount[0], seeds=amount[1])
     with ProcessPoolExecutor(options.jobs) as pool:
-        for seed in range(options.seeds):
-            play = partial(
-                _run, placements=options.placements, mission=options.mission, seed=100 + seed
-            )
-            results += list(tqdm(pool.map(play, chosen), total=len(chosen), disable=None))
+        results = list(tqdm(pool.map(play, chosen), total=len(chosen), disable=None))
     found = table(results)
     for kind, row in found.items():
-        print(f"{kind:32} {row['accused']:3} of {row['drives']:3} accused, "
+        print(f"{kind:40} {row['wrong']:3} of {row['drives']:3} wrong, "
               f"{row['decided']:.0%} decided  {row['names'] or ''}")  # fmt: skip
     if options.json:
         options.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")

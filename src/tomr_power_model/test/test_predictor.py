@@ -133,6 +133,12 @@ def test_a_pause_of_the_commands_leaves_a_doubt_for_as_long_again() -> None:
     assert unknown == list(range(1150, 1400 + 450 + 300, 50))
 
 
+def test_after_standing_without_commands_the_next_one_is_followed_at_once() -> None:
+    events = [(t, kind) for t, kind in _events(5000) if kind == "encoders" or not 500 <= t < 4000]
+    speeds = {p.stamp_ns - BASE: p.speed[1] for p in _run(events, moving=False)}
+    assert not any(math.isnan(speeds[t * MS]) for t in range(1600, 5000, 50))
+
+
 def test_a_restart_in_mid_run_takes_up_the_motion() -> None:
     """A predictor that wakes while the robot drives expects it to go on, not to start."""
     whole = {p.stamp_ns: p for p in _run(_events(4000))}

@@ -82,6 +82,14 @@ class FaultClassifier:
         self._wheel: int | None = None
         self._candidate = STALE
         self._candidate_since = 0
+        self._sure_since: int | None = None
+
+    def release(self) -> str:
+        """Let go of a named fault, latched or not; what still holds is named anew. Returns it."""
+        named = "" if self._state is None or self._state in _QUIET else self._state.name
+        if named:
+            self._state = None
+        return named
 
     def classify(self, frame: ResidualFrame) -> Diagnosis | None:
         """Take a frame; returns a diagnosis when one is to be published.
@@ -149,7 +157,8 @@ class FaultClassifier:
         if leading is STATES[NORMAL] and misfit.unexplained:
             leading = UNKNOWN
         if leading != self._candidate:
-            self._candidate, self._candidate_since = leading, stamp
+            self._candidate, self._candidate_since, self._sure_since = leading, stamp, None
+        held = self._is_held(opinion.sure, stamp)
         is_blind = opinion.wheel in [wheel for wheel, _ in self._unseen.blind]
         if leading is UNKNOWN:
             if self._state in _QUIET:
@@ -158,11 +167,19 @@ class FaultClassifier:
             (misfit.ignores_commands or is_blind) and self._state in _QUIET
         ):
             self._settle(stamp)
-        elif opinion.sure and (leading != self._state or opinion.wheel != self._wheel):
-            if not is_blind:
-                self._enter(leading, self._candidate_since, opinion.wheel)
+        elif held and not is_blind and (leading != self._state or opinion.wheel != self._wheel):
+            self._enter(leading, self._candidate_since, opinion.wheel)
         elif self._state is None:
             self._enter(STALE, stamp, None)
+
+    def _is_held(self, sure: bool, stamp: int) -> bool:
+        """Whether the judge has been sure of what leads for `raise_time`."""
+        if not sure:
+            self._sure_since = None
+            return False
+        if self._sure_since is None:
+            self._sure_since = stamp
+        return stamp - self._sure_since >= self.settings.raise_time
 
     def _pause(self, frame: ResidualFrame, data: Sufficiency) -> None:
         """Nothing can be said of a frame: what was named stays, but normal not for long."""
@@ -184,6 +201,8 @@ class FaultClassifier:
             quiet = POWER_SENSOR[ailing[0]]
         if self._state in _QUIET:
             self._enter(quiet, stamp, None)
+        elif self.settings.latch:
+            return
         elif stamp - self._candidate_since >= self.settings.recovery_time:
             self._enter(quiet, self._candidate_since, None)
 

@@ -14,6 +14,7 @@ from tomr_fault_diag.residuals.frame import (
     GAP,
     MOTORS,
     NOT_MEASURED,
+    SCATTER,
     SPEEDS,
     TOTAL,
     Residual,
@@ -67,7 +68,9 @@ class SufficiencyWatch:
 def _is_usable(frame: ResidualFrame) -> bool:
     """Whether the power of any motor, or of all, can be compared, and the speed of any wheel."""
     powers, speeds = ([frame.residuals[k] for k in group] for group in ((TOTAL, *MOTORS), SPEEDS))
-    return not all(item.stale for item in powers) and not all(item.stale for item in speeds)
+    # Encoders that speak, but not clearly, leave the powers to be compared.
+    heard = any(not item.stale or item.missing == SCATTER for item in speeds)
+    return heard and not all(item.stale for item in powers)
 
 
 def _is_unmeasured(item: Residual) -> bool:

@@ -22,6 +22,7 @@ INPUT_ORDERS: Mapping[str, tuple[int, ...]] = {
 NO_COMMAND = "no fresh cmd_vel for the model"
 NOT_MEASURED = "not measured on this robot"
 GAP = "a gap in "  # and which stream: it paused, or went on only just before
+SCATTER = "the stamps of joint_states scatter too much to tell a speed"
 FROZEN = " repeats itself while the motor works"  # and before it which stream
 
 Unit = Literal["W", "A", "rad/s"]

@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from statistics import median
 from typing import Self
 
 from attrs import evolve, frozen
@@ -12,6 +13,7 @@ from tomr_fault_diag.residuals.frame import (
     MOTORS,
     NO_COMMAND,
     NOT_MEASURED,
+    SCATTER,
     Residual,
     ResidualFrame,
     Unit,
@@ -25,19 +27,28 @@ from tomr_power_model.drive.sources import TOTAL, TOTAL_TOPIC, PowerReading, mot
 from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.readings import NAN, UNKNOWN_READING
 from tomr_power_model.model.continuity import POWER_TOLERANCE, Continuity
-from tomr_power_model.model.encoders import UNKNOWN, EncoderSample, EncoderWindow, Triple
+from tomr_power_model.model.encoders import (
+    UNKNOWN,
+    EncoderSample,
+    EncoderWindow,
+    Triple,
+    WheelEstimate,
+)
 from tomr_power_model.model.input_health import InputReporter, InputState
 from tomr_power_model.model.prediction import Prediction
-from tomr_power_model.model.ticks import Arrival, TickClock
+from tomr_power_model.model.ticks import Arrival, TickClock, to_ns
 from tomr_power_model.robot import WHEELS, Robot
 
 PREDICTIONS = "predictions"
 ENCODERS = "joint_states"
 
-# The model's change over so many ticks widens the band: where power jumps, a lag of a few
+# The model's change over so long, in ticks, widens the band: where power jumps, a lag of a few
 # milliseconds between the streams is a large residual.
-_TRANSIENT_TICKS = 3
+_TRANSIENT = to_ns(0.15)
+_FEWEST = 2  # ticks, of slow decisions
 
+_UNSURE = 0.5  # bands: a speed is not known whose standard deviation is larger
+_SCATTERS = 20  # ticks over which the scatter of stamps is looked at
 _TURNS = 0.3  # rad/s: a slower wheel may rest
 
 _UNKNOWN_READINGS = (UNKNOWN_READING, UNKNOWN_READING, UNKNOWN_READING)
@@ -92,7 +103,9 @@ class ResidualStage:
         )
         self._has_motor_power = bool(motor_topics(robot))
         self._predictions: dict[int, Prediction] = {}
-        self._recent: deque[_Modelled] = deque(maxlen=_TRANSIENT_TICKS)
+        lately = max(_FEWEST, round(_TRANSIENT / ticks.period))
+        self._recent: deque[_Modelled] = deque(maxlen=lately)
+        self._scatter: deque[float] = deque(maxlen=_SCATTERS)
 
     def retune(self, bands: BandSettings) -> None:
         """Change the bands while running."""
@@ -247,19 +260,22 @@ class ResidualStage:
         )
 
     def _speeds(self, tick: int, absent: str) -> list[Residual]:
-        measured = self._encoders.at(tick).speed.tolist()
+        estimate = self._encoders.at(tick)
         bands = self.settings.bands
         pauses = self._encoders.continuity.is_broken(tick)
         is_fresh = tick - self._encoders.continuity.last(tick) < self.settings.stale
         reason = f"{GAP}{ENCODERS}" if pauses and is_fresh else "no fresh joint_states"
+        scatter = self._scatter_of(estimate)
         speeds = []
-        for wheel, value in enumerate(measured):
+        for wheel, value in enumerate(estimate.speed.tolist()):
             models = [past.speed[wheel] for past in self._recent]
             model = models[-1]
             # Against the set direction: "slower than told" is negative whichever way it turns.
             sign = -1.0 if model < 0.0 else 1.0
             spread = bands.speed_transient * _spread(models)
             band = max(bands.speed, bands.speed_relative * abs(model)) + spread
+            if estimate.gain * scatter * max(abs(model), abs(value)) > _UNSURE * band:
+                value, reason = NAN, SCATTER
             missing = _missing(value, model, reason, absent)
             speeds.append(
                 Residual(
@@ -267,6 +283,12 @@ class ResidualStage:
                 )
             )
         return speeds
+
+    def _scatter_of(self, estimate: WheelEstimate) -> float:
+        """How far the times of encoder samples have scattered lately [s]."""
+        if estimate.scatter == estimate.scatter:  # not NaN
+            self._scatter.append(estimate.scatter)
+        return median(self._scatter) if self._scatter else 0.0
 
     def _least(self, unit: Unit) -> float:
         bands = self.settings.bands

@@ -8,7 +8,7 @@ from itertools import compress
 from typing import Protocol
 
 import numpy as np
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.drive.dejitter import Grid, grid_of, is_jitter
@@ -21,6 +21,8 @@ _LEAST = 50
 _EVERY = 25  # samples: how often
 LONG_S = 0.2  # of the fit beside a simulation
 _FIT = 5  # samples that it takes
+_FREE = 2  # more samples than unknowns, to tell how they scatter
+_MOVING = 1.0  # rad/s of the fastest wheel, likewise
 _LEEWAY = 0.05  # s that a stamp may be late: angles that no motor reaches till then are bad
 _NEW_ZERO = 3  # such angles in a row are those of an encoder that counts from elsewhere
 UNKNOWN: Triple = (float("nan"), float("nan"), float("nan"))
@@ -42,6 +44,8 @@ class WheelEstimate:
     speed: Array  # rad/s
     acceleration: Array  # rad/s^2
     angle: Array = field(factory=lambda: np.full(3, np.nan))  # rad
+    scatter: float = math.nan  # of the samples' times about the fit [s], NaN where it does not show
+    gain: float = 0.0  # standard deviation of the speed over that of the angles [1/s]
 
 
 UNKNOWN_MOTION = WheelEstimate(np.full(3, np.nan), np.full(3, np.nan))
@@ -239,8 +243,18 @@ def _chosen(times: tuple[int, ...], which: NDArray[np.bool_]) -> tuple[int, ...]
 
 
 def _from_positions(times: tuple[int, ...], positions: Array) -> WheelEstimate:
-    shape = _weights(times, 2) @ (positions - positions[0])
-    return WheelEstimate(shape[1], 2.0 * shape[2], positions[0] + shape[0])
+    weights = _weights(times, 2)
+    shape = weights @ (positions - positions[0])
+    gain = math.sqrt(float((weights[1] ** 2).sum()))
+    estimate = WheelEstimate(shape[1], 2.0 * shape[2], positions[0] + shape[0], gain=gain)
+    free = len(times) - 3
+    if free < _FREE or not float(np.abs(shape[1]).max()) > _MOVING:
+        return estimate
+    powers = (1e-9 * np.array(times))[:, None] ** np.arange(3)
+    rest = positions - positions[0] - powers @ shape
+    # All wheels are read at once: what scatters is when.
+    scatter = math.sqrt(float((rest**2).sum() / (free * (shape[1] ** 2).sum())))
+    return evolve(estimate, scatter=scatter)
 
 
 @lru_cache(maxsize=64)
