@@ -44,8 +44,8 @@ class Limits:
     samples: int = _limit(2_000_000, "samples of one topic that a fit holds")
     mission_phases: int = _limit(100_000, "phases of a mission, repeats counted")
     mission_seconds: int = _limit(86_400, "a mission")
-    drive_seconds: int = _limit(7_200, "a recording that is fitted as a whole")
-    stamp_jump_seconds: int = _limit(60, "a step between the stamps of a topic, in a fit")
+    drive_seconds: int = _limit(3_600, "a recording that is fitted as a whole")
+    stamp_jump_seconds: int = _limit(30, "a step between the stamps of a topic, in a fit")
 
     @classmethod
     def of_environment(cls, environment: Mapping[str, str]) -> Self:

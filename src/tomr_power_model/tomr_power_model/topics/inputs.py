@@ -13,6 +13,7 @@ from tomr_power_model.drive.sources import (
     motor_topics,
     total_topics,
 )
+from tomr_power_model.errors import one_line
 from tomr_power_model.messages.intake import (
     MALFORMED,
     Triple,
@@ -27,6 +28,7 @@ from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.robot import Robot
 
+_MOST_KINDS = 200  # of complaints that are told apart: their words may be a message's
 Take = Callable[[Any, int], Arrival | str | None]
 
 
@@ -158,8 +160,10 @@ class Complaints:
 
     def note(self, topic: str, problem: str) -> str | None:
         """Count a complaint; returns the line to print, if it is time for one."""
-        key = (topic, problem)
+        key = (topic, one_line(problem))
+        if key not in self.counts and len(self.counts) >= _MOST_KINDS:
+            key = (topic, "further problems of other kinds")
         count = self.counts[key] = self.counts.get(key, 0) + 1
         if str(count).rstrip("0") != "1":
             return None
-        return f"{topic}: {problem}" + (f" ({count} times)" if count > 1 else "")
+        return f"{topic}: {key[1]}" + (f" ({count} times)" if count > 1 else "")
