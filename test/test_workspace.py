@@ -38,6 +38,7 @@ LIBRARIES = {
     "rosbags": ("python3-rosbags-pip", "rosbags"),
     "scipy": ("python3-scipy", "scipy"),
     "tqdm": ("python3-tqdm", "tqdm"),
+    "websockets": ("python3-websockets", "websockets"),
     "yaml": ("python3-yaml", "PyYAML"),
 }
 # What no package.xml can name: requirements-train.txt.
@@ -199,7 +200,9 @@ def test_imports_are_declared(package: Path) -> None:
                 assert requirement in pinned, f"{file} imports {name}: not in requirements.txt"
 
 
-@each_package("tomr_power_model", "tomr_fault_diag", "tomr_reality_gap", "tomr_sim_bridge")
+@each_package(
+    "tomr_power_model", "tomr_fault_diag", "tomr_reality_gap", "tomr_sim_bridge", "tomr_view"
+)
 def test_only_nodes_import_rclpy(package: Path) -> None:
     allowed = {"nodes", "cli"}
     for file in (package / package.name).rglob("*.py"):

@@ -15,6 +15,7 @@ def generate_launch_description() -> LaunchDescription:
     robot = LaunchConfiguration("robot")
     namespace = LaunchConfiguration("namespace")
     factor = ParameterValue(LaunchConfiguration("real_time_factor"), value_type=float)
+    clock = ParameterValue(LaunchConfiguration("publish_clock"), value_type=bool)
     diagnosis = PathJoinSubstitution(
         [FindPackageShare("tomr_fault_diag"), "launch", "diagnosis.launch.py"]
     )
@@ -38,11 +39,21 @@ def generate_launch_description() -> LaunchDescription:
                 default_value="1.0",
                 description="seconds of the robot per second",
             ),
+            DeclareLaunchArgument(
+                "publish_clock",
+                default_value="true",
+                description="false: time is that of the computer, as for one of several robots",
+            ),
+            DeclareLaunchArgument(
+                "composition",
+                default_value="false",
+                description="true: the diagnosis in one process",
+            ),
             Node(
                 package="tomr_sim_bridge",
                 executable="sim_bridge",
                 namespace=namespace,
-                parameters=[robot, {"real_time_factor": factor}],
+                parameters=[robot, {"real_time_factor": factor, "publish_clock": clock}],
                 output="screen",
             ),
             IncludeLaunchDescription(
@@ -50,7 +61,8 @@ def generate_launch_description() -> LaunchDescription:
                 launch_arguments={
                     "robot": robot,
                     "namespace": namespace,
-                    "use_sim_time": "true",
+                    "use_sim_time": LaunchConfiguration("publish_clock"),
+                    "composition": LaunchConfiguration("composition"),
                 }.items(),
                 condition=IfCondition(LaunchConfiguration("diagnosis")),
             ),

@@ -163,7 +163,7 @@ def start_nodes(children: Children, robot: Path, weights: Path | None = None) ->
     more = {"fault_classifier": ["-p", f"weights:={weights.resolve()}"]} if weights else {}
     for name in PROCESSES:
         # sim_bridge makes the time that the others follow.
-        time = [] if name == "sim_bridge" else ["-p", "use_sim_time:=true"]
+        time = ["-p", f"{'publish_clock' if name == 'sim_bridge' else 'use_sim_time'}:=true"]
         given: list[str | Path] = ["--ros-args", "--params-file", robot, *time, *more.get(name, [])]
         children.start(name, [*command_of(name, PROCESSES), *given])
 

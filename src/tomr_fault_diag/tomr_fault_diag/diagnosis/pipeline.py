@@ -20,7 +20,6 @@ from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.dynamics.binding import has_numba
 from tomr_power_model.messages.intake import WheelFinder
 from tomr_power_model.messages.outgoing import DiagnosticMessage, Outgoing
-from tomr_power_model.messages.types import TWIST_STAMPED
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import Robot
@@ -51,7 +50,6 @@ class Pipeline:
         robot: Robot,
         settings: DiagnosisSettings,
         *,
-        twist_type: str = TWIST_STAMPED,
         is_compiled: bool | None = None,
         warn: Callable[[str], object] | None = None,
     ) -> None:
@@ -67,7 +65,7 @@ class Pipeline:
         self._classifier = FaultClassifier(make_judge(settings.classifier))
         wheels = WheelFinder(robot.wheel_names)
         self.inputs: tuple[Input, ...] = (
-            *model_inputs(robot, self._predictor, twist_type, wheels),
+            *model_inputs(robot, self._predictor, wheels),
             *residual_inputs(robot, self._residuals, wheels),
         )
         self._takers: dict[str, list[Take]] = {}

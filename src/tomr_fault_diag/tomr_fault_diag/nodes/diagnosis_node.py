@@ -11,7 +11,7 @@ from tomr_fault_diag.diagnosis.settings import PARAMETERS, STAGE_NODES, Diagnosi
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
 from tomr_power_model.messages.outgoing import DiagnosticMessage, JointMessage, SupplyMessage
 from tomr_power_model.nodes.command_line import node_arguments, parameter_files
-from tomr_power_model.nodes.stage_node import CMD_VEL_TYPE, TWIST_TYPES, StageNode, run_node
+from tomr_power_model.nodes.stage_node import StageNode, run_node
 from tomr_power_model.robot import read_node_sections
 from tomr_power_model.robot.parameters import ParameterSpec
 from tomr_power_model.topics.inputs import Input
@@ -24,7 +24,7 @@ INTERMEDIATE = ParameterSpec(
     "bool",
     True,
 )
-NODE_PARAMETERS = (*PARAMETERS.values(), CMD_VEL_TYPE, INTERMEDIATE)
+NODE_PARAMETERS = (*PARAMETERS.values(), INTERMEDIATE)
 
 
 class DiagnosisNode(StageNode):
@@ -39,7 +39,6 @@ class DiagnosisNode(StageNode):
         self.pipeline = Pipeline(
             self._robot,
             self._settings(),
-            twist_type=TWIST_TYPES[str(self.values["cmd_vel_type"])],
             is_compiled=False,
             warn=self.get_logger().warning,
         )
@@ -62,7 +61,7 @@ class DiagnosisNode(StageNode):
             for outgoing in self.pipeline.messages(self._heard(step)):
                 self.send(outgoing)
 
-        return Input(item.topic, item.type_name, take)
+        return evolve(item, take=take)
 
     def _heard(self, step: Step) -> Step:
         """A step without what nobody listens to: words and numbers for it cost time."""

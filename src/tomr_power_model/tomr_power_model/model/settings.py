@@ -7,7 +7,12 @@ from attrs import field, frozen
 
 from tomr_power_model.model.power_models import POWER_MODELS, own_parameters
 from tomr_power_model.model.ticks import TickSettings, to_ns
-from tomr_power_model.robot.parameters import HARDWARE_ID, NAMELESS, ParameterSpec
+from tomr_power_model.robot.parameters import (
+    CMD_VEL_TYPE,
+    HARDWARE_ID,
+    NAMELESS,
+    ParameterSpec,
+)
 
 _S = ParameterSpec
 TICK_PARAMETERS: tuple[ParameterSpec, ...] = (
@@ -30,6 +35,7 @@ MODEL_PARAMETERS: tuple[ParameterSpec, ...] = (
         0.0,
         60.0,
     ),
+    CMD_VEL_TYPE,
     _S("use_imu", "take the yaw rate from imu/data", "bool", False),
     _S(
         "power_model",

@@ -21,7 +21,7 @@ from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_OK
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.outgoing import TYPES, DiagnosticMessage, Outgoing
 from tomr_power_model.messages.plain import Plain, build
-from tomr_power_model.messages.types import TWIST, TWIST_STAMPED
+from tomr_power_model.nodes.command_type import CommandType
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
 from tomr_power_model.robot import Robot
 from tomr_power_model.robot.parameters import NAMELESS, ParameterSpec, Value
@@ -33,15 +33,6 @@ SENSOR_QOS = QoSProfile(depth=500, reliability=ReliabilityPolicy.BEST_EFFORT)
 STAGE_QOS = QoSProfile(depth=500, reliability=ReliabilityPolicy.RELIABLE)
 
 _SIGNAL_CHECK_S = 0.2  # the longest that a signal waits while no message comes
-
-CMD_VEL_TYPE = ParameterSpec(
-    "cmd_vel_type",
-    "message type of cmd_vel; a Twist counts from when it arrives",
-    "str",
-    "twist_stamped",
-    choices=("twist_stamped", "twist"),
-)
-TWIST_TYPES = {"twist_stamped": TWIST_STAMPED, "twist": TWIST}
 
 
 @cache
@@ -93,14 +84,20 @@ class StageNode(Node):
                 self.complain(item.topic, problem)
             advance()
 
-        self.create_subscription(
-            message_class(item.type_name),
-            item.topic,
-            receive,
-            qos,
-            # Each default event adds to every wait: together a sixth of the nodes' CPU.
-            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-        )
+        def subscribe(type_name: str) -> Any:
+            return self.create_subscription(
+                message_class(type_name),
+                item.topic,
+                receive,
+                qos,
+                # Each default event adds to every wait: together a sixth of the nodes' CPU.
+                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+            )
+
+        if item.other_types:
+            CommandType(self, item.topic, str(self.values["cmd_vel_type"]), subscribe)
+        else:
+            subscribe(item.type_name)
 
     def _note(self, what: str, topic: str, type_name: str) -> None:
         kind = type_name.rpartition("/")[2]
@@ -193,7 +190,10 @@ def make_executor() -> Executor:
 
 
 def run_node(make: Callable[[], Node], arguments: list[str] | None = None) -> int:
-    """Make a node and spin it until a signal; bad parameters end it with one line and code 2."""
+    """Make a node and spin it until a signal; bad parameters end it with one line and code 2.
+
+    Raises what a node keeps as its `failure`: an executor prints a trace of what callbacks raise.
+    """
     stop = StopRequest()
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
@@ -210,9 +210,13 @@ def run_node(make: Callable[[], Node], arguments: list[str] | None = None) -> in
         node.introduce()
     executor = make_executor()
     executor.add_node(node)
-    while not stop.is_set:
+    failure: InputError | None = None
+    while not stop.is_set and failure is None:
         executor.spin_once(_SIGNAL_CHECK_S)
+        failure = getattr(node, "failure", None)
     executor.shutdown()
     node.destroy_node()
     rclpy.try_shutdown()
+    if failure is not None:
+        raise failure
     return EXIT_OK

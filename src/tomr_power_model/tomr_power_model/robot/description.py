@@ -9,7 +9,7 @@ from attrs import frozen
 
 from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
-from tomr_power_model.robot.parameters import ParameterSpec, Value, check_all
+from tomr_power_model.robot.parameters import SHARED_PARAMETERS, ParameterSpec, Value, check_all
 from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
 
 WHEELS = 3
@@ -290,8 +290,12 @@ def _reject_unknown(values: Mapping[str, object], names: tuple[str, ...], place:
         for name in names
         for spec in MOTOR_PARAMETERS
     }
+    shared = {spec.name: spec for spec in SHARED_PARAMETERS}
     for key in values:
         if key in fixed or key in overrides or split_effect(key):
+            continue
+        if key in shared:
+            shared[key].check(values[key], place)
             continue
         near = closest(key, [*fixed, *(f"physics.{effect}" for effect in EFFECTS)])
         raise InputError(f"{place}: {key} is unknown: {near}")

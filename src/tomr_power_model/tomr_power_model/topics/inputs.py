@@ -70,7 +70,7 @@ def _complaint(arrival: Arrival | str | None) -> str | None:
 
 
 def model_inputs(
-    robot: Robot, predictor: PowerPredictor, twist_type: str, wheels: WheelFinder | None = None
+    robot: Robot, predictor: PowerPredictor, wheels: WheelFinder | None = None
 ) -> tuple[Input, ...]:
     """Inputs of the model stage; `wheels` may be shared with another stage."""
 
@@ -87,7 +87,7 @@ def model_inputs(
         return problem or predictor.measured(reading.wheel, reading.stamp_ns)
 
     inputs = [
-        Input("cmd_vel", twist_type, guarded(command), (TWIST, TWIST_STAMPED)),
+        Input("cmd_vel", TWIST_STAMPED, guarded(command), (TWIST, TWIST_STAMPED)),
         *measured_inputs(robot, predictor.encoders, power, wheels),
     ]
     if predictor.settings.use_imu:
