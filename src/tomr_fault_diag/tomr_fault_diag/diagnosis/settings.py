@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Self
 
-from attrs import frozen
+from attrs import evolve, frozen
 
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
 from tomr_fault_diag.residuals.settings import RESIDUAL_PARAMETERS, ResidualSettings
@@ -44,6 +44,16 @@ class DiagnosisSettings:
             ModelSettings.of(checked),
             ResidualSettings.of(checked),
             ClassifierSettings.of(checked),
+        )
+
+    def at_phase(self, share: float) -> Self:
+        """The same with the grid of decisions shifted by a share of its period."""
+        ticks = self.model.ticks
+        shifted = evolve(ticks, phase=round(share * ticks.period))
+        return evolve(
+            self,
+            model=evolve(self.model, ticks=shifted),
+            residuals=evolve(self.residuals, ticks=shifted),
         )
 
 
