@@ -28,6 +28,7 @@ LIBRARIES = {
     "attrs": ("python3-attrs", "attrs"),
     "hypothesis": ("python3-hypothesis", "hypothesis"),
     "jinja2": ("python3-jinja2", "Jinja2"),
+    "lz4": ("python3-lz4", "lz4"),
     "matplotlib": ("python3-matplotlib", "matplotlib"),
     "mujoco": ("python3-mujoco-pip", "mujoco"),
     "numba": ("python3-numba", "numba"),

@@ -15,7 +15,7 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.11",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed", "weights/*.npz", "weights/*.json"]},
+    package_data={NAME: ["py.typed", "weights/*.npz", "weights/*.json", "diagnosis/*.j2"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -26,10 +26,10 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            f"power_residuals = {NAME}.nodes.power_residuals_node:main",
-            f"fault_classifier = {NAME}.nodes.fault_classifier_node:main",
-            f"tomr_diagnosis = {NAME}.nodes.diagnosis_node:main",
-            f"tomr_diagnose = {NAME}.cli.diagnose:main",
+            f"power_residuals = {NAME}.entry:power_residuals",
+            f"fault_classifier = {NAME}.entry:fault_classifier",
+            f"tomr_diagnose = {NAME}.entry:tomr_diagnose",
+            f"tomr_diagnosis = {NAME}.entry:tomr_diagnosis",
         ],
     },
 )

@@ -75,7 +75,7 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             *ARGUMENTS,
-            stage(rate, package="tomr_power_model", executable="power_model"),
+            stage(rate, name, package="tomr_power_model", executable="power_model"),
             stage(rate, name, package="tomr_fault_diag", executable="power_residuals"),
             stage(name, package="tomr_fault_diag", executable="fault_classifier"),
             stage(

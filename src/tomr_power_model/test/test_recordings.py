@@ -290,16 +290,27 @@ def test_an_exception_of_the_caller_is_not_taken_for_damage(tmp_path: Path) -> N
         read()
 
 
-def test_types_that_only_the_recording_knows(tmp_path: Path) -> None:
-    definitions = get_types_from_msg("float64 watts\n", "robot_msgs/msg/Load")
-    own = get_typestore(Stores.ROS2_JAZZY)
-    own.register(definitions)
-    load = own.types["robot_msgs/msg/Load"](watts=12.5)
+@pytest.mark.parametrize(
+    ("type_name", "definition", "words"),
+    [
+        ("robot_msgs/msg/Load", "float64 watts\n", "no standard message"),
+        ("std_msgs/msg/Float64", "float32 data\n", "otherwise than ROS 2 Jazzy"),
+        ("std_msgs/msg/Float64", "float64 data\nfloat64 more\n", "otherwise than ROS 2 Jazzy"),
+    ],
+)
+def test_types_that_are_not_the_standard_s(
+    tmp_path: Path, type_name: str, definition: str, words: str
+) -> None:
+    own = get_typestore(Stores.EMPTY)
+    own.register(get_types_from_msg(definition, type_name))
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connection = writer.add_connection("/load", "robot_msgs/msg/Load", typestore=own)
-        writer.write(connection, 7, own.serialize_cdr(load, "robot_msgs/msg/Load"))
+        connection = writer.add_connection("/load", type_name, typestore=own)
+        writer.write(connection, 7, bytes(24))
     with open_recording(tmp_path / "bag") as recording:
-        assert [message.watts for *_, message, _ in recording.messages()] == [12.5]
+        assert len(list(recording.raw_messages())) == 1
+        with pytest.raises(InputError) as failure:
+            recording.messages()
+    clear_line(failure, "/load", words)
 
 
 def topics_recording(path: Path, *topics: str) -> Path:

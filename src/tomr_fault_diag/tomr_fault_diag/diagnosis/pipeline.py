@@ -19,7 +19,7 @@ from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.dynamics.binding import has_numba
 from tomr_power_model.messages.intake import WheelFinder
-from tomr_power_model.messages.outgoing import Outgoing
+from tomr_power_model.messages.outgoing import DiagnosticMessage, Outgoing
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import Robot
@@ -36,6 +36,7 @@ class Step:
     predictions: tuple[Prediction, ...] = ()
     frames: tuple[ResidualFrame, ...] = ()
     diagnoses: tuple[Diagnosis, ...] = ()
+    reports: tuple[DiagnosticMessage, ...] = ()  # how the inputs do
 
 
 _NOTHING = Step()
@@ -88,7 +89,12 @@ class Pipeline:
         if not predictions and not frames:
             return _NOTHING
         diagnoses = (self._classifier.classify(frame) for frame in frames)
-        return Step(tuple(predictions), tuple(frames), tuple(d for d in diagnoses if d is not None))
+        return Step(
+            tuple(predictions),
+            tuple(frames),
+            tuple(d for d in diagnoses if d is not None),
+            (*self._predictor.reports(), *self._residuals.reports()),
+        )
 
     def retune(self, settings: DiagnosisSettings) -> None:
         """Change what may be changed while running: bands, and times of the classifier."""
@@ -105,3 +111,4 @@ class Pipeline:
             yield residual_message(self.robot, frame, hardware_id)
         for diagnosis in step.diagnoses:
             yield diagnosis_message(self.robot, diagnosis, hardware_id)
+        yield from step.reports

@@ -3,11 +3,9 @@
 from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
-
-import yaml
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import load_yaml, read_text
 from tomr_power_model.robot.description import Robot, robot_from_parameters
 from tomr_power_model.robot.parameters import SHARED_PARAMETERS, USE_SIM_TIME
 
@@ -85,7 +83,7 @@ def shipped_robot(name: str) -> Robot:
 
 def read_sections(source: Path | str) -> dict[str, dict[str, object]]:
     """Flat dotted parameters of each section of a ROS 2 parameter file, not checked."""
-    document = _document(_text(source), str(source))
+    document = load_yaml(_text(source), str(source))
     if not isinstance(document, Mapping):
         return {}
     found: dict[str, dict[str, object]] = {}
@@ -102,22 +100,9 @@ def _text(source: Path | str) -> str:
         resource = files("tomr_power_model").joinpath("robots").joinpath(f"{source}.yaml")
         return resource.read_text(encoding="utf-8")
     try:
-        return Path(source).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(
-            f"{source}: cannot be read ({reason}): give a robot.yaml or one of {shipped_robots()}"
-        ) from None
-
-
-def _document(text: str, place: str) -> Any:
-    try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f" line {mark.line + 1}" if mark is not None else ""
-        problem = getattr(error, "problem", None) or "not YAML"
-        raise InputError(f"{place}:{line} {problem}: mend the YAML") from None
+        return read_text(Path(source))
+    except InputError as error:
+        raise InputError(f"{error}: give a robot.yaml or one of {shipped_robots()}") from None
 
 
 def _flat(tree: Mapping[object, object], prefix: str = "") -> dict[str, object]:

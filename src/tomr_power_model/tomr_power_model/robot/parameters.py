@@ -6,7 +6,7 @@ from typing import Literal
 
 from attrs import frozen
 
-from tomr_power_model.errors import InputError
+from tomr_power_model.errors import InputError, one_line
 
 Value = float | int | bool | str | tuple[float, ...] | tuple[str, ...]
 Kind = Literal["float", "int", "bool", "str", "floats", "strs"]
@@ -56,8 +56,9 @@ class ParameterSpec:
         """Return the value in its type, or raise InputError naming the key and the remedy."""
         try:
             typed = _typed(self.kind, value)
-        except TypeError as error:
-            raise InputError(f"{place}: {self.name} = {value!r}: {error}") from None
+        except (TypeError, OverflowError) as error:
+            shown = one_line(repr(value))
+            raise InputError(f"{place}: {self.name} = {shown}: {error}") from None
         if self.length is not None and isinstance(typed, tuple) and len(typed) != self.length:
             raise InputError(
                 f"{place}: {self.name} = {value!r}: needs {self.length} values, has {len(typed)}"

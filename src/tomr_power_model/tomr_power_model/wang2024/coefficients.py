@@ -13,6 +13,7 @@ import yaml
 from attrs import Attribute, evolve, field, fields, frozen
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import write_text
 from tomr_power_model.robot import WHEELS, Robot, read_node_sections
 from tomr_power_model.robot.description import closest
 from tomr_power_model.robot.parameters import ParameterSpec, check_all
@@ -128,12 +129,7 @@ class Coefficients:
         }
         document = {NODE: {"ros__parameters": {GROUP.rstrip("."): group}}}
         text = yaml.safe_dump(document, sort_keys=False, default_flow_style=None)
-        try:
-            path.write_text(
-                "# Wang 2024: coefficients fitted to a healthy drive.\n" + text, encoding="utf-8"
-            )
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written ({error.strerror})") from None
+        write_text(path, "# Wang 2024: coefficients fitted to a healthy drive.\n" + text)
 
     def check(self, robot: Robot) -> None:
         """Raise InputError unless they were fitted for this robot."""
