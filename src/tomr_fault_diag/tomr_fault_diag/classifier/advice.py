@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from tomr_fault_diag.classifier.states import State
 
 CHECKS: Mapping[str, str] = {
-    "slip": "the floor for dust, water or a sill, the rollers for wear and dirt, the payload's place: "
-    "an unloaded wheel slips first",
+    "slip": "the floor for dust, water or a sill, the rollers for wear and dirt, and the place of "
+    "the payload: an unloaded wheel slips first",
     "control system fault": "the motor's plug and its driver's fuse, enable line and error light",
     "motor system fault": "the encoder's plug and cable, then the motor's coupling and gear",
     "dragging wheel": "the wheel by hand, powered off: brake, bearing, something wound around it",
