@@ -118,13 +118,21 @@ def test_a_released_fault_that_is_still_there_is_named_anew() -> None:
 
 
 def test_no_motor_is_accused_without_data_of_its_own() -> None:
-    blind = [without(f, [MOTORS[1], ENCODERS[1]], "no fresh wheel_2/power") for f in FAULTY]
+    drive = [*FAULTY, *ticks(4000, 5000, LOST)]
+    blind = [without(f, [MOTORS[1], ENCODERS[1]], "no fresh wheel_2/power") for f in drive]
     found = classified(blind)
     assert FAULT not in {d.state.name for d in found}
     (last,) = [d for d in found if d.state is POWER_SENSOR[1]][-1:]
     status = diagnosis_message(shipped_robot("reference"), last, "").statuses[0]
     assert "not observable: motor 2 (power sensor dead)" in status.message
     assert "motor 2 (power sensor dead)" in dict(status.values)["not_observable"]
+
+
+def test_a_dropout_of_a_second_is_no_fault_of_a_sensor() -> None:
+    dead = [*MOTORS, *ENCODERS]
+    silent = [without(item, dead, "no fresh power") for item in ticks(2000, 3000)]
+    frames = [*ticks(50, 2000), *silent, *ticks(3000, 5000)]
+    assert [name for _, name in changes(classified(frames))] == ["normal"]
 
 
 def test_a_fault_named_before_stays_while_its_sensor_is_dead() -> None:
