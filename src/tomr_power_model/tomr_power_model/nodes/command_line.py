@@ -4,8 +4,10 @@ import argparse
 import sys
 from collections.abc import Iterable, Sequence
 
+from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.utilities import remove_ros_args
 
+from tomr_power_model.errors import InputError
 from tomr_power_model.robot.parameters import ParameterSpec
 
 _PARAMETERS = """
@@ -31,5 +33,10 @@ def node_arguments(
         epilog=epilog,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.parse_args(remove_ros_args(given)[1:])
+    try:
+        own = remove_ros_args(given)[1:]
+    except (RCLError, UnknownROSArgsError) as error:
+        # Its text ends with where it was in C.
+        raise InputError(f"{name}: {str(error).partition(', at ')[0]}: mend it") from None
+    parser.parse_args(own)
     return given
