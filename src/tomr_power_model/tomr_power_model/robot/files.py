@@ -8,6 +8,7 @@ from typing import Any
 import yaml
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.robot.commissioned import COMMISSIONING, check_commissioned
 from tomr_power_model.robot.description import Robot, robot_from_parameters
 
 EVERY_NODE = "/**"
@@ -36,6 +37,7 @@ def read_description(source: Path | str) -> dict[str, object]:
     if not section:
         raise InputError(f"{source}: no `/**: ros__parameters:` section: see robots/reference.yaml")
     check_identity(sections.get(CALIBRATION, {}), section, str(source))
+    check_commissioned(sections.get(COMMISSIONING, {}), section, str(source))
     return dict(section)
 
 
