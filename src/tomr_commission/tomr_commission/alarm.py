@@ -26,7 +26,7 @@ from tomr_commission.request import AlarmChoice
 Array = NDArray[np.float64]
 
 _CAP = MOST_CAUTION + SURE  # decades: higher peaks are known to be higher, no more
-_USUAL_SCALE = 4.0  # decades, of a tail with too few peaks to tell
+_USUAL_SCALE, _USUAL_WEIGHT = 4.0, 4  # decades of a tail, and the peaks that this counts as
 _DRAWS = 4000
 _LEAST_RATE = 1e-12
 
@@ -41,7 +41,7 @@ class Tail:
     threshold: float  # decades
     above: int  # events over the threshold
     scale: float  # decades, of the exponential tail
-    certain: int  # peaks that the scale rests on; 0: the usual scale is taken
+    certain: int  # peaks that the scale rests on, those that the usual scale counts as included
     shape: float | None  # of a generalised Pareto tail; None: too few to tell
     peaks: tuple[float, ...]  # all over the threshold, the highest first
 
@@ -57,10 +57,8 @@ class Tail:
         if len(over) < choice.least_peaks:
             threshold, over = 0.0, positive
         known = over[over < _CAP]
-        certain = len(known) if len(over) >= choice.least_peaks else 0
-        scale = _USUAL_SCALE
-        if certain:
-            scale = float((over - threshold).sum()) / certain
+        certain = _USUAL_WEIGHT + len(known)  # a peak at the cap is longer than is known
+        scale = (_USUAL_WEIGHT * _USUAL_SCALE + float((over - threshold).sum())) / certain
         shape = None
         if len(known) >= 2 * choice.least_peaks:
             shape = float(genpareto.fit(known - threshold, floc=0.0)[0])
@@ -86,9 +84,7 @@ class Tail:
         if not self.above:
             return 0.0  # nothing was ever held against it: only the time says how sure that is
         share = float(beta.ppf(confidence, self.above + 1, max(self.events - self.above, 1)))
-        scale = self.scale
-        if self.certain:
-            scale *= self.certain / float(gamma.ppf(1.0 - confidence, self.certain))
+        scale = self.scale * self.certain / float(gamma.ppf(1.0 - confidence, self.certain))
         return self._rate(level, share, scale)
 
     def draws(self, level: float, random: np.random.Generator) -> Array:
@@ -96,7 +92,7 @@ class Tail:
         if not self.above:
             return np.zeros(_DRAWS)
         share = random.beta(self.above + 0.5, self.events - self.above + 0.5, _DRAWS)
-        weight = random.gamma(max(self.certain, 3), 1.0, _DRAWS) / max(self.certain, 3)
+        weight = random.gamma(self.certain, 1.0, _DRAWS) / self.certain
         return np.asarray(
             self.events_per_hour * share * np.exp(-(level - self.threshold) * weight / self.scale)
         )

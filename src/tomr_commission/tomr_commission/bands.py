@@ -139,3 +139,28 @@ def needed(drive: Observed, bands: BandSettings, within: float) -> dict[str, flo
         if len(known):
             found[kind] = float(np.quantile(known, within))
     return found
+
+
+@frozen
+class Drag:
+    """Torque that wheels need in steady motion, as their power tells it."""
+
+    added: Array  # N m beyond the modelled, (3,)
+    usual: Array  # N m, (3,)
+
+
+def steady_drag(drive: Observed) -> Drag:
+    """What the residuals of power amount to as a torque that resists each wheel.
+
+    Where no wheel is ever steady it is nothing. Currents count as powers: shares are the same.
+    """
+    speed = np.abs(np.nan_to_num(drive.modelled[:, list(SPEEDS)]))
+    residual, modelled = drive.residual[:, list(MOTORS)], drive.modelled[:, list(MOTORS)]
+    rows = regimes(drive)["steady"] & np.isfinite(residual) & np.isfinite(modelled)
+    weight = np.where(rows, speed, 0.0)
+    total = np.maximum((weight**2).sum(axis=0), 1e-9)
+
+    def torque(power: Array) -> Array:
+        return np.asarray((weight * np.where(rows, power, 0.0)).sum(axis=0) / total)
+
+    return Drag(torque(residual), np.maximum(np.abs(torque(modelled)), 1e-9))

@@ -2,13 +2,15 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from tomr_commission.request import DEFAULT_RATE, DEFAULT_TOLERANCE, CommissionRequest
 from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK, run_main
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import shipped_robots
+
+PLAN = "plan"  # the other thing that the command does
 
 _DESCRIPTION = """\
 Commission the diagnosis on one robot: find what its description leaves out, fit the bands of its
@@ -59,6 +61,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar="REL",
         help="how far values of robot.yaml may be off (default %(default)s)",
     )
+    add(
+        "--skip",
+        action="append",
+        default=[],
+        metavar="BAG=FROM:TO",
+        help="leave out what was measured then [s]; repeatable",
+    )
     add("--quiet", action="store_true", help="print nothing but errors")
     return parser
 
@@ -75,7 +84,13 @@ def _request(options: argparse.Namespace) -> CommissionRequest:
             raise InputError(f"{bag}: no such recording: give a folder or file of a bag")
     if options.out.exists() and not options.out.is_dir():
         raise InputError(f"--out {options.out}: is no folder: give another")
-    return CommissionRequest(options.robot, bags, options.out, rate, tolerance)
+    skips: Mapping[str, Sequence[tuple[float, float]]] = {}
+    if options.skip:
+        # What fits takes a second to import: --help does without.
+        from tomr_power_model.drive.cut import skips_of
+
+        skips = skips_of(options.skip, bags)
+    return CommissionRequest(options.robot, bags, options.out, rate, tolerance, skips)
 
 
 def _commission(options: argparse.Namespace) -> int:
@@ -98,8 +113,32 @@ def _commission(options: argparse.Namespace) -> int:
     return EXIT_OK if found.is_go else EXIT_MISMATCH
 
 
+def _plan(arguments: Sequence[str]) -> int:
+    parser = argparse.ArgumentParser(
+        prog="tomr_commission plan", description="Write the drive to record as a mission file."
+    )
+    parser.add_argument("--robot", required=True, help="robot.yaml, or a shipped one's name")
+    parser.add_argument("--out", type=Path, required=True, metavar="MISSION.yaml")
+    parser.add_argument(
+        "--speed", type=float, default=0.4, metavar="M/S", help="the highest (default %(default)s)"
+    )
+    options = parser.parse_args(arguments)
+    if not 0.05 <= options.speed <= 5.0:
+        raise InputError(f"--speed {options.speed:g}: give 0.05 to 5 m/s")
+    from tomr_commission.plan import INSTRUCTIONS, mission_text
+    from tomr_commission.store import write_atomically
+    from tomr_power_model.robot import load_robot
+
+    write_atomically(options.out, mission_text(load_robot(options.robot), options.speed))
+    print(f"written: {options.out}")
+    print(INSTRUCTIONS.format(out=options.out, robot=options.robot))
+    return EXIT_OK
+
+
 def _run(arguments: Sequence[str] | None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
+    if given[:1] == [PLAN]:
+        return _plan(given[1:])
     return _commission(_parser().parse_args(given))
 
 

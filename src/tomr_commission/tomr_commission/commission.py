@@ -22,11 +22,14 @@ from tomr_commission.commissioned import (
 )
 from tomr_commission.evidence import decisions, evidence_in
 from tomr_commission.explained import FOLDER, Split, explain_drives
-from tomr_commission.injected import Floor, Trial, floors_of, try_injected
+from tomr_commission.injected import try_injected
 from tomr_commission.observed import Observed, frames_of, observe
 from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse
 from tomr_commission.request import CommissionRequest
+from tomr_commission.simulated import try_simulated
 from tomr_commission.store import Store, digest, fingerprint, write_atomically
+from tomr_commission.suspects import check_values, check_wheels
+from tomr_commission.trials import Floor, Trial, floors_of
 from tomr_commission.verdict import Outcome, Reason, reasons
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
@@ -84,7 +87,7 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     chosen = evolve(classifier, caution=level.caution)
     progress("validating", 0.85)
     said = [decisions(frames_of(drive, bands), chosen) for drive in (*fitted, held)]
-    trials = try_injected([held], bands, chosen)
+    trials = [*try_injected(held, bands, chosen), *work.simulated(described, bands, chosen)]
     floors = floors_of(trials)
     outcome = Outcome(
         request, explained, tuple(fitted), held, bands, level, said[-1], tuple(said[:-1])
@@ -125,8 +128,11 @@ class _Work:
         values = read_description(request.robot)
         robot = load_robot(request.robot)
         prints = [fingerprint(bag) for bag in request.bags]
-        key = digest([suite_version(), repr(sorted(values.items())), *prints])
+        skips = repr(sorted(request.skips.items()))
+        key = digest([suite_version(), repr(sorted(values.items())), skips, *prints])
         drives = tuple(read_drive(bag, robot) for bag in request.bags)
+        check_wheels(drives, robot, str(request.robot))
+        check_values(drives[0], values, str(request.robot))
         split = Split.of(request.bags, drives[0].duration)
         names = tuple(names_of(request.bags))
         store = Store(request.out / STEPS)
@@ -138,9 +144,8 @@ class _Work:
 
         def make() -> Any:
             return explain_drives(
-                request.robot,
+                request,
                 self.split,
-                request.tolerance,
                 lambda stage, part: self.progress(f"explaining: {stage}", 0.02 + 0.4 * part),
             )
 
@@ -180,7 +185,8 @@ class _Work:
                 made[name] if one is None else one
                 for name, one in zip(self.names, kept, strict=True)
             ]
-        return [drive for drive in kept if drive is not None]
+        skips = self.request.skips
+        return [drive.without(skips.get(drive.name, ())) for drive in kept if drive is not None]
 
     def divided(self, drives: Sequence[Observed]) -> tuple[list[Observed], Observed]:
         """Fitted drives, and the one held out."""
@@ -207,8 +213,7 @@ class _Work:
     ) -> Shoved:
         """Simulated shoves."""
         self.progress("simulating healthy hours", 0.55)
-        source = str(self.source(described))
-        usage = Usage.of(np.concatenate([drive.command for drive in self.drives]))
+        source, usage = str(self.source(described)), self.usage()
         parts = (self.key, sorted(read_description(source).items()), bands, settings, usage, plan)
         held = self.store.values(
             "rehearsed",
@@ -216,6 +221,24 @@ class _Work:
             lambda: asdict(rehearse(source, bands, settings, usage, plan)),
         )
         return Shoved(tuple(held["peaks"]), tuple(held["between"]), held["hours"])
+
+    def usage(self) -> Usage:
+        """How the robot is driven."""
+        return Usage.of(np.concatenate([drive.command for drive in self.drives]))
+
+    def simulated(
+        self, described: Path | None, bands: BandSettings, settings: ClassifierSettings
+    ) -> list[Trial]:
+        """Simulated faults; none for a robot that the simulator cannot do."""
+        self.progress("simulating faults", 0.9)
+        source, usage = str(self.source(described)), self.usage()
+        parts = (self.key, sorted(read_description(source).items()), bands, settings, usage)
+
+        def make() -> list[dict[str, Any]]:
+            return [asdict(trial) for trial in try_simulated(source, bands, settings, usage)]
+
+        found = self.store.values("simulated", digest(map(repr, parts)), make)
+        return [Trial(**values) for values in found]
 
 
 def _observe(job: tuple[Path, str, str]) -> Observed:

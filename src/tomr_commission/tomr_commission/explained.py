@@ -6,6 +6,8 @@ from typing import Any
 
 from attrs import frozen
 
+from tomr_commission.request import CommissionRequest
+from tomr_power_model.drive.cut import names_of
 from tomr_power_model.robot import shipped_robots
 from tomr_reality_gap.explain import explain
 from tomr_reality_gap.report.html import channel_lines
@@ -34,26 +36,28 @@ class Split:
         return cls(tuple(bags[:-1]), bags[-1])
 
 
-def explain_drives(robot: str, split: Split, tolerance: float, progress: Progress) -> Any:
+def explain_drives(asked: CommissionRequest, split: Split, progress: Progress) -> Any:
     """Run the search; a plain value that holds the report, its files, and levels by channel.
 
     Raises InputError for recordings that it refuses.
     """
-    from tomr_power_model.drive.cut import names_of
-
-    skips = {}
+    skips = dict(asked.skips)
     if split.cut is not None:
-        skips = {names_of(split.fitted)[0]: ((split.cut, _REST),)}
-    held = () if split.cut is not None else (split.held,)
+        (name,) = names_of(split.fitted)
+        skips[name] = (*skips.get(name, ()), (split.cut, _REST))
     request = Request(
-        robot=robot, real=split.fitted, holdout=held, tolerance=tolerance, skips=skips
+        robot=asked.robot,
+        real=split.fitted,
+        holdout=() if split.cut is not None else (split.held,),
+        tolerance=asked.tolerance,
+        skips=skips,
     )
     found = explain(request, progress)
-    name = robot if robot in shipped_robots() else Path(robot).name
+    source = asked.robot if asked.robot in shipped_robots() else Path(asked.robot).name
     return {
         "report": report_fields(found),
         "explained": found.explained,
-        "files": report_files(found, name),
+        "files": report_files(found, source),
         "levels": [
             {
                 "recording": line.recording,

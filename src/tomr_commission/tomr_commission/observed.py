@@ -4,6 +4,7 @@ Bands are no part of it: the model and the measurements are run through once, an
 bands are made of them afterwards.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Self
 
@@ -86,8 +87,18 @@ class Observed:
         """Of each tick since the first, (n,)."""
         return np.asarray((self.stamp_ns - self.stamp_ns[0]) / NANOSECONDS)
 
+    def without(self, spans: Sequence[tuple[float, float]]) -> "Observed":
+        """The drive without some intervals [s]."""
+        keep = np.ones(len(self.stamp_ns), dtype=bool)
+        for start, end in spans:
+            keep &= (self.seconds < start) | (self.seconds > end)
+        return self._of(keep, self.name)
+
     def part(self, rows: slice, name: str) -> "Observed":
         """Some of its ticks under another name."""
+        return self._of(rows, name)
+
+    def _of(self, rows: slice | NDArray[np.bool_], name: str) -> "Observed":
         return Observed(
             name,
             self.stamp_ns[rows],

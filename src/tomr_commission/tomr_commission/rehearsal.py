@@ -100,7 +100,7 @@ def _one(
 ) -> tuple[list[float], float, int]:
     """Peaks of a drive's shoves, its highest evidence elsewhere, and its ticks."""
     described, bands, settings, usage, plan, seed = job
-    drive = shoved_drive(_robot(described), usage, plan, seed)
+    drive = shoved_drive(robot_of(described), usage, plan, seed)
     seen = observed_of(drive)
     evidence = evidence_in(frames_of(seen, bands), settings)
     own = np.zeros(len(evidence), dtype=bool)
@@ -114,8 +114,8 @@ def _one(
 
 
 @cache
-def _robot(described: str) -> Robot:
-    """A robot's record does not pass between processes."""
+def robot_of(described: str) -> Robot:
+    """A described robot, read once: its record does not pass between processes."""
     return load_robot(described)
 
 

@@ -1,5 +1,6 @@
 """What is to be commissioned, and how."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from attrs import field, frozen
@@ -38,6 +39,7 @@ class Limits:
     unexplained: float = 0.3  # share of the mismatch
     nrmse: float = 0.15  # of power on the held-out drive
     drives_apart: float = 2.0  # band that one drive needs over that of the others
+    drag_apart: float = 0.15  # share of the usual torque by which drives may differ
     outside: float = 0.02  # share of held-out residuals outside of the bands
     minutes: float = 2.5  # of driving to fit to, at least
     held_minutes: float = 0.8
@@ -52,6 +54,7 @@ class CommissionRequest:
     out: Path
     false_alarms_per_hour: float = DEFAULT_RATE
     tolerance: float = DEFAULT_TOLERANCE
+    skips: Mapping[str, Sequence[tuple[float, float]]] = field(factory=dict)  # s, by recording
     bands: BandChoice = field(factory=BandChoice)
     alarm: AlarmChoice = field(factory=AlarmChoice)
     limits: Limits = field(factory=Limits)

@@ -6,7 +6,7 @@ import numpy as np
 from attrs import frozen
 
 from tomr_commission.alarm import AlarmLevel
-from tomr_commission.bands import needed, outside
+from tomr_commission.bands import needed, outside, steady_drag
 from tomr_commission.evidence import MOST_CAUTION, Decided
 from tomr_commission.observed import Observed
 from tomr_commission.request import CommissionRequest, Limits
@@ -45,6 +45,7 @@ def reasons(outcome: Outcome) -> list[Reason]:
         *_too_short(outcome, limits),
         *_left_over(outcome, limits),
         *_apart(outcome, limits),
+        *_floors(outcome, limits),
         *_held_out(outcome, limits),
         *_alarm_rate(outcome),
     ]
@@ -108,6 +109,33 @@ def _apart(outcome: Outcome, limits: Limits) -> list[Reason]:
                     f"{drive.name} needs bands {wide[index] / others:.1f} times as wide as the "
                     "other drives: a fault, another floor or another load in it",
                     "look at it with tomr_diagnose and leave it out, or record it again",
+                )
+            )
+    return found
+
+
+def _floors(outcome: Outcome, limits: Limits) -> list[Reason]:
+    """A drive in which the wheels need another torque than in the rest."""
+    drives = (*outcome.fitted, outcome.held)
+    if len(drives) < 2:
+        return []
+    drags = [steady_drag(drive) for drive in drives]
+    found = []
+    for index, drive in enumerate(drives):
+        rest = np.median([drag.added for k, drag in enumerate(drags) if k != index], axis=0)
+        share = (drags[index].added - rest) / drags[index].usual
+        if np.abs(share).max() > limits.drag_apart:
+            alike = np.ptp(share) < 0.5 * np.abs(share).max()
+            wheel = int(np.argmax(np.abs(share)))
+            what = "every wheel needs" if alike else f"wheel {wheel + 1} needs"
+            size = float(np.mean(share)) if alike else float(share[wheel])
+            found.append(
+                Reason(
+                    f"{drive.name}: {what} {100 * size:+.0f} % of the usual torque beside the "
+                    f"other drives: {'another floor or load' if alike else 'a wheel that drags'}",
+                    "commission each floor by itself, or give drives of both to fit"
+                    if alike
+                    else "look after that wheel, and leave the drive out",
                 )
             )
     return found
