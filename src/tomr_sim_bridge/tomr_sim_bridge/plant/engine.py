@@ -44,6 +44,7 @@ class Engine:
         angles = wheel_angles(robot)
         self._arms = robot.robot_radius * np.column_stack([np.cos(angles), np.sin(angles)])
         names = [f"wheel_{wheel}" for wheel in range(WHEELS)]
+        self._body = self.model.body("base_link").id
         self._angles = np.array([self.model.joint(name).qposadr[0] for name in names])
         self._speeds = np.array([self.model.joint(name).dofadr[0] for name in names])
         rollers = [
@@ -145,6 +146,7 @@ class Engine:
         self.model.dof_frictionloss[self._speeds] = np.maximum(loads.dry, 0.0)
         self.model.dof_damping[self._speeds] = loads.viscous
         self.data.qfrc_applied[self._speeds] = loads.torque
+        self.data.xfrc_applied[self._body, [0, 1, 5]] = loads.push
         torque = loads.roller_force * self._roller_radius
         self.model.dof_frictionloss[self._roller_speeds] = torque[:, None]
 
