@@ -10,6 +10,8 @@ from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot.parameters import ParameterSpec, Value, check_all
 from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
+from tomr_power_model.unmodelled import LearntTerm
+from tomr_power_model.unmodelled.described import PREFIX, terms_of
 
 WHEELS = 3
 GRAVITY = 9.80665  # m/s^2
@@ -100,6 +102,7 @@ class Robot:
     sensors: Sensors
     measurement: Measurement
     physics: Mapping[str, PerWheel]
+    unmodelled: tuple[LearntTerm, ...] = ()  # what was learnt and has no name
 
     @property
     def wheel_topics(self) -> tuple[str, str, str]:
@@ -154,6 +157,7 @@ def robot_from_parameters(values: Mapping[str, object], place: str) -> Robot:
             total=str(checked["measurement.total"]),
         ),
         physics=MappingProxyType(_physics(values, names, place)),
+        unmodelled=terms_of(values, names, place),
     )
 
 
@@ -271,7 +275,7 @@ def _reject_unknown(values: Mapping[str, object], names: tuple[str, ...], place:
         for spec in MOTOR_PARAMETERS
     }
     for key in values:
-        if key in fixed or key in overrides or split_effect(key):
+        if key in fixed or key in overrides or split_effect(key) or key.startswith(PREFIX):
             continue
         near = closest(key, [*fixed, *(f"physics.{effect}" for effect in EFFECTS)])
         raise InputError(f"{place}: {key} is unknown: {near}")
