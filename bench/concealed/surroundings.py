@@ -74,7 +74,7 @@ class StickyPlace(Beyond):
     def resist(self, loads: WheelLoads) -> None:
         place = np.array([self._given["x"], self._given["y"]])
         away = np.hypot(*(loads.contact - place).T)
-        loads.dry += self._given["torque"] * (away < self._given["radius"])
+        loads.dry += self._present * self._given["torque"] * (away < self._given["radius"])
 
 
 class Consumer(Beyond):

@@ -71,6 +71,16 @@ class Shape:
 
 
 @frozen
+class FittedLaw:
+    """A short law that explains about as much as a learnt table."""
+
+    name: str
+    words: str  # with the parameters by name
+    parameters: Mapping[str, Estimate]
+    share: float  # of what the table explains
+
+
+@frozen
 class Learnt:
     """A term without a name, as it was learnt."""
 
@@ -78,6 +88,7 @@ class Learnt:
     sigma: Array  # standard deviations of its values, like them
     share: float  # of what the named findings leave that it predicts where it was not fitted
     is_repeatable: bool  # whether another drive would show it again
+    laws: tuple[FittedLaw, ...] = ()  # simplest first
 
 
 @frozen

@@ -63,7 +63,9 @@ class Findings:
             confidence=0.9,
             evidence=effect.evidence,
             shape=shape_of(effect, analysis.robot),
-            learnt=Learnt(effect.term, effect.sigma, effect.share, effect.is_repeatable),
+            learnt=Learnt(
+                effect.learnt, effect.sigma, effect.share, effect.is_repeatable, effect.laws
+            ),
         )
 
     def _energy(self, value: Array) -> float:

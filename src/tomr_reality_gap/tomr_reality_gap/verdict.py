@@ -12,9 +12,10 @@ from tomr_power_model.estimation.statistics import autocorrelation
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.analysis import AnalysisResult, detection_limits, residuals_of
 from tomr_reality_gap.described import described, for_users
-from tomr_reality_gap.explanation import Comparison, Explanation, Finding
+from tomr_reality_gap.explanation import Comparison, Explanation, Finding, Learnt
 from tomr_reality_gap.findings import Findings
 from tomr_reality_gap.fit.jacobian import linearise
+from tomr_reality_gap.fit.laws import words_of
 from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.unmodelled import Unmodelled
 from tomr_reality_gap.mismatch.compare import comparison, score_of
@@ -167,9 +168,7 @@ def _sentence(findings: Sequence[Finding]) -> str:
     for item in findings:
         where = ", ".join(item.where).replace("_", " ")
         if item.effect == "unknown":
-            family = item.learnt.term.family if item.learnt else None
-            words = "nothing told on what it depends" if family is None else family.words
-            parts.append(f"an effect without a name ({where}: {words})")
+            parts.append(f"an effect without a name ({where}: {_unnamed(item.learnt)})")
             continue
         sizes = ", ".join(
             f"{name} {value.value:.3g} {value.unit}".rstrip()
@@ -177,6 +176,16 @@ def _sentence(findings: Sequence[Finding]) -> str:
         )
         parts.append(f"{_label(item.effect)} ({where}: {sizes})")
     return f"Reality differs: {'; '.join(parts)}."
+
+
+def _unnamed(learnt: Learnt | None) -> str:
+    """What it depends on, and what law it is like."""
+    if learnt is None:
+        return "nothing tells on what it depends"
+    words = learnt.term.family.words
+    if learnt.laws:
+        return f"{words}; {words_of(learnt.laws[0])}"
+    return words if learnt.is_repeatable else f"{words}, which no other drive repeats"
 
 
 def _label(effect: str) -> str:

@@ -74,7 +74,7 @@ class SimulatorBaseline:
 
     def shows(self, unmodelled: Unmodelled) -> bool:
         """Whether half of an effect without a name, or more, is in the simulation too."""
-        robot, table, term = self.described, unmodelled.table, unmodelled.term
+        robot, table, term = self.described, unmodelled.table, unmodelled.learnt
         motions = [motion_in(item, robot) for item in self.dataset.simulations]
         parts = table.columns(self.dataset, robot, motions)
         chosen = [parts[number] for number in term.wheels or range(len(parts))]

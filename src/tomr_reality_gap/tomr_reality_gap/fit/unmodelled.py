@@ -18,8 +18,9 @@ from tomr_power_model.estimation.statistics import autocorrelation_time, robust_
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_power_model.unmodelled import FAMILIES, Family, LearntTerm, Motion
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
-from tomr_reality_gap.explanation import Shape
+from tomr_reality_gap.explanation import FittedLaw, Shape
 from tomr_reality_gap.fit.dataset import Dataset
+from tomr_reality_gap.fit.laws import Evidence, laws_of
 from tomr_reality_gap.fit.learnt import Table, motion_in
 
 Array = NDArray[np.float64]
@@ -82,7 +83,9 @@ class Unmodelled:
     """A term that explains what is left."""
 
     table: Table
-    term: LearntTerm
+    learnt: LearntTerm  # the table
+    laws: tuple[FittedLaw, ...]  # that explain about as much, simplest first
+    term: LearntTerm  # what is simulated: the first law, or else the table
     share: float  # of what is left that it predicts where it was not fitted
     is_repeatable: bool
     evidence: float  # log, correlation of what is left accounted for
@@ -198,12 +201,16 @@ def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]
         np.sqrt(np.einsum("ij,jk,ik->i", table.root, covariance[part, part], table.root))
         for part in (slice(n * count, (n + 1) * count) for n in range(len(units)))
     ]
-    own = np.concatenate(chosen, axis=1) @ np.concatenate(units)
+    joined = np.concatenate(chosen, axis=1)
+    own, term = joined @ np.concatenate(units), table.term(units, tuple(numbers) * at_wheels)
+    laws = laws_of(table, term, _normal_equations(rest, joined, left))
     return Unmodelled(
         table,
-        table.term(units, tuple(numbers) if at_wheels else ()),
+        term,
+        tuple(law for law, _ in laws),
+        laws[0][1] if laws else term,
         best.share,
-        not table.family.is_event,
+        not table.family.is_event or bool(laws),
         _evidence(rest.dataset, alone, left),
         _is_large(rest.dataset, own / rest.weight),
         own / rest.weight,
@@ -211,15 +218,34 @@ def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]
     )
 
 
+def _normal_equations(rest: Remainder, columns: Array, left: Array) -> Evidence:
+    """Of columns, what is not exactly known otherwise eliminated."""
+    base = rest.base
+    inner = base.T @ base + np.eye(base.shape[1])
+    cross = np.linalg.solve(inner, base.T @ np.column_stack([columns, rest.residual]))
+    return Evidence(
+        columns.T @ columns - columns.T @ base @ cross[:, :-1],
+        columns.T @ rest.residual - columns.T @ base @ cross[:, -1],
+        max(float(np.mean([factor for _, factor in _inflations(rest.dataset, left)])), 1.0),
+    )
+
+
+def _inflations(dataset: Dataset, left: Array) -> list[tuple[slice, float]]:
+    """By channel: variance of what is left over that of its noise, times its correlation time."""
+    found = []
+    for part in rows_of(dataset.channels):
+        lags = min(_LAGS, (part.stop - part.start) // 4 + 1)
+        time = autocorrelation_time([left[part]], lags, 0.03)
+        found.append((part, max(float(np.mean(left[part] ** 2)), 1.0) * time))
+    return found
+
+
 def _evidence(dataset: Dataset, before: Array, after: Array) -> float:
     """Log likelihood gained, each sample counted by what of it is not known from the last ones."""
-    gained = 0.0
-    for part in rows_of(dataset.channels):
-        variance = max(float(np.mean(after[part] ** 2)), 1.0)
-        time = autocorrelation_time([after[part]], min(_LAGS, len(after[part]) // 4 + 1), 0.03)
-        fall = float(before[part] @ before[part] - after[part] @ after[part])
-        gained += 0.5 * fall / (variance * time)
-    return gained
+    return sum(
+        0.5 * float(before[part] @ before[part] - after[part] @ after[part]) / factor
+        for part, factor in _inflations(dataset, after)
+    )
 
 
 def _is_large(dataset: Dataset, change: Array) -> bool:
@@ -240,7 +266,7 @@ def _solved(rest: Remainder, columns: Sequence[Array]) -> tuple[list[Array], Arr
 
 def shape_of(effect: Unmodelled, robot: Robot) -> Shape:
     """Its curve with an interval; of a table of two variables what it is along the first."""
-    family, term = effect.family, effect.term
+    family, term = effect.family, effect.learnt
     count = len(term.knots[0])
     values, sigma = (item[0].reshape(count, -1) for item in (term.values, effect.sigma))
     across = int(np.argmin(sigma.sum(axis=0)))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomr_reality_gap.explanation import Estimate, Explanation, Finding, Learnt, Score, Shape
+from tomr_reality_gap.fit.laws import words_of
 from tomr_reality_gap.report.words import decimals
 
 Value = object  # what json.dumps takes
@@ -83,6 +84,15 @@ def _learnt(learnt: Learnt) -> Mapping[str, Value]:
         "words": term.family.words,
         "variables": [axis.title for axis in term.family.axes],
         "repeatable": learnt.is_repeatable,
+        "laws": [
+            {
+                "law": law.name,
+                "words": words_of(law),
+                "parameters": {name: _estimate(item) for name, item in law.parameters.items()},
+                "share_of_table": _number(law.share, 3),
+            }
+            for law in learnt.laws
+        ],
         "share_predicted": _number(learnt.share, 3),
         "unit": term.unit,
         "knots": [[_number(at, 6) for at in points] for points in term.knots],
