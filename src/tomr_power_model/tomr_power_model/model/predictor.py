@@ -170,6 +170,7 @@ class PowerPredictor:
             rise,
             held,
             windows.offset_s,
+            self._path.besides,
         )
         self._heading += turned
         measured = self._model.measured(motion)
@@ -295,7 +296,7 @@ class PowerPredictor:
             voltage = self._robot.supply.nominal_voltage
             return SupplyReading.rounded(voltage, sum(means.at_motor) / voltage)
         auxiliary = self._robot.supply.auxiliary_power if means.other is None else means.other
-        power = means.total + auxiliary
+        power = means.total + auxiliary + self._path.besides.supply
         voltage = self._bus_voltage(means, power)
         return SupplyReading.rounded(voltage, power / voltage)
 
