@@ -247,7 +247,7 @@ def test_launch_files_name_files_that_are_installed() -> None:
                 case ast.List([ast.Call(ast.Name("FindPackageShare"), [package]), *rest]):
                     name, *parts = (ast.literal_eval(part) for part in (package, *rest))
                     named.add(ROOT.joinpath("install", name, "share", name, *parts))
-    assert {file.name for file in named} == {"diagnosis.launch.py", "reference.yaml"}
+    assert {file.name for file in named} == {"diagnosis.launch.py"}
     assert all(file.is_file() for file in named)
 
 

@@ -3,24 +3,30 @@
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.conditions import IfCondition, UnlessCondition
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import LaunchConfiguration, PythonExpression
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-REFERENCE_ROBOT = PathJoinSubstitution(
-    [FindPackageShare("tomr_power_model"), "robots", "reference.yaml"]
+ROBOT = LaunchConfiguration("robot")
+# A file, or the name of a robot that is shipped.
+ROBOT_FILE = PythonExpression(
+    [
+        *("'", ROBOT, "' if '", ROBOT, "'.endswith(('.yaml', '.yml')) else "),
+        *("'", FindPackageShare("tomr_power_model"), "/robots/", ROBOT, ".yaml'"),
+    ]
 )
 ARGUMENTS = (
     DeclareLaunchArgument(
         "robot",
-        default_value=REFERENCE_ROBOT,
-        description="robot.yaml: geometry, masses, motors and friction of the robot",
+        default_value="reference",
+        description="robot.yaml: geometry, masses, motors and friction of the robot; or a shipped "
+        "one by name: reference, robotino_v2, robotino_v2_gray",
     ),
     DeclareLaunchArgument(
         "settings",
         # A file is needed either way: by default the robot's once more, which changes nothing.
-        default_value=LaunchConfiguration("robot"),
+        default_value=ROBOT_FILE,
         description="parameter file with settings of the nodes, such as cmd_vel_type",
     ),
     DeclareLaunchArgument(
@@ -56,7 +62,7 @@ def stage(
     *parameters: dict[str, ParameterValue], package: str, executable: str, composed: bool = False
 ) -> Node:
     """One node of the diagnosis, with the parameters it has besides those of all."""
-    files = [LaunchConfiguration("robot"), LaunchConfiguration("settings")]
+    files = [ROBOT_FILE, LaunchConfiguration("settings")]
     condition = IfCondition if composed else UnlessCondition
     return Node(
         package=package,

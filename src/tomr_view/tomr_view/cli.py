@@ -10,8 +10,7 @@ from pathlib import Path
 from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import shipped_robots
-from tomr_view.picture import described, spells
-from tomr_view.recording import pictures_of
+from tomr_view.recording import introduction, pictures_of
 from tomr_view.server import Server
 
 LOOPBACK = "127.0.0.1"
@@ -70,17 +69,11 @@ def _view(arguments: Sequence[str] | None) -> int:
 
 
 def _view_recording(options: argparse.Namespace) -> int:
+    print(f"diagnosing {options.bag}", file=sys.stderr)
     robot, pictures = pictures_of(options.bag, options.robot, options.namespace)
     if not pictures:
         raise InputError(f"{options.bag}: too short for a decision: give a longer recording")
-    hello = {
-        "mode": "recording",
-        "title": options.bag.name,
-        "robot": described(robot),
-        "count": len(pictures),
-        "times": [picture["t"] for picture in pictures],
-        "spells": spells(pictures),
-    }
+    hello = introduction(robot, pictures, options.bag.name)
     server = Server(hello, pictures)
     server.start(options.host, options.port)
     announce(server)

@@ -1,6 +1,6 @@
 """A recording as pictures: diagnosed anew, ten pictures per second of it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from tomr_fault_diag.diagnosis.offline import diagnose
@@ -9,7 +9,7 @@ from tomr_fault_diag.diagnosis.settings import STAGE_NODES, DiagnosisSettings
 from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.recordings import Recording, open_recording, resolve_topic
 from tomr_power_model.robot import Robot, load_robot, read_node_sections
-from tomr_view.picture import PICTURE_PERIOD, Gatherer, Json, Status
+from tomr_view.picture import PICTURE_PERIOD, Gatherer, Json, Status, described, spells
 
 TRUTH = "ground_truth/faults"
 
@@ -23,6 +23,18 @@ def pictures_of(
     with open_recording(bag) as recording:
         pipeline = Pipeline(robot, settings)
         return robot, list(_pictures(recording, pipeline, namespace))
+
+
+def introduction(robot: Robot, pictures: Sequence[Json], title: str) -> Json:
+    """What a page learns of a recording before its pictures."""
+    return {
+        "mode": "recording",
+        "title": title,
+        "robot": described(robot),
+        "count": len(pictures),
+        "times": [picture["t"] for picture in pictures],
+        "spells": spells(pictures),
+    }
 
 
 def _pictures(recording: Recording, pipeline: Pipeline, namespace: str | None) -> Iterator[Json]:

@@ -102,6 +102,10 @@ class Pipeline:
         self._residuals.retune(settings.residuals.bands)
         self._classifier.settings = settings.classifier
 
+    def release(self) -> str:
+        """Let go of a named fault, latched or not; returns its name, empty if there was none."""
+        return self._classifier.release()
+
     def messages(self, step: Step) -> Iterator[Outgoing]:
         """The messages that the nodes publish at such a step."""
         classifier = self.settings.classifier

@@ -8,6 +8,7 @@ from attrs import evolve
 from tomr_fault_diag.classifier.messages import TOPIC as DIAGNOSTICS
 from tomr_fault_diag.diagnosis.pipeline import Pipeline, Step
 from tomr_fault_diag.diagnosis.settings import PARAMETERS, STAGE_NODES, DiagnosisSettings
+from tomr_fault_diag.nodes.fault_classifier_node import offer_clearing
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
 from tomr_power_model.messages.outgoing import DiagnosticMessage, JointMessage, SupplyMessage
 from tomr_power_model.nodes.command_line import node_arguments, parameter_files
@@ -49,6 +50,7 @@ class DiagnosisNode(StageNode):
                 self.offer(topic, JointMessage if topic == EXPECTED else SupplyMessage)
         inputs = {item.topic: self._input(item) for item in self.pipeline.inputs}
         self.listen(inputs.values(), self._advance)
+        offer_clearing(self, self.pipeline.release)
         self.on_change(lambda _: self.pipeline.retune(self._settings()))
 
     def _settings(self) -> DiagnosisSettings:

@@ -100,26 +100,28 @@ setInterval(() => {
 // --- faults ---------------------------------------------------------------------------------
 
 function showFaults() {
-  const buttons = [];
-  for (const fault of hello.faults || []) {
-    const wheels = fault.has_wheel ? [1, 2, 3] : [null];
-    for (const wheel of wheels) {
-      const button = document.createElement("button");
-      button.type = "button";
-      button.dataset.fault = `${fault.id} ${wheel || ""}`;
-      button.textContent = fault.id.replaceAll("_", " ") + (wheel ? ` ${wheel}` : "");
-      button.onclick = () => {
-        const isOn = button.getAttribute("aria-pressed") === "true";
-        const wish = { ask: "fault", id: isOn ? null : fault.id };
-        if (!isOn) { wish.severity = 1; if (wheel) wish.wheel = wheel; }
-        socket.send(JSON.stringify(wish));
-      };
-      buttons.push(button);
-    }
-  }
-  $("faults").replaceChildren(...buttons);
-  $("faults").hidden = buttons.length === 0;
+  const faults = hello.faults || [];
+  $("faults").hidden = faults.length === 0;
+  const choices = faults.map((fault) => new Option(fault.id.replaceAll("_", " "), fault.id));
+  $("fault").replaceChildren(...choices);
+  chooseFault();
 }
+
+function chooseFault() {
+  const fault = (hello.faults || []).find((item) => item.id === $("fault").value);
+  $("wheel").hidden = !fault || !fault.has_wheel;
+}
+
+function wish(what) {
+  socket.send(JSON.stringify({ ask: "fault", ...what }));
+}
+
+$("fault").onchange = chooseFault;
+$("bring").onclick = () => {
+  const wheel = $("wheel").hidden ? {} : { wheel: Number($("wheel").value) };
+  wish({ id: $("fault").value, severity: 1, ...wheel });
+};
+$("take").onclick = () => wish({ id: null });
 
 // --- drawing --------------------------------------------------------------------------------
 
@@ -371,10 +373,8 @@ function showWords(picture) {
   });
   $("inputs").replaceChildren(...rows);
   $("inputs_title").hidden = rows.length === 0;
-  const on = (picture.faults || []).map((fault) => `${fault.id} ${fault.wheel || ""}`);
-  for (const button of $("faults").children) {
-    button.setAttribute("aria-pressed", on.includes(button.dataset.fault));
-  }
+  const on = (picture.faults || []).map((fault) => `${fault.id} ${fault.wheel || ""}`.trim());
+  $("on").textContent = on.length ? `in force: ${on.join(", ").replaceAll("_", " ")}` : "";
 }
 
 function drawSpells() {
