@@ -7,13 +7,23 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from tomr_fault_diag.classifier import states
+from tomr_fault_diag.classifier.advice import check_first
 from tomr_fault_diag.classifier.belief import CONTROLS, HYPOTHESES
 from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
-from tomr_fault_diag.classifier.messages import diagnosis_message
+from tomr_fault_diag.classifier.messages import diagnosis_message, six_state
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
-from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, POWER_SENSOR, SLIP, STATES
+from tomr_fault_diag.classifier.states import (
+    CONTROL,
+    MOTOR,
+    NORMAL,
+    POWER_SENSOR,
+    SLIP,
+    STATES,
+    State,
+)
 from tomr_fault_diag.classifier.window_network import WindowNetwork
 from tomr_fault_diag.residuals.frame import (
     ENCODERS,
@@ -25,6 +35,7 @@ from tomr_fault_diag.residuals.frame import (
     Residual,
     ResidualFrame,
 )
+from tomr_power_model.messages.plain import Level
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import shipped_robot
 
@@ -107,13 +118,21 @@ def test_a_released_fault_that_is_still_there_is_named_anew() -> None:
 
 
 def test_no_motor_is_accused_without_data_of_its_own() -> None:
-    blind = [without(f, [MOTORS[1], ENCODERS[1]], "no fresh wheel_2/power") for f in FAULTY]
+    drive = [*FAULTY, *ticks(4000, 5000, LOST)]
+    blind = [without(f, [MOTORS[1], ENCODERS[1]], "no fresh wheel_2/power") for f in drive]
     found = classified(blind)
     assert FAULT not in {d.state.name for d in found}
     (last,) = [d for d in found if d.state is POWER_SENSOR[1]][-1:]
     status = diagnosis_message(shipped_robot("reference"), last, "").statuses[0]
     assert "not observable: motor 2 (power sensor dead)" in status.message
     assert "motor 2 (power sensor dead)" in dict(status.values)["not_observable"]
+
+
+def test_a_dropout_of_a_second_is_no_fault_of_a_sensor() -> None:
+    dead = [*MOTORS, *ENCODERS]
+    silent = [without(item, dead, "no fresh power") for item in ticks(2000, 3000)]
+    frames = [*ticks(50, 2000), *silent, *ticks(3000, 5000)]
+    assert [name for _, name in changes(classified(frames))] == ["normal"]
 
 
 def test_a_fault_named_before_stays_while_its_sensor_is_dead() -> None:
@@ -184,6 +203,17 @@ def test_a_gap_is_no_time_in_which_a_fault_recovers() -> None:
     found = changes(classified([*FAULTY, *healthy]))
     assert [name for _, name in found] == ["normal", FAULT, "normal"]
     assert found[-1][0] >= 8000 + 1000
+
+
+def test_every_state_that_is_wrong_says_what_to_check_and_which_of_the_six_it_is() -> None:
+    named = [value for value in vars(states).values() if isinstance(value, State)]
+    for state in (*STATES, *POWER_SENSOR, *named):
+        assert bool(check_first(state)) == (state.level is not Level.OK), state
+        assert six_state(state) == (state.name if state in STATES else "unknown")
+    (found,) = [d for d in classified(FAULTY) if d.changed and d.state is STATES[MOTOR + 1]]
+    values = dict(diagnosis_message(shipped_robot("reference"), found, "").statuses[0].values)
+    assert values["six_state"] == FAULT
+    assert values["check_first"].startswith("the encoder's plug")
 
 
 class Fixed:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap_records import chunk, header, indexed, message
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -365,3 +366,35 @@ def test_a_recording_split_over_files_without_metadata(tmp_path: Path) -> None:
         shutil.copy(storage_file(tmp_path / f"part_{number}"), folder)
     with open_recording(folder) as recording:
         assert [stamp_ns for *_, stamp_ns in recording.messages()] == [1, 2, 5, 6]
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_of_two_recordings_to_one_place_the_first_that_is_complete_stays(
+    tmp_path: Path, storage: str
+) -> None:
+    path = tmp_path / "bag"
+    kind = "std_msgs/msg/Header"
+
+    def record_twice() -> None:
+        with RecordingWriter(path, storage) as late:
+            late.write("late", kind, bag_header(1), 1)
+            with RecordingWriter(path, storage) as early:
+                early.write("early", kind, bag_header(1), 1)
+            assert path.is_dir()
+            late.write("late", kind, bag_header(2), 2)
+
+    with pytest.raises(InputError, match="exists already"):
+        record_twice()
+    with open_recording(path) as recording:
+        assert list(recording.topics) == ["/early"]
+    assert [item.name for item in tmp_path.iterdir()] == ["bag"]
+
+
+def test_messages_whose_topics_are_lost(tmp_path: Path) -> None:
+    path = tmp_path / "lost.mcap"
+    head = header()
+    data = chunk("", message(bytes(8), 1), 39)
+    path.write_bytes(indexed(head, [(data, 39, 1, 1)], ""))
+    with pytest.raises(InputError) as failure, open_recording(path):
+        pass
+    clear_line(failure, str(path), "no topic that they belong to")

@@ -5,6 +5,7 @@ of the command itself 70 (sysexits.h: EX_SOFTWARE), results that could not be sa
 """
 
 import contextlib
+import errno
 import os
 import signal
 import sys
@@ -27,13 +28,17 @@ EXIT_TERMINATED = 143
 
 DEBUG = "TOMR_DEBUG"  # environment: not empty, show where an error comes from
 
+_UNWRITTEN = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
+
+_signals: list[int] = []  # that asked this process to end
+
 Main = Callable[[Sequence[str] | None], int]
 
 
 def run_main(main: Main, arguments: Sequence[str] | None = None) -> int:
     """Run a command's body; whatever happens, give one line on stderr and a code that says it."""
     _prepare_streams()
-    _end_cleanly_on_sigterm()
+    _end_cleanly_on_signals()
     try:
         code = main(arguments)
         sys.stdout.flush()
@@ -41,13 +46,13 @@ def run_main(main: Main, arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         return _fail(EXIT_BAD_INPUT, f"error: {error}")
     except KeyboardInterrupt:
-        return _fail(EXIT_INTERRUPTED, "interrupted")
+        return _interrupted()
     except BrokenPipeError:
         # The reader of a pipe (`| head`) left before it had all.
         _drop_output()
         return EXIT_PIPE_CLOSED
     except Exception as error:  # noqa: BLE001 the outermost place: 1 must not come of it
-        return _fail(*_told(error))
+        return _interrupted() if _signals else _fail(*_told(error))
 
 
 def run_module(name: str) -> int:
@@ -55,11 +60,15 @@ def run_module(name: str) -> int:
     return run_main(lambda _: int(import_module(name).main()))
 
 
+def _interrupted() -> int:
+    return _fail(EXIT_TERMINATED if signal.SIGTERM in _signals else EXIT_INTERRUPTED, "interrupted")
+
+
 def _told(error: Exception) -> tuple[int, str]:
     """Exit code and line for what nobody expected."""
-    if isinstance(error, OSError) and not _can_print():
+    if isinstance(error, OSError) and error.filename is None and error.errno in _UNWRITTEN:
         _drop_output()
-        return EXIT_NO_OUTPUT, f"error: standard output cannot be written ({error.strerror})"
+        return EXIT_NO_OUTPUT, f"error: the output cannot be written ({error.strerror})"
     if isinstance(error, MemoryError):
         return EXIT_BAD_INPUT, "error: the memory does not suffice: give less at a time"
     if isinstance(error, OSError):
@@ -111,14 +120,20 @@ def _prepare_streams() -> None:
             reconfigure(errors="backslashreplace")
 
 
-def _end_cleanly_on_sigterm() -> None:
-    """Let SIGTERM end a command as an exception: temporary files go with it."""
+def _end_cleanly_on_signals() -> None:
+    """Let SIGINT and SIGTERM end a command as exceptions: temporary files go with it.
+
+    An extension module that loads while one is raised may make an error of its own of it: so they
+    are noted as well.
+    """
     if threading.current_thread() is not threading.main_thread():
         return
-    if signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
-        return
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _leave)
+    if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, _leave)
 
-    def leave(*_: object) -> NoReturn:
-        raise SystemExit(EXIT_TERMINATED)
 
-    signal.signal(signal.SIGTERM, leave)
+def _leave(number: int, _: object) -> NoReturn:
+    _signals.append(number)
+    raise KeyboardInterrupt

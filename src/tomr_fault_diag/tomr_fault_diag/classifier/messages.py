@@ -1,5 +1,6 @@
 """A diagnosis as a DiagnosticArray (REP-107)."""
 
+from tomr_fault_diag.classifier.advice import check_first
 from tomr_fault_diag.classifier.stage import Diagnosis
 from tomr_fault_diag.classifier.states import (
     NORMAL,
@@ -23,14 +24,18 @@ TOPIC = "/diagnostics"
 NAME = "fault_classifier: drive"
 
 
-def diagnosis_message(robot: Robot, diagnosis: Diagnosis, hardware_id: str) -> DiagnosticMessage:
+def diagnosis_message(
+    robot: Robot, diagnosis: Diagnosis, hardware_id: str, commissioned: str = ""
+) -> DiagnosticMessage:
     """The message of one diagnosis: state, since when, probabilities, evidence."""
     seconds, rest = divmod(diagnosis.since_ns, NANOSECONDS)
     values = [("state", diagnosis.state.name), ("six_state", six_state(diagnosis.state))]
     values += [("since", f"{seconds}.{rest:09d}")]
+    values.append(("check_first", check_first(diagnosis.state)))
     values.append(("not_observable", ", ".join(diagnosis.unseen.words)))
     for state, share in zip(STATES, diagnosis.probabilities, strict=False):
         values.append((f"p {state.name}", f"{share:.4f}"))
+    values.append(("commissioned", commissioned or "no: run tomr_commission"))
     evidence = evidence_of(robot, diagnosis)
     values.extend((f"evidence {number}", text) for number, text in enumerate(evidence, start=1))
     status = Status(

@@ -35,6 +35,7 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
         "speeds_first",
         choices=tuple(INPUT_ORDERS),
     ),
+    _S("commissioned", "when tomr_commission set this robot's bands and caution", "str", ""),
     HARDWARE_ID,
     _S("evidence_weight", "of window: what one window counts", "float", 0.4, "", 0.01, 1.0),
     _S(
@@ -89,6 +90,7 @@ class ClassifierSettings:
     report_period: int = to_ns(1.0)
     hardware_id: str = NAMELESS
     input_order: str = "speeds_first"
+    commissioned: str = ""
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:
@@ -116,4 +118,5 @@ class ClassifierSettings:
             report_period=to_ns(number("report_period")),
             hardware_id=str(values["hardware_id"]) or NAMELESS,
             input_order=str(values["input_order"]),
+            commissioned=str(values["commissioned"]),
         )

@@ -23,6 +23,7 @@ from tomr_fault_diag.residuals.frame import (
 from tomr_power_model.model.ticks import to_ns
 
 _LATELY = to_ns(1.0)
+_DEAD = to_ns(2.0)  # without a motor's power, before its sensor is to blame
 _LEAST = 0.5  # share of the frames of that time that must be usable
 
 Blind = tuple[tuple[int, str], ...]  # wheels (0..2), and what ails the sensor, "" for a moment
@@ -43,10 +44,12 @@ class SufficiencyWatch:
 
     def __init__(self) -> None:
         self._frames: deque[tuple[int, bool]] = deque()
+        self._since: dict[int, int] = {}  # wheel: since when it is blind [ns]
 
     def clear(self) -> None:
         """Forget all frames."""
         self._frames.clear()
+        self._since.clear()
 
     def take(self, frame: ResidualFrame) -> Sufficiency:
         """Take the newest frame."""
@@ -57,12 +60,17 @@ class SufficiencyWatch:
         while self._frames[0][0] <= frame.stamp_ns - _LATELY:
             self._frames.popleft()
         share = sum(good for _, good in self._frames) / len(self._frames)
-        blind = tuple(
-            (wheel, _ailment(item))
-            for wheel, item in enumerate(frame.residuals[index] for index in MOTORS)
-            if _is_unmeasured(item)
+        return Sufficiency(usable, joined, share >= _LEAST, self._blind(frame))
+
+    def _blind(self, frame: ResidualFrame) -> Blind:
+        motors = [frame.residuals[index] for index in MOTORS]
+        blind = {wheel: _ailment(item) for wheel, item in enumerate(motors) if _is_unmeasured(item)}
+        now = frame.stamp_ns
+        self._since = {wheel: self._since.get(wheel, now) for wheel in blind}
+        return tuple(
+            (wheel, reason if now - self._since[wheel] >= _DEAD else "")
+            for wheel, reason in blind.items()
         )
-        return Sufficiency(usable, joined, share >= _LEAST, blind)
 
 
 def _is_usable(frame: ResidualFrame) -> bool:

@@ -108,11 +108,12 @@ class Pipeline:
 
     def messages(self, step: Step) -> Iterator[Outgoing]:
         """The messages that the nodes publish at such a step."""
-        hardware_id = self.settings.classifier.hardware_id
+        classifier = self.settings.classifier
+        hardware_id = classifier.hardware_id
         for prediction in step.predictions:
             yield from prediction_messages(self.robot, prediction)
         for frame in step.frames:
             yield residual_message(self.robot, frame, hardware_id)
         for diagnosis in step.diagnoses:
-            yield diagnosis_message(self.robot, diagnosis, hardware_id)
+            yield diagnosis_message(self.robot, diagnosis, hardware_id, classifier.commissioned)
         yield from step.reports

@@ -47,8 +47,12 @@ class FaultClassifierNode(StageNode):
         frame = frame_of(message, stamp_of(message, receive_ns))
         diagnosis = self.classifier.classify(frame)
         if diagnosis is not None:
-            hardware_id = self.classifier.settings.hardware_id
-            self.send(diagnosis_message(self._robot, diagnosis, hardware_id))
+            settings = self.classifier.settings
+            self.send(
+                diagnosis_message(
+                    self._robot, diagnosis, settings.hardware_id, settings.commissioned
+                )
+            )
 
     def _retune(self, values: Mapping[str, object]) -> None:
         self.classifier.settings = ClassifierSettings.of(values)

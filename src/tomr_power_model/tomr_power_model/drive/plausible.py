@@ -1,5 +1,6 @@
 """What a robot's sensors cannot have measured, given its description, with a margin of two."""
 
+import math
 from typing import Self
 
 from attrs import frozen
@@ -8,6 +9,7 @@ from tomr_power_model.drive.sources import TOTAL, PowerReading
 from tomr_power_model.robot import Robot
 
 _MARGIN = 2.0
+_DEAD = 0.1  # of the nominal voltage: a supply below it feeds no driver that could report it
 
 
 def fastest_wheel(robot: Robot) -> float:
@@ -20,6 +22,7 @@ def fastest_wheel(robot: Robot) -> float:
 class PowerLimits:
     """Largest magnitudes that are believed: of motors 1-3 and of the whole robot."""
 
+    dead: float  # V, that a supply must have at least
     voltage: float  # V
     current: tuple[float, ...]  # A
     power: tuple[float, ...]  # W
@@ -34,11 +37,15 @@ class PowerLimits:
         current = [_MARGIN * ways * value for value in stall]
         total = _MARGIN * (sum(stall) + auxiliary / full)
         power = (*(_MARGIN * full * value for value in stall), full * total)
-        return cls(_MARGIN * full, (*current, total), power)
+        # Where currents are compared a voltage may be left at zero.
+        dead = _DEAD * full if robot.measurement.quantity == "power" else -math.inf
+        return cls(dead, _MARGIN * full, (*current, total), power)
 
     def problem(self, reading: PowerReading) -> str | None:
         """Why a reading cannot be true, None if it can; what it does not say is not judged."""
         name = "the robot" if reading.wheel == TOTAL else f"motor {reading.wheel + 1}"
+        if reading.voltage < self.dead:
+            return f"{reading.voltage:.3g} V of {name} feeds nothing; the sample is ignored"
         for value, most, unit in (
             (reading.voltage, self.voltage, "V"),
             (reading.current, self.current[reading.wheel], "A"),

@@ -86,7 +86,6 @@ class PowerPredictor:
         self._resting.clear()
         self._encoders.clear()
         self._commands.clear()
-        self._was_silent = False
         self._gyro: tuple[int, float] | None = None
         self._heading = 0.0  # at the start of the next tick, against the first [rad]
         self._model.clear()
@@ -171,6 +170,7 @@ class PowerPredictor:
             rise,
             held,
             windows.offset_s,
+            self._path.besides,
         )
         self._heading += turned
         measured = self._model.measured(motion)
@@ -200,10 +200,7 @@ class PowerPredictor:
         stands = all(abs(value) < _RESTS for value in (*commanded.speed, *speed))
         if silent and stands and tick - self._commands.last(tick) > timeout:
             self._commands.excuse(tick)
-            silent = False
-        if self._was_silent and not silent:
-            self._resting.clear()  # the driver's integral went its own way
-        self._was_silent = silent
+            return False
         return silent
 
     @staticmethod
@@ -299,7 +296,7 @@ class PowerPredictor:
             voltage = self._robot.supply.nominal_voltage
             return SupplyReading.rounded(voltage, sum(means.at_motor) / voltage)
         auxiliary = self._robot.supply.auxiliary_power if means.other is None else means.other
-        power = means.total + auxiliary
+        power = means.total + auxiliary + self._path.besides.supply
         voltage = self._bus_voltage(means, power)
         return SupplyReading.rounded(voltage, power / voltage)
 

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
 
-from rclpy._rclpy_pybind11 import RCLError
+from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.utilities import remove_ros_args
 
-from tomr_power_model.cli import EXIT_BAD_INPUT
+from tomr_power_model.errors import InputError
 from tomr_power_model.robot.parameters import ParameterSpec
 
 _PARAMETERS = """
@@ -37,14 +37,14 @@ def node_arguments(
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     try:
-        parser.parse_args(remove_ros_args(given)[1:])
-    except RCLError as error:
-        print(f"error: {_cause(given, error)}", file=sys.stderr)
-        raise SystemExit(EXIT_BAD_INPUT) from None
+        own = remove_ros_args(given)[1:]
+    except (RCLError, UnknownROSArgsError) as error:
+        raise InputError(f"{name}: {_cause(given, error)}") from None
+    parser.parse_args(own)
     return given
 
 
-def _cause(arguments: Sequence[str], error: RCLError) -> str:
+def _cause(arguments: Sequence[str], error: Exception) -> str:
     """Why ROS refuses its arguments; its own text ends with where it was in C."""
     for file in parameter_files(arguments):
         if not Path(file).is_file():

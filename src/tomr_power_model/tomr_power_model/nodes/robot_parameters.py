@@ -22,7 +22,16 @@ from tomr_power_model.robot.description import effect_spec
 from tomr_power_model.robot.parameters import ParameterSpec, Value
 from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
 
-GROUPS = ("robot", "motor", "controller", "supply", "physics", "sensors", "measurement")
+GROUPS = (
+    "robot",
+    "motor",
+    "controller",
+    "supply",
+    "physics",
+    "sensors",
+    "measurement",
+    "unmodelled",
+)
 _ROS_OWN = ("use_sim_time", "qos_overrides", "start_type_description_service")
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from tomr_power_model.errors import InputError
 from tomr_power_model.files import load_yaml, read_text
+from tomr_power_model.robot.commissioned import COMMISSIONING, check_commissioned
 from tomr_power_model.robot.description import Robot, robot_from_parameters
 from tomr_power_model.robot.parameters import SHARED_PARAMETERS, USE_SIM_TIME
 
@@ -35,6 +36,7 @@ def read_description(source: Path | str) -> dict[str, object]:
     if not section:
         raise InputError(f"{source}: no `/**: ros__parameters:` section: see robots/reference.yaml")
     check_identity(sections.get(CALIBRATION, {}), section, str(source))
+    check_commissioned(sections.get(COMMISSIONING, {}), section, str(source))
     return dict(section)
 
 

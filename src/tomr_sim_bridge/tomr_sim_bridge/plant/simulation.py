@@ -275,7 +275,8 @@ class Simulation:
             effect.bill(drivers)
         copper = current**2 * self._resistance
         self._resistance = drivers.resistance
-        self._total_power = float(drivers.power.sum()) + self.robot.supply.auxiliary_power
+        others = drivers.other + self.robot.supply.auxiliary_power
+        self._total_power = float(drivers.power.sum()) + others
         resisted = loads.dry * np.abs(turned) + loads.viscous * turned**2 / self._grid.stretch
         self.ledger.motors += float(motor_power.sum()) * self._grid.stretch
         self.ledger.drivers += float(drivers.power.sum()) * self._grid.stretch
