@@ -44,6 +44,10 @@ class _Witness:
             judge.clear()
         self.decades = 0.0
 
+    def interrupt(self) -> None:
+        for judge in self._judges:
+            judge.interrupt()
+
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         careful, hasty = (judge.judge(frame, elapsed_ns, unseen) for judge in self._judges)
         named = hasty.sure and int(np.argmax(hasty.probabilities)) != NORMAL
