@@ -145,6 +145,7 @@ def test_the_detection_floor_is_where_nine_of_ten_are_found() -> None:
 def test_intervals_are_the_exact_ones() -> None:
     assert poisson_interval(0) == (0.0, pytest.approx(3.6889, abs=1e-4))  # -ln 0.025
     assert poisson_interval(3) == pytest.approx((0.6187, 8.7673), abs=1e-4)
+    assert poisson_interval(7) == pytest.approx((2.814, 14.423), abs=1e-3)
     assert binomial_interval(10, 10) == (pytest.approx(0.025**0.1), 1.0)
     assert binomial_interval(0, 10)[1] == pytest.approx(1 - 0.025**0.1)
 
