@@ -24,5 +24,5 @@ setup(
     install_requires=["setuptools"],
     extras_require={"test": ["pytest"]},
     zip_safe=False,
-    entry_points={"console_scripts": [f"tomr_demo = {NAME}.main:main"]},
+    entry_points={"console_scripts": [f"tomr_demo = {NAME}.entry:tomr_demo"]},
 )

@@ -26,9 +26,10 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            f"power_residuals = {NAME}.nodes.power_residuals_node:main",
-            f"fault_classifier = {NAME}.nodes.fault_classifier_node:main",
-            f"tomr_diagnose = {NAME}.cli.diagnose:main",
+            f"power_residuals = {NAME}.entry:power_residuals",
+            f"fault_classifier = {NAME}.entry:fault_classifier",
+            f"tomr_diagnose = {NAME}.entry:tomr_diagnose",
+            f"tomr_diagnosis = {NAME}.entry:tomr_diagnosis",
         ],
     },
 )

@@ -26,8 +26,8 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            f"power_model = {NAME}.nodes.power_model_node:main",
-            f"tomr_calibrate = {NAME}.calibrate_cli:main",
+            f"power_model = {NAME}.entry:power_model",
+            f"tomr_calibrate = {NAME}.entry:tomr_calibrate",
         ],
     },
 )

@@ -21,5 +21,5 @@ setup(
     install_requires=["setuptools"],
     extras_require={"fleet": ["distributed"], "test": ["pytest"]},
     zip_safe=False,
-    entry_points={"console_scripts": [f"tomr_gap = {NAME}.cli:main"]},
+    entry_points={"console_scripts": [f"tomr_gap = {NAME}.entry:tomr_gap"]},
 )

@@ -1,5 +1,6 @@
 """The demo on stage: wait until all nodes work, drive, bring the faults, keep the score."""
 
+import contextlib
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -95,6 +96,14 @@ class Play:
             director.recording = None
         self.board.close()
         self._show()
+
+    def drive_on(self) -> None:
+        """Drive until a signal comes: faults are up to whoever watches."""
+        self._acts = ()
+        self._director.drive()
+        with contextlib.suppress(KeyboardInterrupt):
+            while True:
+                self._turn()
 
     def scene(self) -> Scene:
         """What there is to show now."""

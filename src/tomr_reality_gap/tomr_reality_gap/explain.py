@@ -9,23 +9,29 @@ from numpy.typing import NDArray
 from tomr_power_model.estimation.noise import rows_of
 from tomr_reality_gap.alignment.response import controller_alternatives
 from tomr_reality_gap.alignment.simulation import Run
-from tomr_reality_gap.analysis import AnalysisResult
+from tomr_reality_gap.analysis import AnalysisResult, residuals_of
 from tomr_reality_gap.explanation import Explanation
 from tomr_reality_gap.fit.backward_elimination import backward_elimination
 from tomr_reality_gap.fit.basis_responses import basis_responses
 from tomr_reality_gap.fit.consistency import check_same_robot
 from tomr_reality_gap.fit.dataset import Dataset
-from tomr_reality_gap.fit.forward_selection import forward_selection
+from tomr_reality_gap.fit.forward_selection import Selection, finding_cost, forward_selection
+from tomr_reality_gap.fit.jacobian import linearise
+from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
+from tomr_reality_gap.fit.unmodelled import Remainder, Unmodelled, refitted, unmodelled_effect
 from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
 from tomr_reality_gap.mismatch.orders import ripple_orders
 from tomr_reality_gap.prepared import Prepared, prepared
 from tomr_reality_gap.progress import Progress
 from tomr_reality_gap.request import Request
+from tomr_reality_gap.rules import is_doubted, is_unmodelled, unexplained
 from tomr_reality_gap.verdict import explanation_of
 
 Array = NDArray[np.float64]
+
+_LITTLE = 0.15  # of the noise: what is left of what is drawn is not looked into
 
 
 def explain(request: Request, progress: Progress = lambda stage, part: None) -> Explanation:
@@ -57,10 +63,23 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
     tick = _Counter(progress, 3 * len(candidates) * len(ready.real))
     basis = basis_responses(dataset, base.robot, ready.scales.torque, orders)
     start = Model(base, parameters, (0.0,) * len(parameters))
-    found = forward_selection(dataset, start, candidates, basis, tick=tick)
+
+    def named(data: Dataset) -> Selection:
+        found = forward_selection(data, start, candidates, basis, tick=tick)
+        return backward_elimination(data, found, candidates, tick)
+
+    found = named(dataset)
     check_same_robot(dataset, found.rounds[-1])
-    found = backward_elimination(dataset, found, tick)
+    effect, plain = _unmodelled(dataset, found, ready), None
+    if effect is not None:  # names are sought once more, beside it
+        plain, dataset = dataset, _with_term(dataset, found, effect)
+        found = named(dataset)
+        effect = refitted(_remainder(plain, found), effect, found.best.model.described.robot)
+        dataset = _with_term(plain, found, effect)
     baseline = SimulatorBaseline.of(ready.simulations, dataset, found.noise, base.robot)
+    if effect is not None and baseline is not None and baseline.shows(effect):
+        effect, dataset, plain = None, plain or dataset, None
+        found = named(dataset)
     found, shared = beyond_baseline(dataset, found, baseline, tick)
     return AnalysisResult(
         dataset,
@@ -72,7 +91,35 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
         basis,
         baseline,
         shared,
+        plain,
+        effect,
     )
+
+
+def _remainder(dataset: Dataset, found: Selection) -> Remainder:
+    jacobian = linearise(dataset, found.best.model, ())
+    return Remainder.of(dataset, jacobian.value, np.asarray(jacobian.matrix, dtype=np.float64))
+
+
+def _unmodelled(dataset: Dataset, found: Selection, ready: Prepared) -> Unmodelled | None:
+    """What no name explains, if that is much, and a term predicts it."""
+    robot = found.best.model.described.robot
+    described, explained = dataset.predict([ready.base.robot, robot])
+    share, size = unexplained(residuals_of(dataset, described, explained))
+    if size < _LITTLE:
+        return None
+    gross = is_doubted(share, size, bool(found.best.model.hypotheses))
+    effect = unmodelled_effect(_remainder(dataset, found), robot, ready.scales, is_sure=gross)
+    cost = finding_cost(len(dataset.value))
+    named = found.best.evidence - found.without.evidence
+    if effect is None or gross:
+        return effect
+    return effect if effect.is_large and is_unmodelled(effect.evidence, named, cost) else None
+
+
+def _with_term(dataset: Dataset, found: Selection, effect: Unmodelled) -> Dataset:
+    robot = found.best.model.described.robot
+    return Dataset(tuple(with_terms(item, robot, (effect.term,)) for item in dataset.simulations))
 
 
 class _Counter:

@@ -15,18 +15,17 @@ tomr_simulate serves as well.
 """
 
 import csv
-import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
 from attrs import evolve, field, frozen
 
 from tomr_fault_diag.classifier import states
 from tomr_fault_diag.classifier.states import FAULTLESS, NORMAL, STATES, State
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import load_yaml, read_text
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.recordings import open_recording, resolve_topic
 from tomr_power_model.robot.description import closest
@@ -192,15 +191,11 @@ def recorded_labels(bag: Path, namespace: str | None = None) -> tuple[Label, ...
 
 
 def _read(path: Path, bag: str) -> list[Label]:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: labels cannot be read ({reason})") from None
+    text = read_text(path)
     if path.suffix == ".csv":
-        rows: Any = [_cells(row) for row in csv.DictReader(text.splitlines())]
+        rows: Any = [_cells(row, path) for row in csv.DictReader(text.splitlines())]
     else:
-        rows = _document(text, path)
+        rows = load_yaml(text, str(path))  # JSON is YAML too
     if isinstance(rows, Mapping) and "faults" in rows:
         return _mission(rows, bag or path.stem, path)
     if not isinstance(rows, list):
@@ -208,14 +203,7 @@ def _read(path: Path, bag: str) -> list[Label]:
     return [_label(row, bag, f"{path}: label {n}") for n, row in enumerate(rows, start=1)]
 
 
-def _document(text: str, path: Path) -> Any:
-    try:
-        return json.loads(text) if path.suffix == ".json" else yaml.safe_load(text)
-    except (json.JSONDecodeError, yaml.YAMLError) as error:
-        raise InputError(f"{path}: {' '.join(str(error).split())[:120]}: mend the file") from None
-
-
-def _cells(row: Mapping[str, str]) -> dict[str, object]:
+def _cells(row: Mapping[str, str], path: Path) -> dict[str, object]:
     """Numbers as numbers; what is empty is absent; accepted states stand between bars."""
     found: dict[str, object] = {}
     for key, text in row.items():
@@ -225,7 +213,7 @@ def _cells(row: Mapping[str, str]) -> dict[str, object]:
         if key == "accept":
             value = text.split("|")
         elif key not in ("bag", "state"):
-            value = yaml.safe_load(text)
+            value = load_yaml(text, str(path))
         found[key] = value
     return found
 

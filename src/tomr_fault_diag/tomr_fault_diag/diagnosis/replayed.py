@@ -20,6 +20,7 @@ from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.diagnosis.summary import Summariser, Summary
 from tomr_fault_diag.diagnosis.track import Track, Tracker
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import make_folder, write_text
 from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.messages.outgoing import TYPES
 from tomr_power_model.recordings import Recording, RecordingWriter, open_recording
@@ -203,13 +204,8 @@ def pages_for(folder: Path, bags: Sequence[Path]) -> list[Path]:
 
 def write_page(path: Path, text: str) -> None:
     """Write a page. Raises InputError."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be written ({error.strerror}): give another place"
-        ) from None
+    make_folder(path.parent)
+    write_text(path, text)
 
 
 def replay_all(tasks: Sequence[Task], jobs: int) -> Iterator[Replayed | Failed]:

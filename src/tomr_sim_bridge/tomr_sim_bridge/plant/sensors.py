@@ -23,6 +23,8 @@ from tomr_sim_bridge.plant.wheels import Vector, rolling_rows
 
 FAULT_RATE = 20.0  # Hz of ground_truth/faults
 _SLIPPING = "floor_slippery"  # the fault whose truth tells how fast wheels slip
+# Of wheel odometry, as drivers state it: x, y, z [m^2], roll, pitch, yaw [rad^2].
+ODOMETRY_VARIANCES = (1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-2)
 
 
 def quantise(values: Vector, quantum: float) -> Vector:
@@ -148,7 +150,8 @@ class Sensors:
         elapsed = (stamp - self._odometry_stamp) / NANOSECONDS
         speed = step / elapsed if elapsed > 0 else np.zeros(3)
         self._odometry_angle, self._odometry_stamp = angle, stamp
-        measured = samples.odometry(stamp, "odom", self._odometry_pose, speed.tolist())
+        pose = self._odometry_pose
+        measured = samples.odometry(stamp, "odom", pose, speed.tolist(), ODOMETRY_VARIANCES)
         state = self._memory.at(stamp)
         place = (*state[moments.POSITION].tolist(), float(state[moments.YAW]))
         velocity = _into_body(state[moments.VELOCITY], state[moments.YAW])
