@@ -78,7 +78,7 @@ def described(dice: random.Random) -> tuple[str, str]:
         )
         if dice.random() < 0.4:
             effect = dice.choice(sorted(EFFECTS))
-            values = dict.fromkeys(EFFECTS[effect].parameters, 0.5)
+            values: dict[str, object] = dict.fromkeys(EFFECTS[effect].parameters, 0.5)
             values[dice.choice(sorted(values))] = number
             body["physics"][effect] = values
             said.append(f"{effect}: {number}")
@@ -139,8 +139,8 @@ def _with_robot(dice: random.Random, folder: Path, base: Base, text: str, what: 
     if dice.random() < 0.25:
         mission = folder / "short.yaml"
         mission.write_text(_SHORT)
-        arguments = (str(mission), "--robot", str(path), "--out", str(folder / "out"), "--quiet")
-        return Attack("tomr_simulate", arguments, what)
+        options = ("--robot", str(path), "--out", str(folder / "out"), "--quiet")
+        return Attack("tomr_simulate", (str(mission), *options), what)
     tool, arguments = reading(dice, bag)
     given = [item for item in arguments if item != "reference"]
     if "--robot" in given:
@@ -244,7 +244,7 @@ _WORDS = {
 def command_lines(dice: random.Random, folder: Path, base: Base) -> Attack:
     tool = dice.choice(sorted(_WORDS))
     bag = write(folder / "bag", base.healthy[:600])
-    values = (
+    values: tuple[str, ...] = (
         *(str(bag), str(folder), "reference", "nowhere", "", "-", "/dev/null", "/dev/zero", "."),
         *("robot.mass", "robot.mass=0.1", "robot.mass=nan", "bag=0:1", "bag=9:1", "bag=inf:nan"),
         *("all", "-1", "1e308", "nan", "mcap", "a\nb", "\x1b[31m", "x" * 5000, str(folder / "new")),
@@ -305,7 +305,7 @@ def archives(dice: random.Random, folder: Path, base: Base) -> Attack:
         if dice.random() < 0.1:
             large = tarfile.TarInfo("zeros.csv")
             large.size = 700 * MEGA
-            tar.addfile(large, _Zeros())  # type: ignore[arg-type]
+            tar.addfile(large, _Zeros())
     if dice.random() < 0.3:
         packed = bytearray(archive.read_bytes())
         packed[dice.randrange(len(packed))] ^= 1 << dice.randrange(8)
