@@ -2,7 +2,6 @@
 
 import datetime
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from tomr_commission.evidence import decisions, evidence_in
 from tomr_commission.explained import FOLDER, Split, explain_drives
 from tomr_commission.injected import try_injected
 from tomr_commission.observed import Observed, frames_of, observe
+from tomr_commission.parallel import on_all_cores
 from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse
 from tomr_commission.request import CommissionRequest
 from tomr_commission.simulated import try_simulated
@@ -37,7 +37,6 @@ from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.drive.cut import names_of
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.drive.record import Drive
-from tomr_power_model.dynamics.simulation import worker_count
 from tomr_power_model.robot import load_robot, read_description, read_node_sections
 
 Progress = Callable[[str, float], None]
@@ -177,8 +176,7 @@ class _Work:
             if one is None
         ]
         if jobs:
-            with ProcessPoolExecutor(min(worker_count(), len(jobs))) as pool:
-                made = {drive.name: drive for drive in pool.map(_observe, jobs)}
+            made = {drive.name: drive for drive in on_all_cores(_observe, jobs)}
             for name, drive in made.items():
                 self.store.keep(f"drive_{name}", key, drive)
             kept = [
