@@ -14,8 +14,8 @@ Steady = Callable[..., Observed]
 
 
 def test_margin_multiplies_the_bands(steady: Steady) -> None:
-    plain = bands_of([steady()], BandChoice(margin=1.0, speed_margin=1.0))
-    wide = bands_of([steady()], BandChoice(margin=2.0, speed_margin=3.0))
+    plain = bands_of([steady()], BandChoice(margin=1.0, speed_factor=1.0))
+    wide = bands_of([steady()], BandChoice(margin=2.0, speed_factor=1.5))
     assert wide.power == pytest.approx(2.0 * plain.power, rel=1e-3)
     assert wide.speed == pytest.approx(3.0 * plain.speed, rel=1e-3)
     assert wide.total_factor == pytest.approx(plain.total_factor, rel=1e-3)

@@ -53,6 +53,7 @@ class Commissioned:
     outcome: Outcome
     reasons: tuple[Reason, ...]
     regimes: tuple[RegimeLine, ...]
+    margin: float  # of the bands
     shoved: Shoved
     plan: Rehearsal
     trials: tuple[Trial, ...]
@@ -71,6 +72,16 @@ class Commissioned:
         return "go" if self.is_go else "no-go"
 
 
+@frozen
+class Tuned:
+    """Bands, and the alarm level that they ask for."""
+
+    margin: float
+    bands: BandSettings
+    shoved: Shoved
+    level: AlarmLevel
+
+
 def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     """Run all steps that are not done yet. Raises InputError for what cannot be used."""
     work = _Work.begin(request, progress)
@@ -78,11 +89,9 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     described = work.description(explained)
     drives = work.observed(described)
     fitted, held = work.divided(drives)
-    bands = bands_of(fitted, request.bands)
-    classifier = work.classifier(described)
-    plan = Rehearsal()
-    shoved = work.rehearsed(described, bands, classifier, plan)
-    level = _level(request, fitted, bands, classifier, shoved, plan)
+    classifier, plan = work.classifier(described), Rehearsal()
+    tuned = work.tuned(described, fitted, classifier, plan)
+    bands, level = tuned.bands, tuned.level
     chosen = evolve(classifier, caution=level.caution)
     progress("validating", 0.85)
     said = [decisions(frames_of(drive, bands), chosen) for drive in (*fitted, held)]
@@ -100,7 +109,8 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
         outcome=outcome,
         reasons=against,
         regimes=tuple(regime_table(fitted, bands)),
-        shoved=shoved,
+        margin=tuned.margin,
+        shoved=tuned.shoved,
         plan=plan,
         trials=tuple(trials),
         floors=tuple(floors),
@@ -202,6 +212,25 @@ class _Work:
         settings = DiagnosisSettings.of(given, self.request.robot).classifier
         return evolve(settings, classifier="window", caution=ClassifierSettings().caution)
 
+    def tuned(
+        self,
+        described: Path | None,
+        fitted: Sequence[Observed],
+        settings: ClassifierSettings,
+        plan: Rehearsal,
+    ) -> Tuned:
+        """The narrowest bands with which false alarms can be as rare as wanted."""
+        choice, share = self.request.bands, 0.55
+        while True:
+            self.progress("simulating healthy hours", share)
+            bands = bands_of(fitted, choice)
+            shoved = self.rehearsed(described, bands, settings, plan)
+            level = _level(self.request, fitted, bands, settings, shoved, plan)
+            wider = choice.wider * choice.margin
+            if level.needed <= choice.most_caution or wider > choice.widest:
+                return Tuned(choice.margin, bands, shoved, level)
+            choice, share = evolve(choice, margin=wider), min(share + 0.07, 0.8)
+
     def rehearsed(
         self,
         described: Path | None,
@@ -210,12 +239,12 @@ class _Work:
         plan: Rehearsal,
     ) -> Shoved:
         """Simulated shoves."""
-        self.progress("simulating healthy hours", 0.55)
         source, usage = str(self.source(described)), self.usage()
         parts = (self.key, sorted(read_description(source).items()), bands, settings, usage, plan)
+        key = digest(map(repr, parts))
         held = self.store.values(
-            "rehearsed",
-            digest(map(repr, parts)),
+            f"rehearsed_{key}",
+            key,
             lambda: asdict(rehearse(source, bands, settings, usage, plan)),
         )
         return Shoved(tuple(held["peaks"]), tuple(held["between"]), held["hours"])

@@ -60,7 +60,7 @@ class Usage:
 class Rehearsal:
     """How the simulated hours are made."""
 
-    shoves: int = 600
+    shoves: int = 390
     force: tuple[float, float] = (0.5, 3.0)  # N per kg of the robot
     duration: tuple[float, float] = (0.03, 0.2)  # s
     off: float = 0.02  # share by which every value of the robot may be off its explained one

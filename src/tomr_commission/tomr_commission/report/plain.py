@@ -62,6 +62,7 @@ def fields(found: Commissioned) -> dict[str, Any]:
         "unexplained_share": outcome.explained["report"]["unexplained_share"],
         "levels": outcome.explained["levels"],
         "bands": asdict(outcome.bands),
+        "margin": found.margin,
         "regimes": [asdict(line) for line in found.regimes],
         "alarm": {
             "caution": level.caution,
