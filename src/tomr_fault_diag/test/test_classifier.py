@@ -160,6 +160,13 @@ def test_a_robot_that_has_not_been_told_anything_waits() -> None:
     assert stale.state is STALE
 
 
+def test_the_message_says_when_the_robot_was_commissioned() -> None:
+    robot, found = shipped_robot("reference"), _run((HEALTHY, 40))[-1]
+    for given, said in (("2026-03-01", "2026-03-01"), ("", "no: run tomr_commission")):
+        status = diagnosis_message(robot, found, "", given).statuses[0]
+        assert dict(status.values)["commissioned"] == said
+
+
 def test_a_clock_that_goes_back_starts_afresh() -> None:
     classifier = _classifier()
     for tick in range(100, 130):
