@@ -1,6 +1,7 @@
 """The command as a whole: files, verdicts, exit codes, resuming. The long steps are replaced."""
 
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from tomr_commission.cli import main
 from tomr_commission.commission import _observe
 from tomr_commission.rehearsal import Shoved
 from tomr_commission.trials import Trial
+from tomr_fault_diag.classifier.commissioned import commissioned_words
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_power_model.errors import InputError
@@ -45,11 +47,11 @@ def explained(**changes: object) -> dict[str, Any]:
     return {"report": report, "explained": "", "files": {"report.html": ""}, "levels": [level]}
 
 
-@pytest.fixture
-def steps(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Mock]]:
+@pytest.fixture(scope="module")
+def steps() -> Iterator[dict[str, Mock]]:
     """The long steps, done at once, and bands from drives as short as those of the repository."""
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")  # nor do processes have to be started
     with (
+        patch.dict(os.environ, OMP_NUM_THREADS="1"),  # nor do processes have to be started
         patch("tomr_fault_diag.residuals.calibrated._LEAST", 100),
         patch(f"{HERE}.explain_drives", return_value=explained()) as explain,
         patch(f"{HERE}.rehearse", return_value=Shoved((0.0,) * 60, (0.0,) * 20, 0.1)) as rehearse,
@@ -57,6 +59,14 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Mock]]:
         patch(f"{HERE}.try_injected", return_value=[FOUND]) as inject,
     ):
         yield {"inject": inject, "explain": explain, "rehearse": rehearse, "simulate": simulate}
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory, steps: dict[str, Mock]) -> Path:
+    """Results of a commissioning on one short drive."""
+    out = tmp_path_factory.mktemp("done")
+    assert run(out) == 1
+    return out
 
 
 def run(out: Path, *arguments: str) -> int:
@@ -69,65 +79,61 @@ def report(out: Path) -> dict[str, Any]:
     return found
 
 
-def test_short_drive_is_a_no_go_that_says_what_to_record(
-    tmp_path: Path, steps: dict[str, Mock]
-) -> None:
-    assert run(tmp_path) == 1
-    found = report(tmp_path)
+def test_short_drive_is_a_no_go_that_says_what_to_record(done: Path) -> None:
+    found = report(done)
     assert found["verdict"] == "no-go"
     assert [reason["remedy"] for reason in found["reasons"]] == [
         "record the drive of tomr_commission plan, and give it as well"
     ]
-    page = (tmp_path / "commission.html").read_text()
+    page = (done / "commission.html").read_text()
     assert "NO-GO" in page
     assert page.count("data:image/png") == 2
 
 
-def test_written_description_is_loaded_everywhere(tmp_path: Path, steps: dict[str, Mock]) -> None:
-    run(tmp_path)
-    written = tmp_path / "commissioned.yaml"
+def test_written_description_is_loaded_everywhere(done: Path) -> None:
+    written = done / "commissioned.yaml"
     assert load_robot(written) == shipped_robot("reference")
     settings = DiagnosisSettings.of(read_node_sections(written, NODES), str(written))
-    bands = report(tmp_path)["bands"]
+    bands = report(done)["bands"]
     assert settings.residuals.bands.power == pytest.approx(bands["power"])
-    assert settings.classifier.caution == report(tmp_path)["alarm"]["caution"]
-    assert settings.classifier.commissioned == report(tmp_path)["date"]
+    assert settings.classifier.caution == report(done)["alarm"]["caution"]
+    # A no-go is no commissioning.
+    assert commissioned_words(settings.classifier) == "no: run tomr_commission"
     assert settings.classifier.hardware_id == ClassifierSettings().hardware_id
 
 
-def test_values_changed_afterwards_are_refused(tmp_path: Path, steps: dict[str, Mock]) -> None:
-    run(tmp_path)
-    written = tmp_path / "commissioned.yaml"
-    written.write_text(written.read_text().replace("mass: 15.0", "mass: 16.0"))
+def test_values_changed_afterwards_are_refused(done: Path, tmp_path: Path) -> None:
+    text = (done / "commissioned.yaml").read_text()
+    written = tmp_path / "heavier.yaml"
+    written.write_text(text.replace("mass: 15.0", "mass: 16.0"))
     with pytest.raises(InputError, match=r"commissioned on .*run tomr_commission again"):
         load_robot(written)
 
 
 def test_commissioned_file_is_commissioned_again_from_its_description(
-    tmp_path: Path, steps: dict[str, Mock]
+    tmp_path: Path, done: Path
 ) -> None:
-    run(tmp_path / "first")
-    first = tmp_path / "first" / "commissioned.yaml"
-    bag = str(BAGS / "square")
-    main([bag, "--robot", str(first), "--out", str(tmp_path / "second"), "--quiet"])
+    bag, first = str(BAGS / "square"), done / "commissioned.yaml"
+    main([bag, "--robot", str(first), "--out", str(tmp_path), "--quiet"])
     one, other = (
-        yaml.safe_load((tmp_path / name / "commissioned.yaml").read_text())
-        for name in ("first", "second")
+        yaml.safe_load((folder / "commissioned.yaml").read_text()) for folder in (done, tmp_path)
     )
     assert one["/**"] == other["/**"]
     assert one["power_residuals"] == other["power_residuals"]
 
 
 def test_rerun_does_nothing_twice(tmp_path: Path, steps: dict[str, Mock]) -> None:
+    long = [steps[name] for name in ("explain", "rehearse", "simulate")]
+    before = [step.call_count for step in long]
     with patch(f"{HERE}._observe", side_effect=_observe) as observe:
         run(tmp_path)
         texts = (tmp_path / "commissioned.yaml").read_text()
         run(tmp_path)
-    long = [observe, *(steps[name] for name in ("explain", "rehearse", "simulate"))]
-    assert [step.call_count for step in long] == [1, 1, 1, 1]
+    assert observe.call_count == 1
+    assert [step.call_count - count for step, count in zip(long, before, strict=True)] == [1, 1, 1]
     assert (tmp_path / "commissioned.yaml").read_text() == texts
     run(tmp_path, "--tolerance", "0.02")
-    assert steps["explain"].call_count == 2
+    assert steps["explain"].call_count == before[0] + 2
 
 
 def test_what_is_left_far_above_the_noise_is_a_no_go(
@@ -135,8 +141,8 @@ def test_what_is_left_far_above_the_noise_is_a_no_go(
 ) -> None:
     left = explained(unexplained_share=0.5)
     left["levels"][0]["level"] = 12.0
-    steps["explain"].return_value = left
-    assert run(tmp_path) == 1
+    with patch(f"{HERE}.explain_drives", return_value=left):
+        assert run(tmp_path) == 1
     said = " ".join(reason["what"] for reason in report(tmp_path)["reasons"])
     assert "12.0 times the sensors' noise" in said
     assert "50 % of the mismatch" in said

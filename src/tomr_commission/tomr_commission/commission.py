@@ -31,6 +31,7 @@ from tomr_commission.store import Store, digest, fingerprint, write_atomically
 from tomr_commission.suspects import check_values, check_wheels
 from tomr_commission.trials import Floor, Trial, floors_of
 from tomr_commission.verdict import Outcome, Reason, reasons
+from tomr_fault_diag.classifier.commissioned import stamp_of
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.settings import BandSettings
@@ -316,6 +317,7 @@ def _text(
             for floor in floors
         },
         verdict="no-go" if against else "go",
+        stamp="" if against else stamp_of(date, work.classifier(described)),
     )
     sections = base_sections(request.robot, described)
     return commissioned_text(sections, outcome.bands, record, Path(request.robot).name)
