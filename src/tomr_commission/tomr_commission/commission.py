@@ -310,12 +310,7 @@ def _text(
         held_out=outcome.held.name,
         method="exponential tails of the classifier's evidence, real driving and simulated shoves",
         level=outcome.level,
-        floors={
-            floor.kind: "not found"
-            if floor.everywhere is None
-            else f"{floor.everywhere:g} {floor.unit}".strip()
-            for floor in floors
-        },
+        floors={floor.kind: floor.words for floor in floors},
         verdict="no-go" if against else "go",
         stamp="" if against else stamp_of(date, work.classifier(described)),
     )
