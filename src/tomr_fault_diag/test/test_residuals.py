@@ -190,6 +190,36 @@ def test_what_no_supply_can_deliver_is_no_sample() -> None:
         assert not frame.residuals[MOTORS[1]].stale
 
 
+@pytest.mark.parametrize(
+    ("topic", "bad"),
+    [
+        ("wheel_2/power", lambda t: _battery(t, 24.0, NAN)),
+        ("wheel_2/power", lambda t: _battery(t, 1e30, 1.0)),
+        ("battery_state", lambda t: _battery(t, NAN, -1.0)),
+        ("joint_states", lambda t: Message(header=_joints(t).header, name=None)),
+    ],
+)
+def test_an_input_that_sends_what_cannot_be_used_says_so(
+    topic: str, bad: Callable[[int], Any]
+) -> None:
+    robot = _robot()
+    stage = ResidualStage(robot)
+    takers = {item.topic: item.take for item in residual_inputs(robot, stage)}
+    said: dict[str, str] = {}
+    for step in range(150):
+        stamp = BASE + step * 10 * MS
+        if step % 5 == 0:
+            stage.prediction(_prediction(stamp))
+        for name, make in ALL.items():
+            is_bad = name == topic and step > 50
+            takers[name](bad(stamp) if is_bad else make(stamp), stamp)
+        stage.due()
+        for report in stage.reports():
+            said.update({status.name: status.message for status in report.statuses})
+    assert said.pop(f"inputs: {topic}") == "sends what cannot be used"
+    assert set(said.values()) == {"as it should be"}
+
+
 def test_an_angle_that_no_wheel_reaches_is_no_sample_unless_it_stays() -> None:
     def leaps(at: int, message: Any, until: int) -> Any:
         if 600 <= at < until:

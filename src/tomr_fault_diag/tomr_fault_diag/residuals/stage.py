@@ -23,7 +23,13 @@ from tomr_fault_diag.residuals.measured import Measured, SupplyWindow
 from tomr_fault_diag.residuals.repeats import RepeatWatch, Work
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_power_model.drive.plausible import PowerLimits, fastest_wheel
-from tomr_power_model.drive.sources import TOTAL, TOTAL_TOPIC, PowerReading, motor_topics
+from tomr_power_model.drive.sources import (
+    ARRAY_TOPIC,
+    TOTAL,
+    TOTAL_TOPIC,
+    PowerReading,
+    motor_topics,
+)
 from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.readings import NAN, UNKNOWN_READING
 from tomr_power_model.model.continuity import POWER_TOLERANCE, Continuity
@@ -145,6 +151,16 @@ class ResidualStage:
         elif arrival is Arrival.REPEATED:
             self._flows[supply].precedes(stamp)
         return arrival
+
+    def refused(self, topic: str) -> None:
+        """Take note of a message that nothing can be read from."""
+        if topic == ENCODERS:
+            self._encoders.continuity.refuse()
+        for supply, flow in zip(self._supplies, self._flows, strict=True):
+            if topic in (supply, f"{supply}/power") or (
+                topic == ARRAY_TOPIC and supply != TOTAL_TOPIC
+            ):
+                flow.refuse()
 
     def due(self) -> list[ResidualFrame]:
         """Residuals for the ticks that the stamps have reached, in order."""

@@ -43,6 +43,13 @@ class PowerLimits:
 
     def problem(self, reading: PowerReading) -> str | None:
         """Why a reading cannot be true, None if it can; what it does not say is not judged."""
+        wheel = reading.wheel
+        if (
+            self.dead <= reading.voltage <= self.voltage
+            and abs(reading.current) <= self.current[wheel]
+            and abs(reading.power) <= self.power[wheel]
+        ):
+            return None  # as nearly all are
         name = "the robot" if reading.wheel == TOTAL else f"motor {reading.wheel + 1}"
         if reading.voltage < self.dead:
             return f"{reading.voltage:.3g} V of {name} feeds nothing; the sample is ignored"

@@ -151,16 +151,13 @@ class EncoderWindow:
 
     def _leaps_to(self, sample: EncoderSample) -> bool:
         """Whether no wheel can have turned so far since the last sample, or turns so fast."""
-        if any(abs(speed) > self._fastest for speed in sample.velocity):
+        if _exceeds(sample.velocity, (0.0, 0.0, 0.0), self._fastest):
             return True
         if not self._samples:
             return False
         last = self._samples[-1]
         furthest = self._fastest * (1e-9 * (sample.stamp_ns - last.stamp_ns) + _LEEWAY)
-        return any(
-            abs(now - before) > furthest
-            for now, before in zip(sample.position, last.position, strict=True)
-        )
+        return _exceeds(sample.position, last.position, furthest)
 
     def at(self, tick_ns: int) -> WheelEstimate:
         """Estimate for the window that ends at a tick; NaN if its samples are missing or stale."""
@@ -236,6 +233,12 @@ class EncoderWindow:
                 line = _weights(_chosen(times, timed), 1) @ velocities[timed][:, [wheel]]
                 speed[wheel], acceleration[wheel] = line[0, 0], line[1, 0]
         return WheelEstimate(speed, acceleration, angle)
+
+
+def _exceeds(values: Triple, others: Triple, most: float) -> bool:
+    """Whether any two differ by more; NaN differs by nothing. Written out: it is asked often."""
+    (a, b, c), (x, y, z) = values, others
+    return abs(a - x) > most or abs(b - y) > most or abs(c - z) > most
 
 
 def _chosen(times: tuple[int, ...], which: NDArray[np.bool_]) -> tuple[int, ...]:

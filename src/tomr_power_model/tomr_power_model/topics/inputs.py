@@ -1,6 +1,7 @@
 """Which topics a stage reads and what it does with each message; nodes and tools share this."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from attrs import frozen
@@ -43,17 +44,23 @@ class Input:
     other_types: tuple[str, ...] = ()
 
 
-def guarded(take: Take) -> Callable[[Any, int], str | None]:
-    """Turn an unusable message or stamp into a complaint: no message may stop a stage."""
+def guarded(
+    take: Take, refused: Callable[[], None] = lambda: None
+) -> Callable[[Any, int], str | None]:
+    """Turn an unusable message or stamp into a complaint: no message may stop a stage.
+
+    `refused` is called for each message that nothing can be read from.
+    """
 
     def taken(message: Any, receive_ns: int) -> str | None:
         try:
-            arrival = take(message, receive_ns)
+            return _complaint(take(message, receive_ns))
         except Unusable as error:
-            return f"{error}; the message is ignored"
+            problem = f"{error}; the message is ignored"
         except MALFORMED as error:
-            return f"malformed ({error}); the message is ignored"
-        return _complaint(arrival)
+            problem = f"malformed ({error}); the message is ignored"
+        refused()
+        return problem
 
     return taken
 
@@ -100,17 +107,23 @@ def measured_inputs(
     encoders: Callable[[int, Triple, Triple], Arrival | str],
     power: Callable[[PowerReading], Arrival | str],
     wheels: WheelFinder | None = None,
+    *,
+    refused: Callable[[str], None] = lambda topic: None,
 ) -> tuple[Input, ...]:
-    """Inputs of a stage that takes encoders and power; `wheels` may be shared with another one."""
+    """Inputs of a stage that takes encoders and power; `wheels` may be shared with another one.
+
+    `refused` gets the topic of each message that nothing can be read from.
+    """
     take = _encoders(wheels or WheelFinder(robot.wheel_names), encoders)
     inputs = []
     for source in (*motor_topics(robot), *total_topics(robot)):
         if source.topic == ENCODER_TOPIC:
             take = _with_power(take, source, power)
         else:
-            taker = guarded(_power(source, power))
+            taker = guarded(_power(source, power), partial(refused, source.topic))
             inputs.append(Input(source.topic, source.type_name, taker))
-    return (Input(ENCODER_TOPIC, JOINT_STATE, guarded(take)), *inputs)
+    encoder_taker = guarded(take, partial(refused, ENCODER_TOPIC))
+    return (Input(ENCODER_TOPIC, JOINT_STATE, encoder_taker), *inputs)
 
 
 def _power(source: PowerTopic, power: Callable[[PowerReading], Arrival | str]) -> Take:
