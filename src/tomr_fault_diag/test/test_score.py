@@ -54,6 +54,13 @@ def test_delay_and_time_of_a_fault_named_right() -> None:
     assert found.healthy_seconds == pytest.approx(3.9)
 
 
+def test_naming_counts_for_half_a_second_after_the_end() -> None:
+    late = seen(track((8.4, "motor system fault 2", 2)), START, [FAULT], (0, 1))
+    assert one(late).delay == pytest.approx(4.4)
+    too_late = seen(track((8.6, "motor system fault 2", 2)), START, [FAULT], (0, 1))
+    assert math.isinf(one(too_late).delay)
+
+
 def test_another_wheel_is_another_fault() -> None:
     case = one(seen(track((4.3, "motor system fault 3", 3)), START, [FAULT], (0, 1)))
     assert math.isinf(case.delay)
@@ -127,6 +134,10 @@ def test_the_detection_floor_is_where_nine_of_ten_are_found() -> None:
     cases = [case("drag", math.inf if size < 0.35 else 0.5, size) for size in np.arange(1, 11) / 10]
     found = Scores((Seen(tuple(cases), (), 0.0, 0, 1),)).as_dict()
     assert found["detection_floor"]["drag"]["severity"] == pytest.approx(0.4)
+    lucky = [case("drag", 0.5 if size < 0.15 or size > 0.45 else math.inf, size)
+             for size in np.arange(1, 11) / 10]  # fmt: skip
+    found = Scores((Seen(tuple(lucky), (), 0.0, 0, 1),)).as_dict()
+    assert found["detection_floor"]["drag"]["severity"] == pytest.approx(0.5)
     never = Scores((Seen((case("drag", math.inf, 0.1), case("drag", math.inf, 0.2)), (), 0, 0, 1),))
     assert never.as_dict()["detection_floor"]["drag"]["severity"] is None
 
@@ -134,6 +145,7 @@ def test_the_detection_floor_is_where_nine_of_ten_are_found() -> None:
 def test_intervals_are_the_exact_ones() -> None:
     assert poisson_interval(0) == (0.0, pytest.approx(3.6889, abs=1e-4))  # -ln 0.025
     assert poisson_interval(3) == pytest.approx((0.6187, 8.7673), abs=1e-4)
+    assert poisson_interval(7) == pytest.approx((2.814, 14.423), abs=1e-3)
     assert binomial_interval(10, 10) == (pytest.approx(0.025**0.1), 1.0)
     assert binomial_interval(0, 10)[1] == pytest.approx(1 - 0.025**0.1)
 

@@ -133,6 +133,15 @@ def test_a_push_through_a_lever_turns_the_robot_anticlockwise(
     assert run.twist()[-1, 2] > 0.1
 
 
+def test_a_push_moves_the_robot_its_way(make_robot: MakeRobot, drive: Callable) -> None:
+    simulation = Simulation(make_robot({"physics.friction.coulomb.torque": 0.0}, ideal=True))
+    simulation.set_fault("drivers_off", severity=1.0)
+    simulation.set_fault("pushed", severity=1.0, azimuth=math.pi / 2.0)
+    run = drive(simulation, 0.3)
+    assert run.twist()[-1, 1] > 0.1
+    assert np.abs(run.twist()[-1, [0, 2]]) == pytest.approx(0.0, abs=0.02)
+
+
 def pushed_by(fault: str, body: BodyMotion, *before: BodyMotion, **settings: object) -> list[float]:
     """Force in the world [N, N] and moment [N m] of a fault on the body, after it has seen more."""
     board = FaultBoard()

@@ -164,7 +164,11 @@ def load_labels(path: Path) -> Labels:
 
 
 def recorded_labels(bag: Path, namespace: str | None = None) -> tuple[Label, ...] | None:
-    """What a simulator recorded beside a drive; None where it recorded nothing."""
+    """What a simulator recorded beside a drive; None where it recorded nothing.
+
+    A fault begins when something else was last true, so that no delay is flattered.
+    """
+    before = 0.0
     open_since: dict[str, dict[str, float]] = {}
     found: list[tuple[str, dict[str, float]]] = []
     with open_recording(bag) as recording:
@@ -178,10 +182,11 @@ def recorded_labels(bag: Path, namespace: str | None = None) -> tuple[Label, ...
                 state = open_since.get(status.name)
                 if values.get("active", 0.0) > 0.0:
                     if state is None or now - state["end"] > _MERGED:
-                        state = open_since[status.name] = {"onset": now}
+                        state = open_since[status.name] = {"onset": before}
                         found.append((status.name, state))
                     state.update({k: values[k] for k in ("wheel", "severity") if k in values})
                     state["end"] = now
+            before = now
     return tuple(simulated(str(bag), fault_id, values) for fault_id, values in found)
 
 
