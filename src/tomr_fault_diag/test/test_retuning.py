@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from importlib.resources import files
+from pathlib import Path
 
 import pytest
 import rclpy
@@ -70,3 +71,21 @@ def test_a_fault_is_cleared_by_service(node: StageNode) -> None:
     rclpy.spin_until_future_complete(node, answer, timeout_sec=10.0)
     assert answer.result().success
     assert answer.result().message == "no fault was named"
+
+
+def test_one_process_takes_the_sections_of_the_stages(tmp_path: Path) -> None:
+    reference = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml").read_text()
+    file = tmp_path / "robot.yaml"
+    file.write_text(
+        reference
+        + "power_residuals:\n  ros__parameters:\n    band.power: 2.2\n"
+        + "tomr_diagnosis:\n  ros__parameters:\n    recovery_time: 2.5\n"
+    )
+    rclpy.init(args=["--ros-args", "--params-file", str(file), "-p", "band.current:=0.3"])
+    node = DiagnosisNode([str(file)])
+    settings = node.pipeline.settings
+    node.destroy_node()
+    rclpy.shutdown()
+    assert settings.residuals.bands.power == 2.2
+    assert settings.residuals.bands.current == 0.3
+    assert settings.classifier.recovery_time == to_ns(2.5)
