@@ -85,7 +85,7 @@ def test_states_without_their_wheel() -> None:
         ("- {bag: a, severity: much}", "severity = 'much': give a number"),
         ("- {bag: a, observable: [[1.0]]}", "is no pair"),
         ("bag: a", "is no list of labels"),
-        ("- [", "mend the file"),
+        ("- [", "mend the YAML"),
         ("- 7", "is no mapping"),
     ],
 )
