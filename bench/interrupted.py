@@ -145,17 +145,20 @@ def power(wheel: int, at: float, make: Callable[[Any, Any], Any], length: float 
     return change
 
 
-def _frozen(message: Any, held: Any) -> Any:
+def frozen_sensor(message: Any, held: Any) -> Any:
+    """A sensor that repeats what it said at first."""
     message.voltage, message.current = held.voltage, held.current
     return message
 
 
-def _absurd(message: Any, _: Any) -> Any:
+def absurd(message: Any, _: Any) -> Any:
+    """What no sensor measures."""
     message.voltage = 1e30
     return message
 
 
-def _dead(message: Any, _: Any) -> Any:
+def dead(message: Any, _: Any) -> Any:
+    """A bus that answers with zeros."""
     message.voltage, message.current = 0.0, 0.0
     return message
 
@@ -205,10 +208,10 @@ def cases(placements: int) -> Iterator[Case]:
         yield Case("2 % lost, 5 ms, 1 s without power", worn, seed=seed)
     for at in places[::3]:
         for wheel in range(3):
-            yield Case("power frozen", power(wheel, at, _frozen))
-            yield Case("power reads zero", power(wheel, at, _dead))
-            yield Case("one sample of 1e30 V", power(wheel, at, _absurd, 0.015))
-            yield Case("1e30 V for good", power(wheel, at, _absurd))
+            yield Case("power frozen", power(wheel, at, frozen_sensor))
+            yield Case("power reads zero", power(wheel, at, dead))
+            yield Case("one sample of 1e30 V", power(wheel, at, absurd, 0.015))
+            yield Case("1e30 V for good", power(wheel, at, absurd))
             yield Case("unplugged", unplugged(wheel, at))
 
 

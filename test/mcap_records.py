@@ -4,8 +4,9 @@ import io
 import struct
 from collections.abc import Iterable
 
-from lz4.frame import LZ4FrameCompressor
-from rosbags.rosbag2 import storage_mcap
+from lz4.frame import LZ4FrameCompressor  # type: ignore[import-untyped]
+
+from tomr_power_model.recordings.bounds import zstd
 
 MAGIC = b"\x89MCAP0\r\n"
 MEGA = 1 << 20
@@ -74,7 +75,7 @@ def zeros(compression: str, size: int) -> bytes:
     block = bytes(MEGA)
     out = io.BytesIO()
     if compression == "zstd":
-        packer = storage_mcap.zstd.ZstdCompressor()
+        packer = zstd.ZstdCompressor()
         for _ in range(size // MEGA):
             out.write(packer.compress(block))
         out.write(packer.flush())

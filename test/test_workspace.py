@@ -128,7 +128,7 @@ def test_install_has_what_ros2_looks_for(package: Path) -> None:
     share = ROOT / "install" / package.name / "share"
     assert (share / "ament_index/resource_index/packages" / package.name).exists()
     expected = {"package.xml"}
-    for folder in ("launch/*.launch.py", "*/robots/*.yaml", "*/missions/*.yaml"):
+    for folder in ("launch/*.launch.py", "config/*", "*/robots/*.yaml", "*/missions/*.yaml"):
         expected |= {f"{file.parent.name}/{file.name}" for file in package.glob(folder)}
     installed = {
         str(file.relative_to(share / package.name))

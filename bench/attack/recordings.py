@@ -78,8 +78,8 @@ def damaged_file(dice: random.Random, folder: Path, base: Base) -> Attack:
         (bag / "metadata.yaml").unlink()
     tool, arguments = reading(dice, bag)
     # A flipped bit of sqlite3 may be a plausible value: there is nothing to know it by.
-    names = None if storage == "sqlite3" or victim.name == "metadata.yaml" else names
-    return Attack(tool, arguments, f"{kind} in {victim.suffix} of {storage}", names)
+    known = None if storage == "sqlite3" or victim.name == "metadata.yaml" else names
+    return Attack(tool, arguments, f"{kind} in {victim.suffix} of {storage}", known)
 
 
 def _numbers(message: Any, dice: random.Random) -> str:

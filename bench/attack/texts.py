@@ -1,6 +1,7 @@
 """Attacks on descriptions, missions, coefficients, weights, archives, options and command lines."""
 
 import io
+import math
 import random
 import tarfile
 from pathlib import Path
@@ -12,6 +13,7 @@ from mcap_records import MEGA, channel, chunk, closing, header, indexed, zeros
 from attack.case import HEALTHY, NUMBERS, ROOT, VALUES, Attack, Base, attack, reading
 from attack.recordings import write
 from tomr_power_model.effects import EFFECTS
+from tomr_power_model.robot.tables import ROBOT_PARAMETERS
 from tomr_power_model.wang2024.coefficients import Coefficients
 
 _ROBOTS = ROOT / "src/tomr_power_model/tomr_power_model/robots"
@@ -76,7 +78,7 @@ def described(dice: random.Random) -> tuple[str, str]:
         )
         if dice.random() < 0.4:
             effect = dice.choice(sorted(EFFECTS))
-            values = dict.fromkeys(EFFECTS[effect].parameters, 0.5)
+            values: dict[str, object] = dict.fromkeys(EFFECTS[effect].parameters, 0.5)
             values[dice.choice(sorted(values))] = number
             body["physics"][effect] = values
             said.append(f"{effect}: {number}")
@@ -90,9 +92,46 @@ def described(dice: random.Random) -> tuple[str, str]:
     return yaml.safe_dump(tree), ", ".join(said)
 
 
+def extreme(dice: random.Random) -> tuple[str, str]:
+    """A robot.yaml with numbers that are permitted, most of them at the ends of their ranges."""
+    tree = yaml.safe_load((_ROBOTS / "reference.yaml").read_text("utf-8"))
+    body = tree["/**"]["ros__parameters"]
+    said = []
+    specs = [spec for spec in ROBOT_PARAMETERS if spec.kind == "float"]
+    for spec in dice.sample(specs, dice.choice((1, 2, 4, 12))):
+        group, _, key = spec.name.partition(".")
+        body[group] = body.get(group, {}) if isinstance(body.get(group, {}), dict) else {}
+        body[group][key] = _within(spec.minimum, spec.maximum, dice)
+        said.append(f"{spec.name} = {body[group][key]:.3g}")
+    for effect in dice.sample(sorted(EFFECTS), dice.choice((0, 0, 1, 3))):
+        body["physics"][effect] = {
+            name: _within(item.minimum, item.maximum, dice)
+            for name, item in EFFECTS[effect].parameters.items()
+        }
+        said.append(effect)
+    return yaml.safe_dump(tree), ", ".join(said)
+
+
+def _within(low: float, high: float, dice: random.Random) -> float:
+    """A number of a range: an end, or any order of magnitude."""
+    if dice.random() < 0.3:
+        return dice.choice((low, high))
+    if low < 0.0:
+        return dice.uniform(low, high)
+    return math.exp(dice.uniform(math.log(max(low, 1e-6)), math.log(high)))
+
+
+@attack("extreme robots")
+def extremes(dice: random.Random, folder: Path, base: Base) -> Attack:
+    return _with_robot(dice, folder, base, *extreme(dice))
+
+
 @attack("robot.yaml")
 def descriptions(dice: random.Random, folder: Path, base: Base) -> Attack:
-    text, what = described(dice)
+    return _with_robot(dice, folder, base, *described(dice))
+
+
+def _with_robot(dice: random.Random, folder: Path, base: Base, text: str, what: str) -> Attack:
     path = folder / dice.choice(("robot.yaml", "<b>.yaml", "a\nb.yaml"))
     path.write_text(text, "utf-8", errors="surrogatepass")
     seconds = [raw for raw in base.healthy if raw.stamp_ns < base.healthy[0].stamp_ns + 3e9]
@@ -100,8 +139,8 @@ def descriptions(dice: random.Random, folder: Path, base: Base) -> Attack:
     if dice.random() < 0.25:
         mission = folder / "short.yaml"
         mission.write_text(_SHORT)
-        arguments = (str(mission), "--robot", str(path), "--out", str(folder / "out"), "--quiet")
-        return Attack("tomr_simulate", arguments, what)
+        options = ("--robot", str(path), "--out", str(folder / "out"), "--quiet")
+        return Attack("tomr_simulate", (str(mission), *options), what)
     tool, arguments = reading(dice, bag)
     given = [item for item in arguments if item != "reference"]
     if "--robot" in given:
@@ -205,7 +244,7 @@ _WORDS = {
 def command_lines(dice: random.Random, folder: Path, base: Base) -> Attack:
     tool = dice.choice(sorted(_WORDS))
     bag = write(folder / "bag", base.healthy[:600])
-    values = (
+    values: tuple[str, ...] = (
         *(str(bag), str(folder), "reference", "nowhere", "", "-", "/dev/null", "/dev/zero", "."),
         *("robot.mass", "robot.mass=0.1", "robot.mass=nan", "bag=0:1", "bag=9:1", "bag=inf:nan"),
         *("all", "-1", "1e308", "nan", "mcap", "a\nb", "\x1b[31m", "x" * 5000, str(folder / "new")),
@@ -266,7 +305,7 @@ def archives(dice: random.Random, folder: Path, base: Base) -> Attack:
         if dice.random() < 0.1:
             large = tarfile.TarInfo("zeros.csv")
             large.size = 700 * MEGA
-            tar.addfile(large, _Zeros())  # type: ignore[arg-type]
+            tar.addfile(large, _Zeros())
     if dice.random() < 0.3:
         packed = bytearray(archive.read_bytes())
         packed[dice.randrange(len(packed))] ^= 1 << dice.randrange(8)

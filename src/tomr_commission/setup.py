@@ -6,7 +6,7 @@ NAME = "tomr_commission"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="From healthy drives of one robot to a diagnosis with a measured false-alarm rate.",
     maintainer="TOMR maintainers",
     maintainer_email="maintainers@tomr.dev",

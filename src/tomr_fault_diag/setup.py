@@ -8,7 +8,7 @@ NAME = "tomr_fault_diag"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="Faults of a three-wheeled omni robot, told from the power of its motors.",
     maintainer="TOMR maintainers",
     maintainer_email="maintainers@tomr.dev",
@@ -20,6 +20,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/launch", sorted(glob("launch/*.launch.py"))),
+        (f"share/{NAME}/config", sorted(glob("config/*"))),
     ],
     install_requires=["setuptools"],
     extras_require={"test": ["pytest"]},

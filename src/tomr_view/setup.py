@@ -6,7 +6,7 @@ NAME = "tomr_view"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="The diagnosis of a robot in a browser, live or of a recording.",
     maintainer="TOMR maintainers",
     maintainer_email="maintainers@tomr.dev",

@@ -44,7 +44,7 @@ def bands_of(drives: Sequence[Observed], choice: BandChoice) -> BandSettings:
         if name in _MARGINED:
             values[name] *= choice.margin
         elif name.startswith("speed"):
-            values[name] *= choice.speed_margin
+            values[name] *= choice.speed_factor * choice.margin
     return evolve(fitted, **{name: float(f"{value:.4g}") for name, value in values.items()})
 
 

@@ -2,7 +2,6 @@
 
 import datetime
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from tomr_commission.evidence import decisions, evidence_in
 from tomr_commission.explained import FOLDER, Split, explain_drives
 from tomr_commission.injected import try_injected
 from tomr_commission.observed import Observed, frames_of, observe
+from tomr_commission.parallel import on_all_cores
 from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse
 from tomr_commission.request import CommissionRequest
 from tomr_commission.simulated import try_simulated
@@ -31,13 +31,13 @@ from tomr_commission.store import Store, digest, fingerprint, write_atomically
 from tomr_commission.suspects import check_values, check_wheels
 from tomr_commission.trials import Floor, Trial, floors_of
 from tomr_commission.verdict import Outcome, Reason, reasons
+from tomr_fault_diag.classifier.commissioned import stamp_of
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.drive.cut import names_of
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.drive.record import Drive
-from tomr_power_model.dynamics.simulation import worker_count
 from tomr_power_model.robot import load_robot, read_description, read_node_sections
 
 Progress = Callable[[str, float], None]
@@ -54,6 +54,7 @@ class Commissioned:
     outcome: Outcome
     reasons: tuple[Reason, ...]
     regimes: tuple[RegimeLine, ...]
+    margin: float  # of the bands
     shoved: Shoved
     plan: Rehearsal
     trials: tuple[Trial, ...]
@@ -72,6 +73,16 @@ class Commissioned:
         return "go" if self.is_go else "no-go"
 
 
+@frozen
+class Tuned:
+    """Bands, and the alarm level that they ask for."""
+
+    margin: float
+    bands: BandSettings
+    shoved: Shoved
+    level: AlarmLevel
+
+
 def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     """Run all steps that are not done yet. Raises InputError for what cannot be used."""
     work = _Work.begin(request, progress)
@@ -79,11 +90,9 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     described = work.description(explained)
     drives = work.observed(described)
     fitted, held = work.divided(drives)
-    bands = bands_of(fitted, request.bands)
-    classifier = work.classifier(described)
-    plan = Rehearsal()
-    shoved = work.rehearsed(described, bands, classifier, plan)
-    level = _level(request, fitted, bands, classifier, shoved, plan)
+    classifier, plan = work.classifier(described), Rehearsal()
+    tuned = work.tuned(described, fitted, classifier, plan)
+    bands, level = tuned.bands, tuned.level
     chosen = evolve(classifier, caution=level.caution)
     progress("validating", 0.85)
     said = [decisions(frames_of(drive, bands), chosen) for drive in (*fitted, held)]
@@ -101,7 +110,8 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
         outcome=outcome,
         reasons=against,
         regimes=tuple(regime_table(fitted, bands)),
-        shoved=shoved,
+        margin=tuned.margin,
+        shoved=tuned.shoved,
         plan=plan,
         trials=tuple(trials),
         floors=tuple(floors),
@@ -177,8 +187,7 @@ class _Work:
             if one is None
         ]
         if jobs:
-            with ProcessPoolExecutor(min(worker_count(), len(jobs))) as pool:
-                made = {drive.name: drive for drive in pool.map(_observe, jobs)}
+            made = {drive.name: drive for drive in on_all_cores(_observe, jobs)}
             for name, drive in made.items():
                 self.store.keep(f"drive_{name}", key, drive)
             kept = [
@@ -204,6 +213,25 @@ class _Work:
         settings = DiagnosisSettings.of(given, self.request.robot).classifier
         return evolve(settings, classifier="window", caution=ClassifierSettings().caution)
 
+    def tuned(
+        self,
+        described: Path | None,
+        fitted: Sequence[Observed],
+        settings: ClassifierSettings,
+        plan: Rehearsal,
+    ) -> Tuned:
+        """The narrowest bands with which false alarms can be as rare as wanted."""
+        choice, share = self.request.bands, 0.55
+        while True:
+            self.progress("simulating healthy hours", share)
+            bands = bands_of(fitted, choice)
+            shoved = self.rehearsed(described, bands, settings, plan)
+            level = _level(self.request, fitted, bands, settings, shoved, plan)
+            wider = choice.wider * choice.margin
+            if level.needed <= choice.most_caution or wider > choice.widest:
+                return Tuned(choice.margin, bands, shoved, level)
+            choice, share = evolve(choice, margin=wider), min(share + 0.07, 0.8)
+
     def rehearsed(
         self,
         described: Path | None,
@@ -212,12 +240,12 @@ class _Work:
         plan: Rehearsal,
     ) -> Shoved:
         """Simulated shoves."""
-        self.progress("simulating healthy hours", 0.55)
         source, usage = str(self.source(described)), self.usage()
         parts = (self.key, sorted(read_description(source).items()), bands, settings, usage, plan)
+        key = digest(map(repr, parts))
         held = self.store.values(
-            "rehearsed",
-            digest(map(repr, parts)),
+            f"rehearsed_{key}",
+            key,
             lambda: asdict(rehearse(source, bands, settings, usage, plan)),
         )
         return Shoved(tuple(held["peaks"]), tuple(held["between"]), held["hours"])
@@ -282,13 +310,9 @@ def _text(
         held_out=outcome.held.name,
         method="exponential tails of the classifier's evidence, real driving and simulated shoves",
         level=outcome.level,
-        floors={
-            floor.kind: "not found"
-            if floor.everywhere is None
-            else f"{floor.everywhere:g} {floor.unit}".strip()
-            for floor in floors
-        },
+        floors={floor.kind: floor.words for floor in floors},
         verdict="no-go" if against else "go",
+        stamp="" if against else stamp_of(date, work.classifier(described)),
     )
     sections = base_sections(request.robot, described)
     return commissioned_text(sections, outcome.bands, record, Path(request.robot).name)

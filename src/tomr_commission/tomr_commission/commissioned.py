@@ -28,6 +28,7 @@ class Record:
     level: AlarmLevel
     floors: Mapping[str, str]  # smallest size found, by fault
     verdict: str
+    stamp: str  # for the status of the classifier; empty: it is not commissioned
 
 
 def suite_version() -> str:
@@ -57,7 +58,7 @@ def commissioned_text(
     )
     # Evidence in decades is the window classifier's.
     classifier = merged.setdefault(CLASSIFIER, {})
-    classifier.update(classifier="window", caution=record.level.caution, commissioned=record.date)
+    classifier.update(classifier="window", caution=record.level.caution, commissioned=record.stamp)
     merged[COMMISSIONING] = {
         DATE: record.date,
         "version": suite_version(),

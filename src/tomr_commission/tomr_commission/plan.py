@@ -1,7 +1,5 @@
 """The drive to record for a commissioning: a mission file, and what to see to."""
 
-from typing import cast
-
 import yaml
 
 from tomr_power_model.effects.base import Phase
@@ -44,7 +42,7 @@ def mission_text(robot: Robot, top_speed: float) -> str:
         "description": "Headings, speeds, spins, starts, stops and rest.",
         "phases": phases,
     }
-    return cast(str, yaml.dump(mission, Dumper=_Plain, sort_keys=False, default_flow_style=None))
+    return yaml.dump(mission, Dumper=_Plain, sort_keys=False, default_flow_style=None)
 
 
 class _Plain(yaml.SafeDumper):

@@ -6,7 +6,6 @@ drive. Simulated in the power model's own dynamics, which also train the classif
 """
 
 import math
-from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 
 import numpy as np
@@ -15,10 +14,10 @@ from numpy.typing import NDArray
 
 from tomr_commission.evidence import evidence_in
 from tomr_commission.observed import Observed, frames_of
+from tomr_commission.parallel import on_all_cores
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.frame import RESIDUALS, SPEEDS
 from tomr_fault_diag.residuals.settings import BandSettings
-from tomr_power_model.dynamics.simulation import worker_count
 from tomr_power_model.robot import Robot, load_robot
 from tomr_sim_bridge.missions.mission import Mission
 from tomr_sim_bridge.missions.schema import RandomPhase, TwistPhase
@@ -61,7 +60,7 @@ class Usage:
 class Rehearsal:
     """How the simulated hours are made."""
 
-    shoves: int = 600
+    shoves: int = 390
     force: tuple[float, float] = (0.5, 3.0)  # N per kg of the robot
     duration: tuple[float, float] = (0.03, 0.2)  # s
     off: float = 0.02  # share by which every value of the robot may be off its explained one
@@ -85,9 +84,8 @@ def rehearse(
     """Drive a described robot and shove it, on all cores; the result depends on arguments alone."""
     count = math.ceil(plan.shoves / _PER_DRIVE)
     jobs = [(robot, bands, settings, usage, plan, _SEED + index) for index in range(count)]
-    _one(jobs[0])  # compiled before the processes start
-    with ProcessPoolExecutor(worker_count()) as pool:
-        parts = list(pool.map(_one, jobs, chunksize=_CHUNK))
+    _one(jobs[0])  # compiled before processes start
+    parts = on_all_cores(_one, jobs, _CHUNK)
     return Shoved(
         tuple(peak for peaks, _, _ in parts for peak in peaks),
         tuple(between for _, between, _ in parts),

@@ -17,7 +17,10 @@ class BandChoice:
 
     within: float = WITHIN  # share of the healthy residuals of the fitting drives inside
     margin: float = 1.5  # on top, for what other days and floors bring
-    speed_margin: float = 3.0  # of wheel speeds: loops of real drivers are not known as well
+    speed_factor: float = 2.0  # margin of speeds over that: drivers' loops are not known as well
+    wider: float = 1.7  # times as wide, again and again, while alarms by shoves are too many
+    widest: float = 8.0  # margin
+    most_caution: float = 25.0  # decades that may be needed before bands are made wider
 
 
 @frozen

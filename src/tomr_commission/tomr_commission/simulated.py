@@ -1,16 +1,14 @@
 """Faults of the explained robot in MuJoCo: what cannot be put into recordings honestly."""
 
-from concurrent.futures import ProcessPoolExecutor
-
 from attrs import frozen
 
 from tomr_commission.evidence import decisions
 from tomr_commission.observed import Observed, frames_of
+from tomr_commission.parallel import on_all_cores
 from tomr_commission.rehearsal import Usage, robot_of
 from tomr_commission.trials import Trial, first_alarm, smallest_found
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.settings import BandSettings
-from tomr_power_model.dynamics.simulation import worker_count
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_sim_bridge.faults import all_parameters
 from tomr_sim_bridge.missions.mission import Mission
@@ -95,8 +93,7 @@ def try_simulated(
     Raises InputError for a robot that MuJoCo cannot do.
     """
     jobs = [(robot, bands, settings, usage, case) for case in cases()]
-    with ProcessPoolExecutor(worker_count()) as pool:
-        return [trial for trials in pool.map(_tried, jobs) for trial in trials]
+    return [trial for trials in on_all_cores(_tried, jobs) for trial in trials]
 
 
 _Job = tuple[str, BandSettings, ClassifierSettings, Usage, SimulatedCase]

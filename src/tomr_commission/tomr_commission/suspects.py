@@ -33,8 +33,8 @@ _LEAST_SAMPLES = 200
 _LEAST_LENGTH = 0.05  # (rad/s)/(m/s): a wheel that answers to nothing
 _OFF = 0.3  # relative error of the answers as described from which on something is wrong
 _FITS = 0.12  # and with the mistake mended
-_POWER_OFF = 0.4  # NRMSE of power as described from which on a value is taken for grossly wrong
-_POWER_BETTER = 0.4  # part of it that mending must leave, at most
+_POWER_OFF = 0.3  # NRMSE of power from which on a value may be grossly wrong; mended it is less
+_POWER_BETTER = 0.5  # part of it that mending must leave, at most
 _ALIKE = 1.4  # mistakes whose error is within this factor of the least are named together
 
 
@@ -56,7 +56,10 @@ def check_wheels(drives: Sequence[Drive], robot: Robot, place: str) -> None:
     error = _distance(seen, expected)
     if error < _OFF:
         return
-    best = min(_mistaken(robot, expected), key=lambda answer: _distance(seen, answer.matrix))
+    # Of mistakes that look alike the first is the likeliest.
+    best = min(
+        _mistaken(robot, expected), key=lambda answer: round(_distance(seen, answer.matrix), 3)
+    )
     if _distance(seen, best.matrix) < _FITS:
         raise InputError(
             f"{place}: {best.mistake}: encoders against commands are {100 * error:.0f} % off as "
@@ -119,10 +122,10 @@ def _mistaken(robot: Robot, expected: Array) -> Iterator[_Answer]:
         angle = math.radians(degrees)
         turned = expected.copy()
         turned[:, :2] = expected[:, :2] @ _rotation(angle)
-        right = math.remainder(robot.wheel_offset + angle, 2.0 * math.pi)
+        offset = round(math.remainder(robot.wheel_offset + angle, 2.0 * math.pi), 4) + 0.0
         yield _Answer(
             f"the wheels stand {degrees} degrees further around than described",
-            f"write robot.wheel_offset: {right:.4f}",
+            f"write robot.wheel_offset: {offset:g}",
             turned,
         )
     for axis, what in ((1, "linear.y"), (2, "angular.z")):
@@ -176,9 +179,9 @@ def check_values(drive: Drive, values: Mapping[str, object], place: str) -> None
     robots = [robot, *(_changed(values, key, factor, place) for key, factor in tried)]
     errors = [_error(simulation, row) for row in simulation.predict(robots)]
     described, others = errors[0], errors[1:]
-    if not others or described < _POWER_OFF or min(others) > _POWER_BETTER * described:
+    least = min(others, default=described)
+    if described < _POWER_OFF or least > min(_POWER_OFF, _POWER_BETTER * described):
         return
-    least = min(others)
     alike = sorted(
         (error, key, factor)
         for error, (key, factor) in zip(others, tried, strict=True)
@@ -212,7 +215,7 @@ def _changed(values: Mapping[str, object], key: str, factor: float, place: str) 
 def _error(simulation: RecordingSimulation, row: Array) -> float:
     """RMS of measured - simulated over the spread, of everything that is drawn."""
     errors = [
-        float(np.mean((channel.value - row[part]) ** 2) / max(np.var(channel.value), 1e-12))
+        float(np.mean((channel.value - row[part]) ** 2) / max(float(np.var(channel.value)), 1e-12))
         for channel, part in zip(simulation.channels, rows_of(simulation.channels), strict=True)
         if channel.kind in DRAWN_KINDS
     ]

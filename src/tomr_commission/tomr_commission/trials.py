@@ -50,6 +50,20 @@ class Floor:
     delay: float | None  # s, median of all that were found
     called: str
 
+    @property
+    def words(self) -> str:
+        """The smallest size that is found at every wheel; one that has no size is just found."""
+        if self.everywhere is None:
+            return "not found at every wheel" if self.somewhere is not None else "not found"
+        return f"{self.everywhere:g} {self.unit}" if self.unit else "found"
+
+    @property
+    def best(self) -> str:
+        """That at the wheel where it is seen best."""
+        if self.somewhere is None:
+            return "not found"
+        return f"{self.somewhere:g} {self.unit}" if self.unit else "found"
+
 
 def floors_of(trials: Sequence[Trial]) -> list[Floor]:
     """Detection floors by kind."""

@@ -22,7 +22,7 @@ from tomr_power_model.drive.cut import skips_of
 from tomr_power_model.drive.excitation import check_excitation
 from tomr_power_model.drive.quality import Finding, refuse, sensor_faults
 from tomr_power_model.drive.record import Drive
-from tomr_power_model.errors import InputError
+from tomr_power_model.errors import InputError, one_line
 from tomr_power_model.estimation.parameter import Values
 from tomr_power_model.files import write_together
 from tomr_power_model.robot import (
@@ -254,9 +254,9 @@ def _print(result: Result, notes: Sequence[str]) -> None:
     if not result.held_out:
         notes = [*notes, "no --holdout: the figures are those of the fitted drives"]
     for text in (*notes, *result.notes):
-        console.print(f"note: {text}", markup=False)
+        console.print(f"note: {one_line(text)}", markup=False)
     for text in result.warnings:
-        console.print(f"warning: {text}", markup=False, style="yellow")
+        console.print(f"warning: {one_line(text)}", markup=False, style="yellow")
 
 
 def _table(*headings: str) -> Table:

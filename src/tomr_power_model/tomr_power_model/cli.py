@@ -11,6 +11,7 @@ import signal
 import sys
 import threading
 import traceback
+import warnings
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import NoReturn
@@ -40,7 +41,11 @@ def run_main(main: Main, arguments: Sequence[str] | None = None) -> int:
     _prepare_streams()
     _end_cleanly_on_signals()
     try:
-        code = main(arguments)
+        with warnings.catch_warnings():
+            if not (os.environ.get(DEBUG) or sys.warnoptions):
+                # Of numpy and others, on what nobody can mend who runs a command.
+                warnings.simplefilter("ignore")
+            code = main(arguments)
         sys.stdout.flush()
         return code
     except InputError as error:

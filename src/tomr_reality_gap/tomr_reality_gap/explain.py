@@ -1,12 +1,13 @@
 """From recordings to an explanation: align, compare, name, model, show."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
 from tomr_power_model.estimation.noise import rows_of
+from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.response import controller_alternatives
 from tomr_reality_gap.alignment.simulation import Run
 from tomr_reality_gap.analysis import AnalysisResult, residuals_of
@@ -71,11 +72,9 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
     found = named(dataset)
     check_same_robot(dataset, found.rounds[-1])
     effect, plain = _unmodelled(dataset, found, ready), None
-    if effect is not None:  # names are sought once more, beside it
-        plain, dataset = dataset, _with_term(dataset, found, effect)
-        found = named(dataset)
-        effect = refitted(_remainder(plain, found), effect, found.best.model.described.robot)
-        dataset = _with_term(plain, found, effect)
+    if effect is not None:
+        plain = dataset
+        dataset, found, effect = _beside(plain, found, effect, named)
     baseline = SimulatorBaseline.of(ready.simulations, dataset, found.noise, base.robot)
     if effect is not None and baseline is not None and baseline.shows(effect):
         effect, dataset, plain = None, plain or dataset, None
@@ -96,8 +95,49 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
     )
 
 
-def _remainder(dataset: Dataset, found: Selection) -> Remainder:
-    jacobian = linearise(dataset, found.best.model, ())
+def _beside(
+    plain: Dataset, found: Selection, effect: Unmodelled, named: Callable[[Dataset], Selection]
+) -> tuple[Dataset, Selection, Unmodelled]:
+    """Names sought once more, beside an unnamed term, and the term fitted anew beside them.
+
+    Names that only stood in for the term have bent it: fitted without any, it comes first, if
+    fewer names then leave less.
+    """
+    if found.best.model.hypotheses:
+        tried = _settled(plain, _refitted(plain, found.without.model, effect), named)
+        names = [len(item.best.model.hypotheses) for item in (found, tried[1])]
+        sigma = tried[1].noise.sigma
+        left = [_left(data, item, sigma) for data, item in ((plain, found), tried[:2])]
+        if names[1] < names[0] and left[1] < left[0]:
+            return tried
+    return _settled(plain, effect, named, found.best.model)
+
+
+def _settled(
+    plain: Dataset,
+    effect: Unmodelled,
+    named: Callable[[Dataset], Selection],
+    model: Model | None = None,
+) -> tuple[Dataset, Selection, Unmodelled]:
+    """Recordings with a term, the names beside it, and the term as fitted beside these."""
+    robot = plain.simulations[0].robot if model is None else model.described.robot
+    found = named(_with_term(plain, robot, effect))
+    effect = _refitted(plain, found.best.model, effect)
+    return _with_term(plain, found.best.model.described.robot, effect), found, effect
+
+
+def _refitted(plain: Dataset, model: Model, effect: Unmodelled) -> Unmodelled:
+    return refitted(_remainder(plain, model), effect, model.described.robot)
+
+
+def _left(dataset: Dataset, found: Selection, sigma: Array) -> float:
+    """Sum of squares that a selection leaves, in units of a noise."""
+    value = dataset.predict([found.best.model.described.robot])[0]
+    return float((((dataset.value - value) / sigma) ** 2).sum())
+
+
+def _remainder(dataset: Dataset, model: Model) -> Remainder:
+    jacobian = linearise(dataset, model, ())
     return Remainder.of(dataset, jacobian.value, np.asarray(jacobian.matrix, dtype=np.float64))
 
 
@@ -109,7 +149,8 @@ def _unmodelled(dataset: Dataset, found: Selection, ready: Prepared) -> Unmodell
     if size < _LITTLE:
         return None
     gross = is_doubted(share, size, bool(found.best.model.hypotheses))
-    effect = unmodelled_effect(_remainder(dataset, found), robot, ready.scales, is_sure=gross)
+    rest = _remainder(dataset, found.best.model)
+    effect = unmodelled_effect(rest, robot, ready.scales, is_sure=gross)
     cost = finding_cost(len(dataset.value))
     named = found.best.evidence - found.without.evidence
     if effect is None or gross:
@@ -117,8 +158,7 @@ def _unmodelled(dataset: Dataset, found: Selection, ready: Prepared) -> Unmodell
     return effect if effect.is_large and is_unmodelled(effect.evidence, named, cost) else None
 
 
-def _with_term(dataset: Dataset, found: Selection, effect: Unmodelled) -> Dataset:
-    robot = found.best.model.described.robot
+def _with_term(dataset: Dataset, robot: Robot, effect: Unmodelled) -> Dataset:
     return Dataset(tuple(with_terms(item, robot, (effect.term,)) for item in dataset.simulations))
 
 

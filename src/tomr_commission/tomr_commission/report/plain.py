@@ -25,10 +25,11 @@ def lines(found: Commissioned) -> list[str]:
         f"{len(outcome.held_said.alarms)} false alarms, "
         f"{100 * decided_share(outcome.held_said):.0f} % of the time decided",
     ]
+    said.append("smallest size found:")
     for floor in found.floors:
-        size = "not found" if floor.everywhere is None else f"{floor.everywhere:g} {floor.unit}"
         delay = "" if floor.delay is None else f", after {floor.delay:.2f} s"
-        said.append(f"found from {size.strip()} on: {floor.kind}{delay}; called {floor.called}")
+        name = f"; called {floor.called}" if floor.called else ""
+        said.append(f"  {floor.kind}: {floor.words}{delay}{name}")
     return said
 
 
@@ -62,6 +63,7 @@ def fields(found: Commissioned) -> dict[str, Any]:
         "unexplained_share": outcome.explained["report"]["unexplained_share"],
         "levels": outcome.explained["levels"],
         "bands": asdict(outcome.bands),
+        "margin": found.margin,
         "regimes": [asdict(line) for line in found.regimes],
         "alarm": {
             "caution": level.caution,

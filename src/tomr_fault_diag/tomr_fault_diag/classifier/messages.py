@@ -25,7 +25,7 @@ NAME = "fault_classifier: drive"
 
 
 def diagnosis_message(
-    robot: Robot, diagnosis: Diagnosis, hardware_id: str, commissioned: str = ""
+    robot: Robot, diagnosis: Diagnosis, hardware_id: str, commissioned: str = "no"
 ) -> DiagnosticMessage:
     """The message of one diagnosis: state, since when, probabilities, evidence."""
     seconds, rest = divmod(diagnosis.since_ns, NANOSECONDS)
@@ -35,7 +35,7 @@ def diagnosis_message(
     values.append(("not_observable", ", ".join(diagnosis.unseen.words)))
     for state, share in zip(STATES, diagnosis.probabilities, strict=False):
         values.append((f"p {state.name}", f"{share:.4f}"))
-    values.append(("commissioned", commissioned or "no: run tomr_commission"))
+    values.append(("commissioned", commissioned))
     evidence = evidence_of(robot, diagnosis)
     values.extend((f"evidence {number}", text) for number, text in enumerate(evidence, start=1))
     status = Status(

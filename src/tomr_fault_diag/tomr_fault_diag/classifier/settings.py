@@ -35,7 +35,12 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
         "speeds_first",
         choices=tuple(INPUT_ORDERS),
     ),
-    _S("commissioned", "when tomr_commission set this robot's bands and caution", "str", ""),
+    _S(
+        "commissioned",
+        "when tomr_commission set bands and caution, and with which weights",
+        "str",
+        "",
+    ),
     HARDWARE_ID,
     _S("evidence_weight", "of window: what one window counts", "float", 0.4, "", 0.01, 1.0),
     _S(

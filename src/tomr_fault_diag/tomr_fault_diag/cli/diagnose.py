@@ -12,6 +12,7 @@ from attrs import evolve
 from tqdm import tqdm
 
 from tomr_fault_diag.diagnosis.bags import find_bags, is_bag
+from tomr_fault_diag.diagnosis.key_table import summaries
 from tomr_fault_diag.diagnosis.labels import RECORDED, Labels, load_labels
 from tomr_fault_diag.diagnosis.replayed import (
     Failed,
@@ -23,7 +24,6 @@ from tomr_fault_diag.diagnosis.replayed import (
     write_page,
 )
 from tomr_fault_diag.diagnosis.settings import (
-    PARAMETERS,
     STAGE_NODES,
     DiagnosisSettings,
     parse_assignments,
@@ -102,7 +102,7 @@ def _parser() -> argparse.ArgumentParser:
         help="a parameter; --parameters lists them",
     )
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
-    parser.add_argument("--parameters", action=_ListParameters, help="list all parameters")
+    parser.add_argument("--parameters", action=_ListParameters, help="list all keys of robot.yaml")
     return parser
 
 
@@ -113,8 +113,8 @@ class _ListParameters(argparse.Action):
         super().__init__(option_strings, dest, nargs=0, help=help)
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        for spec in PARAMETERS.values():
-            print(spec.summary)
+        for line in summaries():
+            print(line)
         parser.exit()
 
 

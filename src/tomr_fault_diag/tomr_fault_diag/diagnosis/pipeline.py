@@ -9,6 +9,7 @@ from typing import Any
 
 from attrs import frozen
 
+from tomr_fault_diag.classifier.commissioned import commissioned_words
 from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
@@ -63,6 +64,7 @@ class Pipeline:
         self._predictor = PowerPredictor(robot, settings.model, is_compiled=compiled)
         self._residuals = ResidualStage(robot, settings.residuals)
         self._classifier = FaultClassifier(make_judge(settings.classifier))
+        self._commissioned = commissioned_words(settings.classifier)
         wheels = WheelFinder(robot.wheel_names)
         self.inputs: tuple[Input, ...] = (
             *model_inputs(robot, self._predictor, wheels),
@@ -108,12 +110,11 @@ class Pipeline:
 
     def messages(self, step: Step) -> Iterator[Outgoing]:
         """The messages that the nodes publish at such a step."""
-        classifier = self.settings.classifier
-        hardware_id = classifier.hardware_id
+        hardware_id = self.settings.classifier.hardware_id
         for prediction in step.predictions:
             yield from prediction_messages(self.robot, prediction)
         for frame in step.frames:
             yield residual_message(self.robot, frame, hardware_id)
         for diagnosis in step.diagnoses:
-            yield diagnosis_message(self.robot, diagnosis, hardware_id, classifier.commissioned)
+            yield diagnosis_message(self.robot, diagnosis, hardware_id, self._commissioned)
         yield from step.reports

@@ -6,6 +6,7 @@ from typing import Any
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from tomr_fault_diag.classifier.commissioned import commissioned_words
 from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.messages import TOPIC, diagnosis_message
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
@@ -38,6 +39,7 @@ class FaultClassifierNode(StageNode):
     def __init__(self) -> None:
         super().__init__("fault_classifier", CLASSIFIER_PARAMETERS)
         self.classifier = FaultClassifier(make_judge(ClassifierSettings.of(self.values)))
+        self._commissioned = commissioned_words(self.classifier.settings)
         self.offer(TOPIC, DiagnosticMessage)
         self.listen([Input(RESIDUALS, DIAGNOSTICS, guarded(self._take))], self._advance, STAGE_QOS)
         self.on_change(self._retune)
@@ -47,12 +49,8 @@ class FaultClassifierNode(StageNode):
         frame = frame_of(message, stamp_of(message, receive_ns))
         diagnosis = self.classifier.classify(frame)
         if diagnosis is not None:
-            settings = self.classifier.settings
-            self.send(
-                diagnosis_message(
-                    self._robot, diagnosis, settings.hardware_id, settings.commissioned
-                )
-            )
+            hardware_id = self.classifier.settings.hardware_id
+            self.send(diagnosis_message(self._robot, diagnosis, hardware_id, self._commissioned))
 
     def _retune(self, values: Mapping[str, object]) -> None:
         self.classifier.settings = ClassifierSettings.of(values)

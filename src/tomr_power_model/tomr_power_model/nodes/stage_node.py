@@ -5,6 +5,8 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import rclpy
@@ -37,9 +39,17 @@ _SIGNAL_CHECK_S = 0.2  # the longest that a signal waits while no message comes
 
 @cache
 def message_class(type_name: str) -> Any:
-    """The Python class of a message type such as sensor_msgs/msg/JointState."""
-    package, _, name = type_name.split("/")
-    return getattr(import_module(f"{package}.msg"), name)
+    """The Python class of a message type such as sensor_msgs/msg/JointState.
+
+    The name may come from a recording: what is no package of messages is not imported. Raises
+    ImportError, AttributeError or ValueError.
+    """
+    package, kind, name = type_name.split("/")
+    found = find_spec(package) if package.isidentifier() else None
+    folders = (found.submodule_search_locations or ()) if found else ()
+    if kind != "msg" or not any(Path(folder, kind).is_dir() for folder in folders):
+        raise ImportError(f"no messages of {package!r} are installed")
+    return getattr(import_module(f"{package}.{kind}"), name)
 
 
 def to_ros(plain: Plain) -> Any:

@@ -4,6 +4,7 @@ Beyond its table it fades to nothing within one knot's distance: it says nothing
 been.
 """
 
+import math
 from itertools import product
 
 import numpy as np
@@ -14,6 +15,8 @@ from tomr_power_model.unmodelled.base import UNITS, Family
 from tomr_power_model.unmodelled.motion import Motion
 
 Array = NDArray[np.float64]
+
+_ROUNDING = 1e-9
 
 
 @frozen
@@ -52,23 +55,25 @@ class LearntTerm:
         coordinates, factor = self.family.coordinates(motion), self.family.factor(motion)
         factor = np.broadcast_to(factor, (n, wheels))
         if self.family.acts == "force":
-            basis = basis_at(self.family, self.knots, coordinates[:, 0])
-            torque = motion.resisting(*(basis @ component for component in self.values))
+            pushes = [self._at(component, coordinates[:, 0]) for component in self.values]
+            torque = motion.resisting(pushes[0], pushes[1])
         elif self.family.acts == "supply":
-            basis = basis_at(self.family, self.knots, coordinates[:, 0])
-            supply = factor[:, 0] * (basis @ self.values[0])
+            supply = factor[:, 0] * self._at(self.values[0], coordinates[:, 0])
         else:
             found = torque if self.family.acts == "torque" else driver
             for wheel, values in zip(self.wheels, self.values, strict=True):
                 place = min(wheel, coordinates.shape[1] - 1)
-                basis = basis_at(self.family, self.knots, coordinates[:, place])
-                found[:, wheel] = factor[:, wheel] * (basis @ values)
+                found[:, wheel] = factor[:, wheel] * self._at(values, coordinates[:, place])
         return Actions(torque, driver, supply)
+
+    def _at(self, values: Array, at: Array) -> Array:
+        return value_at(self.family, self.knots, values, at)
 
     def outside(self, motion: Motion) -> float:
         """Share of a drive that lies beyond the table."""
+        ones = np.ones(math.prod(len(points) for points in self.knots))
         found = [
-            basis_at(self.family, self.knots, column).sum(axis=1) < 1.0 - 1e-9
+            self._at(ones, column) < 1.0 - _ROUNDING
             for column in np.moveaxis(self.family.coordinates(motion), 1, 0)
         ]
         return float(np.mean(found))
@@ -76,35 +81,47 @@ class LearntTerm:
 
 def basis_at(family: type[Family], knots: tuple[Array, ...], at: Array) -> Array:
     """Weights of a table's values at some coordinates (m, axes), (m, k): the last axis fastest."""
-    parts = [
-        _hats(points, at[:, number], axis.is_periodic)
-        for number, (axis, points) in enumerate(zip(family.axes, knots, strict=True))
-    ]
-    if len(parts) == 1:
-        return parts[0]
-    first, second = parts
-    return np.asarray((first[:, :, None] * second[:, None, :]).reshape(len(at), -1))
+    found = np.zeros((len(at), math.prod(len(points) for points in knots)))
+    for index, weight in _corners(family, knots, at):
+        np.add.at(found, (np.arange(len(at)), index), weight)
+    return found
 
 
-def _hats(knots: Array, at: Array, is_periodic: bool) -> Array:
-    """Hat functions of even knots, (m, k); a periodic axis is closed, another one fades."""
-    count, found = len(knots), np.zeros((len(at), len(knots)))
-    rows = np.arange(len(at))
+def value_at(family: type[Family], knots: tuple[Array, ...], values: Array, at: Array) -> Array:
+    """A table (k,) at some coordinates (m, axes), (m,)."""
+    return np.asarray(sum(weight * values[index] for index, weight in _corners(family, knots, at)))
+
+
+def _corners(
+    family: type[Family], knots: tuple[Array, ...], at: Array
+) -> list[tuple[NDArray[np.intp], Array]]:
+    """The knots around some coordinates, as indices into the table, with their weights, (m,)."""
+    found = [(np.zeros(len(at), dtype=np.intp), np.ones(len(at)))]
+    for number, (axis, points) in enumerate(zip(family.axes, knots, strict=True)):
+        sides = _beside(points, at[:, number], axis.is_periodic)
+        found = [
+            (index * len(points) + own, weight * part)
+            for index, weight in found
+            for own, part in sides
+        ]
+    return found
+
+
+def _beside(
+    knots: Array, at: Array, is_periodic: bool
+) -> tuple[tuple[NDArray[np.intp], Array], tuple[NDArray[np.intp], Array]]:
+    """The two knots beside each value with their weights; beyond the last one they fade."""
+    count = len(knots)
     if is_periodic:
         place = np.mod(at, 2.0 * np.pi) * count / (2.0 * np.pi)
-        low = np.floor(place).astype(np.intp) % count
-        share = place - np.floor(place)
-        found[rows, low] = 1.0 - share
-        found[rows, (low + 1) % count] += share
-        return found
+        low = np.floor(place).astype(np.intp)
+        share = place - low
+        return (low % count, 1.0 - share), ((low + 1) % count, share)
     place = (at - knots[0]) / (knots[1] - knots[0])
     inside = np.clip(place, 0.0, count - 1.0)
     low = np.minimum(np.floor(inside).astype(np.intp), count - 2)
-    share = inside - low
-    fade = np.clip(1.0 - np.abs(place - inside), 0.0, 1.0)
-    found[rows, low] = (1.0 - share) * fade
-    found[rows, low + 1] = share * fade
-    return found
+    share, fade = inside - low, np.clip(1.0 - np.abs(place - inside), 0.0, 1.0)
+    return (low, (1.0 - share) * fade), (low + 1, share * fade)
 
 
 def smoothness(family: type[Family], knots: tuple[Array, ...], length: float) -> Array:

@@ -15,6 +15,7 @@ from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 
 _STAND_INS = 4  # alternatives that are tried for each finding
 _SWAPS = 3  # at most
+_FRICTION = ("friction.coulomb", "friction.viscous")
 
 
 def backward_elimination(
@@ -34,9 +35,11 @@ def backward_elimination(
         count = len(best.model.hypotheses)
         fewer = [(best.model.without(number), best.sensors) for number in range(count)]
         shorter = refine(dataset, fewer, jacobian, noise, tick=tick)
-        cost = _cost(dataset, found, best)
-        gains = [_worth(best, cost) - _worth(item, cost) for item in shorter]
-        weakest = int(np.argmax(-np.array(gains)))
+        gains = [
+            _worth(best, cost) - _worth(item, cost)
+            for item, cost in zip(shorter, _costs(dataset, found, best), strict=True)
+        ]
+        weakest = int(np.argmin(gains))
         if gains[weakest] > 0.0:
             break
         best = shorter[weakest]
@@ -54,6 +57,19 @@ def backward_elimination(
 
 def _cost(dataset: Dataset, found: Selection, best: FittedModel) -> float:
     return finding_cost(len(dataset.value), best.evidence - found.without.evidence)
+
+
+def _costs(dataset: Dataset, found: Selection, best: FittedModel) -> list[float]:
+    """What each finding must bring; friction's two parts at one place count as one finding."""
+    usual, least = _cost(dataset, found, best), finding_cost(len(dataset.value))
+    parts = [item for item in best.model.hypotheses if item.effect in _FRICTION]
+    return [
+        least
+        if any(one is not item and one.where == item.where for one in parts)
+        and item.effect in _FRICTION
+        else usual
+        for item in best.model.hypotheses
+    ]
 
 
 def _worth(item: FittedModel, cost: float) -> float:

@@ -23,8 +23,10 @@ Array = NDArray[np.float64]
 _AS_WELL = 0.9  # of what the table explains
 _LISTED = 3
 _TINY = 1e-9
+_NEGLIGIBLE = 1e-6  # of the largest eigenvalue
+_POSITIVE = ("slack", "radius", "decay")
 _BEYOND = 1.0  # of the range, on either side, that a law is trusted beyond the table
-_FINER = 2  # knots of a law's table for each of the learnt one
+_FINER = 4  # knots of a law's table for each of the learnt one
 
 
 @frozen
@@ -196,19 +198,46 @@ class Evidence:
     inflation: float  # variance of what is left, correlation included, over that of the noise
 
 
-def laws_of(
-    table: Table, term: LearntTerm, evidence: Evidence
-) -> list[tuple[FittedLaw, LearntTerm]]:
-    """Laws that explain about as much as the table, simplest first, with tables of their own."""
-    units = np.concatenate([np.linalg.solve(table.root, values) for values in term.values])
-    whole = _explained(units, evidence)
-    found = []
-    for law in LAWS:
-        if table.family.family_id in law.families and whole > 0.0:
-            fitted = _fitted(law, table, term, evidence)
-            if fitted is not None and fitted[0].share > _AS_WELL:
-                found.append(fitted)
-    found.sort(key=lambda pair: len(pair[0].parameters) - 20.0 * pair[0].share)
+@frozen
+class LawAt:
+    """A law with its parameters."""
+
+    law: Law
+    parameters: Array
+    sigma: Array  # their standard deviations
+    share: float  # of what the table explains
+    table: Table
+    learnt: LearntTerm
+
+    @property
+    def term(self) -> LearntTerm:
+        """The law as a table that reaches farther than what was learnt, and is finer."""
+        pairs = zip(self.table.knots, self.table.family.axes, strict=True)
+        knots = tuple(_farther(points, axis.is_periodic) for points, axis in pairs)
+        at, learnt = _places(knots), self.learnt
+        values = np.atleast_2d(self.law.value(self.parameters, at))
+        rows = np.broadcast_to(values, (len(learnt.values), len(at)))
+        return LearntTerm(learnt.family, learnt.wheels, knots, np.array(rows))
+
+    @property
+    def fitted(self) -> FittedLaw:
+        """As a report has it."""
+        variable, estimates = self.table.family.axes[0].unit, {}
+        for (name, unit), value, sigma in zip(
+            self.law.units.items(), self.parameters.tolist(), self.sigma.tolist(), strict=True
+        ):
+            value = abs(value) if name in _POSITIVE else value
+            unit = {"*": self.learnt.unit, "variable": variable}.get(unit, unit)
+            estimates[name] = Estimate(value, value - 1.96 * sigma, value + 1.96 * sigma, unit)
+        return FittedLaw(self.law.name, self.law.words, estimates, self.share)
+
+
+def laws_of(table: Table, learnt: LearntTerm, evidence: Evidence) -> list[LawAt]:
+    """Laws that explain about as much as the table, simplest first."""
+    known = [law for law in LAWS if table.family.family_id in law.families]
+    found = [item for law in known if (item := _fitted(law, table, learnt, evidence)) is not None]
+    found = [item for item in found if item.share > _AS_WELL]
+    found.sort(key=lambda item: len(item.parameters) - 20.0 * item.share)
     return found[:_LISTED]
 
 
@@ -216,12 +245,10 @@ def _explained(units: Array, evidence: Evidence) -> float:
     return float(2.0 * units @ evidence.vector - units @ evidence.matrix @ units)
 
 
-def _fitted(
-    law: Law, table: Table, term: LearntTerm, evidence: Evidence
-) -> tuple[FittedLaw, LearntTerm] | None:
-    at, count = _places(table.knots), len(term.values)
+def _fitted(law: Law, table: Table, learnt: LearntTerm, evidence: Evidence) -> LawAt | None:
+    at, count = _places(table.knots), len(learnt.values)
     values, vectors = np.linalg.eigh(evidence.matrix)
-    kept = values > 1e-6 * values.max()
+    kept = values > _NEGLIGIBLE * values.max()
     root = np.sqrt(values[kept])
     target = (vectors[:, kept].T @ evidence.vector) / root
     inverse = np.linalg.inv(table.root)
@@ -233,39 +260,23 @@ def _fitted(
     def misfit(p: Array) -> Array:
         return np.asarray(root * (vectors[:, kept].T @ units_at(p)) - target)
 
-    best = None
-    for start in law.starts(at, term.values):
-        tried = least_squares(misfit, start, x_scale=np.abs(start) + 0.1, max_nfev=60)
-        best = tried if best is None or tried.cost < best.cost else best
-    if best is None:
+    tried = [
+        least_squares(misfit, start, x_scale=np.abs(start) + 0.1, max_nfev=60)
+        for start in law.starts(at, learnt.values)
+    ]
+    if not tried:
         return None
-    p = np.asarray(best.x)
-    units = np.concatenate([np.linalg.solve(table.root, item) for item in term.values])
-    share = _explained(units_at(p), evidence) / max(_explained(units, evidence), _TINY)
+    best = min(tried, key=lambda item: float(item.cost))
+    p = np.asarray(best.x, dtype=np.float64)
+    whole = _explained((learnt.values @ inverse.T).ravel(), evidence)
+    share = _explained(units_at(p), evidence) / max(whole, _TINY)
     covariance = np.linalg.pinv(best.jac.T @ best.jac) * evidence.inflation
-    half = 1.96 * np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    axis = table.family.axes[0]
-    parameters = {}
-    for (name, unit), value, wide in zip(law.units.items(), p.tolist(), half, strict=True):
-        unit = {"*": term.unit, "variable": axis.unit}.get(unit, unit)
-        value = abs(value) if name in ("slack", "radius", "decay") else value
-        parameters[name] = Estimate(value, value - float(wide), value + float(wide), unit)
-    return FittedLaw(law.name, law.words, parameters, share), _as_term(law, p, table, term)
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return LawAt(law, p, sigma, share, table, learnt)
 
 
 def _places(knots: Sequence[Array]) -> Array:
     return np.array(list(product(*knots)), dtype=np.float64)
-
-
-def _as_term(law: Law, p: Array, table: Table, term: LearntTerm) -> LearntTerm:
-    """The law as a table that reaches farther than what was learnt."""
-    knots = tuple(
-        _farther(points, axis.is_periodic)
-        for points, axis in zip(table.knots, table.family.axes, strict=True)
-    )
-    at = _places(knots)
-    rows = np.broadcast_to(np.atleast_2d(law.value(p, at)), (len(term.values), len(at)))
-    return LearntTerm(term.family, term.wheels, knots, np.array(rows))
 
 
 def _farther(points: Array, is_periodic: bool) -> Array:

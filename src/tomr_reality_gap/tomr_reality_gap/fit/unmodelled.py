@@ -22,6 +22,7 @@ from tomr_reality_gap.explanation import FittedLaw, Shape
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.laws import Evidence, laws_of
 from tomr_reality_gap.fit.learnt import Table, motion_in
+from tomr_reality_gap.fit.polish import polished
 
 Array = NDArray[np.float64]
 
@@ -178,8 +179,11 @@ def families_tried(
 
 def refitted(rest: Remainder, effect: Unmodelled, robot: Robot) -> Unmodelled:
     """The same term, fitted anew to what another model leaves."""
-    motions = [motion_in(item, robot) for item in rest.dataset.simulations]
-    return fitted(rest, Tried(effect.table, effect.share), robot, motions)
+    motions, table = [motion_in(item, robot) for item in rest.dataset.simulations], effect.table
+    stretch, moment = rest.blocks
+    columns = table.columns(rest.dataset, robot, motions)
+    share = predicted_share(rest, columns, moment if table.family.is_event else stretch)
+    return fitted(rest, Tried(table, share), robot, motions)
 
 
 def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]) -> Unmodelled:
@@ -203,17 +207,30 @@ def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]
     ]
     joined = np.concatenate(chosen, axis=1)
     own, term = joined @ np.concatenate(units), table.term(units, tuple(numbers) * at_wheels)
-    laws = laws_of(table, term, _normal_equations(rest, joined, left))
+    equations, change = _normal_equations(rest, joined, left), own / rest.weight
+    laws, simulated = laws_of(table, term, equations), term
+    if laws:
+        first, change = polished(
+            laws[0],
+            rest.dataset,
+            robot,
+            motions,
+            residual=rest.residual,
+            base=rest.base,
+            weight=rest.weight,
+            inflation=equations.inflation,
+        )
+        laws, simulated = [first, *laws[1:]], first.term
     return Unmodelled(
         table,
         term,
-        tuple(law for law, _ in laws),
-        laws[0][1] if laws else term,
+        tuple(law.fitted for law in laws),
+        simulated,
         best.share,
         not table.family.is_event or bool(laws),
         _evidence(rest.dataset, alone, left),
-        _is_large(rest.dataset, own / rest.weight),
-        own / rest.weight,
+        _is_large(rest.dataset, change),
+        change,
         np.stack(sigma),
     )
 
