@@ -45,6 +45,8 @@ def test_episodes_do_not_overlap_and_tell_since_when(capsys: pytest.CaptureFixtu
 def test_a_folder_is_all_its_recordings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "bad").mkdir()
     (tmp_path / "bad" / "bad.mcap").write_bytes(b"no recording")
+    (tmp_path / ".half.part").mkdir()
+    (tmp_path / ".half.part" / "half.mcap").write_bytes(b"")
     (tmp_path / "good").symlink_to(HEALTHY)
     code, found, err = run(capsys, tmp_path, FAULTY, "--jobs", 2)
     assert code == 2
@@ -124,8 +126,8 @@ def test_pages_need_nothing_beside_them(tmp_path: Path, capsys: pytest.CaptureFi
     page.feed(text)
     assert page.fetched == []
     assert "url(" not in text
-    # Truth, two phases; probability, total, and for each wheel five panels.
-    assert page.counts["svg"] == 3 + 2 + 3 * 5
+    # Truth, two phases; six inputs; probability, total, and for each wheel five panels.
+    assert page.counts["svg"] == 3 + 6 + 2 + 3 * 5
     assert "motor system fault 3 at" in text
     values = json.loads(re.findall(r'id="data">(.*?)</script>', text)[0])
     assert len(values["values"]) == 17

@@ -40,6 +40,7 @@ from tomr_fault_diag.diagnosis.words import (
 )
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_MISMATCH, EXIT_OK, run_main
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import make_folder
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.robot import load_robot, read_node_sections, shipped_robots
 
@@ -145,6 +146,7 @@ def _tasks(options: argparse.Namespace) -> list[Task]:
     labels = load_labels(Path(options.labels)) if is_file else Labels(())
     pages: Sequence[Path | None] = [None] * len(bags)
     if options.html is not None:
+        make_folder(options.html)  # before hours of work
         pages = pages_for(options.html, bags)
     return [
         evolve(task, bag=bag, page=page, labels=labels.of(bag))

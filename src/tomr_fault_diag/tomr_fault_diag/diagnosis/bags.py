@@ -14,8 +14,13 @@ def is_bag(path: Path) -> bool:
     return any(f.name == "metadata.yaml" or f.suffix in FILE_SUFFIXES for f in path.iterdir())
 
 
+def _is_hidden(path: Path) -> bool:
+    return any(part.startswith(".") for part in path.parts)
+
+
 def find_bags(paths: Iterable[Path]) -> list[Path]:
-    """The recordings, with those in folders at any depth, each once.
+    """The recordings, with those in folders at any depth, each once, hidden ones left out: a
+    recorder may be at work there.
 
     Raises InputError for a folder without any.
     """
@@ -24,7 +29,11 @@ def find_bags(paths: Iterable[Path]) -> list[Path]:
         if is_bag(path):
             found[path] = None
             continue
-        inside = sorted(f for f in path.rglob("*") if f.is_dir() and is_bag(f))
+        inside = sorted(
+            folder
+            for folder in path.rglob("*")
+            if folder.is_dir() and not _is_hidden(folder.relative_to(path)) and is_bag(folder)
+        )
         if not inside:
             raise InputError(
                 f"{path} holds no recording; give a rosbag2 folder, or a folder of them"

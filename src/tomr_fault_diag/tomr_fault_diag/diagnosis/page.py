@@ -16,10 +16,10 @@ from tomr_fault_diag.diagnosis.labels import Label, split_state
 from tomr_fault_diag.diagnosis.replayed import Failed, Replayed
 from tomr_fault_diag.diagnosis.summary import UNDECIDED
 from tomr_fault_diag.diagnosis.svg import HEIGHT, Panel, area, line, reach, scaled
-from tomr_fault_diag.diagnosis.track import Track
+from tomr_fault_diag.diagnosis.track import Health, Track
 from tomr_fault_diag.diagnosis.words import notes, score_lines, seconds, total_line, verdict
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL
-from tomr_power_model.messages.plain import NANOSECONDS
+from tomr_power_model.messages.plain import NANOSECONDS, Level
 
 Array = NDArray[np.float64]
 
@@ -27,6 +27,12 @@ INDEX = "index.html"
 _MOST_BANDS = 6.0  # of a residual's panel
 _MOST_READ = 12_000  # ticks whose values can be read under the pointer
 _NORMAL_COLOUR = "#69b578"
+_LEVEL_COLOURS = {
+    Level.OK: "#d5ead9",
+    Level.WARN: "#f77f00",
+    Level.ERROR: "#d62828",
+    Level.STALE: "#90a4ae",
+}
 _QUIET_COLOURS = {
     "not observable in this motion": "#cfd8dc",
     "waiting": "#e6e9ec",
@@ -88,6 +94,7 @@ def time_line(
     ms = (first.stamp_ns - start) / 1e6
     strips = [_said(track, start, number, len(tracks)) for number, track in enumerate(tracks)]
     strips = [*_true(labels, start, length), *strips]
+    inputs = [_input(topic, changes, start, length) for topic, changes in first.inputs.items()]
     panels = _panels(first, ms, wheels) if len(ms) else []
     step = -(-len(ms) // _MOST_READ) if len(ms) else 1
     data = {
@@ -101,6 +108,7 @@ def time_line(
         title=found.task.bag.name,
         verdict=verdict(found),
         strips=strips,
+        inputs=inputs,
         legend=_legend(strips),
         panels=panels,
         height=HEIGHT,
@@ -165,6 +173,22 @@ def _true(labels: Sequence[Label], start_ns: int, length: int) -> list[Strip]:
         wheel = f" {label.wheel}" if label.wheel else ""
         bars.append(_bar(f"{label.state}{wheel}", round(1000 * label.onset), end, label.title))
     return [Strip("true", tuple(bars))]
+
+
+def _input(topic: str, changes: Sequence[Health], start_ns: int, length: int) -> Strip:
+    """How an input did, one bar for as long as its level stood."""
+    ms = [(change.stamp_ns - start_ns) // 1_000_000 for change in changes]
+    bars = [
+        Bar(
+            f"{topic}: {change.words}, {begin / 1000:.2f} to {end / 1000:.2f} s",
+            begin,
+            max(1, end - begin),
+            _LEVEL_COLOURS[change.level],
+            change.level != Level.OK,
+        )
+        for change, begin, end in zip(changes, ms, [*ms[1:], length], strict=True)
+    ]
+    return Strip(topic, tuple(bars))
 
 
 def _bar(state: str, begin: int, end: int, title: str = "") -> Bar:

@@ -100,6 +100,8 @@ class _Listener:
         for frame in step.frames:
             self._summariser.frame(frame)
             self._tracker.frame(frame)
+        for report in step.reports:
+            self._tracker.report(report)
 
     def phase(self, share: float) -> Phase:
         return Phase(share, self._summariser.summary())

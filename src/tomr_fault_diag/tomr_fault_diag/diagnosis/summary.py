@@ -5,11 +5,17 @@ from collections import Counter
 from attrs import evolve, field, frozen
 
 from tomr_fault_diag.classifier.stage import Diagnosis
-from tomr_fault_diag.classifier.states import FAULTLESS, NOT_OBSERVABLE, STALE, WAITING
+from tomr_fault_diag.classifier.states import (
+    FAULTLESS,
+    NOT_ENOUGH,
+    NOT_OBSERVABLE,
+    STALE,
+    WAITING,
+)
 from tomr_fault_diag.residuals.frame import RESIDUALS, ResidualFrame
 
 # States in which nothing was decided, not even that all is well.
-UNDECIDED = frozenset({NOT_OBSERVABLE.name, STALE.name, WAITING.name, "not enough data"})
+UNDECIDED = frozenset({NOT_OBSERVABLE.name, STALE.name, WAITING.name, NOT_ENOUGH.name})
 
 
 @frozen

@@ -1,5 +1,6 @@
 """What the diagnosis said tick by tick, and what it said it from."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +9,8 @@ from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.stage import Diagnosis
 from tomr_fault_diag.residuals.frame import RESIDUALS, ResidualFrame
+from tomr_power_model.messages.outgoing import DiagnosticMessage
+from tomr_power_model.messages.plain import Level
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
@@ -20,6 +23,14 @@ class Said(NamedTuple):
     wheel: int
 
 
+class Health(NamedTuple):
+    """How an input does from a stamp [ns] on."""
+
+    stamp_ns: int
+    level: Level
+    words: str
+
+
 @frozen
 class Track:
     """A recording in n ticks."""
@@ -30,6 +41,7 @@ class Track:
     residual: Array  # measured - modelled, (n, 10)
     band: Array  # (n, 10)
     modelled: Array  # (n, 10)
+    inputs: Mapping[str, tuple[Health, ...]] = field(factory=dict)  # each change, by topic
 
 
 @define
@@ -43,6 +55,7 @@ class Tracker:
     _states: list[Said] = field(factory=list)
     _probabilities: list[float] = field(factory=list)
     _rows: list[list[tuple[float, float, float]]] = field(factory=list)
+    _inputs: dict[str, list[Health]] = field(factory=dict)
 
     def diagnosis(self, diagnosis: Diagnosis, probability: float) -> None:
         """Note a diagnosis and the probability of its state; its frame comes after it."""
@@ -60,6 +73,13 @@ class Tracker:
             self._probabilities.append(self._probability)
             self._rows.append([(r.residual, r.band, r.modelled) for r in frame.residuals])
 
+    def report(self, message: DiagnosticMessage) -> None:
+        """Note how inputs do; only a change of the level counts."""
+        for status in message.statuses if self.detail else ():
+            changes = self._inputs.setdefault(status.name.removeprefix("inputs: "), [])
+            if not changes or changes[-1].level != status.level:
+                changes.append(Health(message.stamp_ns, status.level, status.message))
+
     def track(self) -> Track:
         """All that was gathered."""
         rows = np.array(self._rows, dtype=np.float64).reshape(-1, RESIDUALS, 3)
@@ -70,4 +90,5 @@ class Tracker:
             rows[..., 0],
             rows[..., 1],
             rows[..., 2],
+            {topic: tuple(changes) for topic, changes in self._inputs.items()},
         )
