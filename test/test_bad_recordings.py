@@ -85,7 +85,7 @@ def _unclosed_sqlite(drive: list[Raw], folder: Path) -> Path:
             writer.write_raw(m.topic, m.type_name, m.data, m.stamp_ns)
         left = folder / "killed"
         left.mkdir()
-        for file in (folder / "recorder").iterdir():
+        for file in folder.glob(".recorder.*/recorder/*"):
             shutil.copy(file, left / file.name)
     return left
 
