@@ -37,7 +37,7 @@ MANIFESTS := $(wildcard $(addprefix src/*/,package.xml setup.py setup.cfg resour
 LINKED := $(sort $(MANIFESTS) $(wildcard src/*/launch/*.launch.py \
     $(addprefix src/*/tomr_*/,robots/*.yaml missions/*.yaml weights/*)))
 
-.PHONY: help setup demo test attack audit lint format bench figures train bags clean FORCE
+.PHONY: help setup demo test attack audit lint format bench docs figures train bags clean FORCE
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -81,6 +81,9 @@ bench: setup ## measure CPU, latency and offline speed, as ratios (not a test)
 
 figures: .venv/training ## draw the figures of docs/experiments.md anew (installs torch)
 	$(BIN)/python bench/experiments.py all --out docs/figures
+
+docs: setup ## write the table of keys in docs/keys.md anew
+	$(BIN)/python -m tomr_fault_diag.diagnosis.key_table > docs/keys.md
 
 train: .venv/training ## train the classifier anew, in five minutes (installs torch)
 	$(BIN)/tomr_train --out src/tomr_fault_diag/tomr_fault_diag/weights/window.npz $(ARGS)

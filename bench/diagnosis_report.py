@@ -6,9 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from tomr_fault_diag.classifier.states import STATES
+from tomr_fault_diag.diagnosis.score import poisson_interval
 
 Codes = NDArray[np.int64]
 
@@ -135,12 +135,6 @@ def _by_state(onsets: Sequence[Onset]) -> dict[str, dict[str, float | int | None
         state.name: _delays([onset for onset in onsets if STATES[onset.state] is state])
         for state in STATES[1:]
     }
-
-
-def poisson_interval(count: int) -> tuple[float, float]:
-    """Exact 95 % interval of the mean of which a count is one sample."""
-    low = float(chi2.ppf(0.025, 2 * count)) / 2.0 if count else 0.0
-    return low, float(chi2.ppf(0.975, 2 * count + 2)) / 2.0
 
 
 def _alarms(outcomes: Sequence[Outcome]) -> dict[str, object]:

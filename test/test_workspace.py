@@ -38,6 +38,7 @@ LIBRARIES = {
     "rosbags": ("python3-rosbags-pip", "rosbags"),
     "scipy": ("python3-scipy", "scipy"),
     "tqdm": ("python3-tqdm", "tqdm"),
+    "websockets": ("python3-websockets", "websockets"),
     "yaml": ("python3-yaml", "PyYAML"),
 }
 # What no package.xml can name: requirements-train.txt.
@@ -127,7 +128,7 @@ def test_install_has_what_ros2_looks_for(package: Path) -> None:
     share = ROOT / "install" / package.name / "share"
     assert (share / "ament_index/resource_index/packages" / package.name).exists()
     expected = {"package.xml"}
-    for folder in ("launch/*.launch.py", "*/robots/*.yaml", "*/missions/*.yaml"):
+    for folder in ("launch/*.launch.py", "config/*", "*/robots/*.yaml", "*/missions/*.yaml"):
         expected |= {f"{file.parent.name}/{file.name}" for file in package.glob(folder)}
     installed = {
         str(file.relative_to(share / package.name))
@@ -199,13 +200,28 @@ def test_imports_are_declared(package: Path) -> None:
                 assert requirement in pinned, f"{file} imports {name}: not in requirements.txt"
 
 
-@each_package("tomr_power_model", "tomr_fault_diag", "tomr_reality_gap", "tomr_sim_bridge")
+@each_package(
+    "tomr_power_model", "tomr_fault_diag", "tomr_reality_gap", "tomr_sim_bridge", "tomr_view"
+)
 def test_only_nodes_import_rclpy(package: Path) -> None:
     allowed = {"nodes", "cli"}
     for file in (package / package.name).rglob("*.py"):
         inside = file.relative_to(package / package.name).parts
         if inside[0] not in allowed and not file.name.endswith("_node.py"):
             assert not [name for name in imports(file) if name.split(".")[0] == "rclpy"], file
+
+
+@pytest.mark.parametrize(
+    "node", ["power_model", "power_residuals", "fault_classifier", "diagnosis"]
+)
+def test_nodes_import_nothing_large(node: str) -> None:
+    """Each would add seconds and tens of megabytes to a node on a small computer."""
+    package = "tomr_power_model" if node == "power_model" else "tomr_fault_diag"
+    program = f"import {package}.nodes.{node}_node, sys; print(*sys.modules)"
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert not {"scipy", "numba", "matplotlib", "rosbags", "torch"} & set(run.stdout.split())
 
 
 def test_launch_files_start_commands_that_exist() -> None:
@@ -218,7 +234,7 @@ def test_launch_files_start_commands_that_exist() -> None:
                 named = [given.get("package"), given.get("executable")]
                 if all(isinstance(value, ast.Constant) for value in named):
                     started.add(tuple(value.value for value in named))
-    nodes = {"power_model", "power_residuals", "fault_classifier", "sim_bridge"}
+    nodes = {"power_model", "power_residuals", "fault_classifier", "tomr_diagnosis", "sim_bridge"}
     assert {command for _, command in started} == nodes
     assert started <= known
 
@@ -231,7 +247,7 @@ def test_launch_files_name_files_that_are_installed() -> None:
                 case ast.List([ast.Call(ast.Name("FindPackageShare"), [package]), *rest]):
                     name, *parts = (ast.literal_eval(part) for part in (package, *rest))
                     named.add(ROOT.joinpath("install", name, "share", name, *parts))
-    assert {file.name for file in named} == {"diagnosis.launch.py", "reference.yaml"}
+    assert {file.name for file in named} == {"diagnosis.launch.py"}
     assert all(file.is_file() for file in named)
 
 

@@ -12,7 +12,7 @@ from stages import as_arrays, pipeline_of, steps_of
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.stage import Diagnosis
-from tomr_fault_diag.classifier.states import DISOBEYS, NOT_OBSERVABLE, WAITING
+from tomr_fault_diag.classifier.states import NOT_ENOUGH, NOT_OBSERVABLE, STALE, STATES, WAITING
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, ResidualFrame
 from tomr_power_model.model.ticks import NANOSECONDS
 
@@ -20,12 +20,12 @@ Array = NDArray[np.float64]
 Change = tuple[float, str, int | None]  # stamp [s], state, wheel 1..3
 
 JOBS = 2
-# The score knows no state of a robot that does not follow: none of its faults is known.
+# What the score knows no state for is none of the faults that it knows.
 _SCORED = {
     NOT_OBSERVABLE.name: "not_observable",
-    DISOBEYS.name: "unknown",
-    WAITING.name: "stale",
+    **dict.fromkeys((WAITING.name, STALE.name, NOT_ENOUGH.name), "stale"),
 }
+_SIX = frozenset(state.name for state in STATES)
 
 
 @frozen
@@ -75,7 +75,9 @@ def changes_of(diagnoses: Iterable[Diagnosis]) -> tuple[Change, ...]:
 
 def scored_name(state: str) -> str:
     """A state of the suite as the score calls it: `motor system fault 2` is motor_system_2."""
-    return _SCORED.get(state, state.replace(" fault", "").replace(" ", "_"))
+    if state not in _SIX:
+        return _SCORED.get(state, "unknown")
+    return state.replace(" fault", "").replace(" ", "_")
 
 
 def play_all(

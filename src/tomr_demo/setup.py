@@ -8,7 +8,7 @@ NAME = "tomr_demo"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="A simulated robot drives, fails and is diagnosed while you watch.",
     maintainer="TOMR maintainers",
     maintainer_email="maintainers@tomr.dev",

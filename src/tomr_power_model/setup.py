@@ -8,7 +8,7 @@ NAME = "tomr_power_model"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="Electrical power of a three-wheeled omni robot, predicted from its motion.",
     maintainer="TOMR maintainers",
     maintainer_email="maintainers@tomr.dev",

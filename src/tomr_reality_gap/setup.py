@@ -6,7 +6,7 @@ NAME = "tomr_reality_gap"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="What a robot's simulation leaves out, found in recordings of the real one.",
     maintainer="TOMR maintainers",
     maintainer_email="maintainers@tomr.dev",

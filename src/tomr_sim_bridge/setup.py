@@ -8,7 +8,7 @@ NAME = "tomr_sim_bridge"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="A simulated three-wheeled omni robot with faults to try, and a bag player.",
     maintainer="TOMR maintainers",
     maintainer_email="maintainers@tomr.dev",

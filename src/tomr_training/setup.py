@@ -6,7 +6,7 @@ NAME = "tomr_training"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="Simulated drives by the thousand, and classifiers of faults trained on them.",
     maintainer="TOMR maintainers",
     maintainer_email="maintainers@tomr.dev",

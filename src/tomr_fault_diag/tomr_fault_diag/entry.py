@@ -13,6 +13,11 @@ def fault_classifier() -> int:
     return run_module("tomr_fault_diag.nodes.fault_classifier_node")
 
 
+def tomr_diagnosis() -> int:
+    """Entry point of `tomr_diagnosis`."""
+    return run_module("tomr_fault_diag.nodes.diagnosis_node")
+
+
 def tomr_diagnose() -> int:
     """Entry point of `tomr_diagnose`."""
     return run_module("tomr_fault_diag.cli.diagnose")

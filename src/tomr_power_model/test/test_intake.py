@@ -122,7 +122,7 @@ class TestInputsOfAStage:
 
     def _take(self, topic: str, message: Any) -> str | None:
         robot = shipped_robot("reference")
-        inputs = model_inputs(robot, PowerPredictor(robot), "geometry_msgs/msg/TwistStamped")
+        inputs = model_inputs(robot, PowerPredictor(robot))
         return next(item.take for item in inputs if item.topic == topic)(message, STAMP)
 
     def test_good_messages_get_no_complaint(self) -> None:
@@ -142,7 +142,7 @@ class TestInputsOfAStage:
     def test_stamps_of_power_reach_the_model(self) -> None:
         robot = shipped_robot("reference")
         predictor = PowerPredictor(robot)
-        inputs = model_inputs(robot, predictor, "geometry_msgs/msg/TwistStamped")
+        inputs = model_inputs(robot, predictor)
         message = to_bag(battery_state(STAMP, 24.0, -1.0))
         with patch.object(predictor, "measured", return_value=Arrival.REPEATED) as measured:
             for topic in ("wheel_3/power", "battery_state"):

@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from tomr_power_model.errors import InputError
-from tomr_power_model.robot import load_robot, shipped_robots
+from tomr_power_model.robot import load_robot, read_node_sections, shipped_robots
 
 REFERENCE = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml").read_text()
 
@@ -27,6 +27,15 @@ def _write(tmp_path: Path, **changes: object) -> Path:
     file = tmp_path / "robot.yaml"
     file.write_text(yaml.safe_dump(document))
     return file
+
+
+def test_keys_for_all_nodes_may_stand_beside_the_robot(tmp_path: Path) -> None:
+    file = _write(tmp_path, cmd_vel_type="twist", hardware_id="r7", use_sim_time=True)
+    assert load_robot(file) == load_robot("reference")
+    settings = read_node_sections(file, ("power_model", "fault_classifier"))
+    assert settings["cmd_vel_type"] == "twist"
+    assert settings["hardware_id"] == "r7"
+    assert "use_sim_time" not in settings  # of ROS, not of a tool
 
 
 def test_shipped_robots_load() -> None:
@@ -57,6 +66,7 @@ def test_shipped_robots_load() -> None:
         ({"physics__friction.coulomb": {"torqe": 0.1}}, ["torqe", "torque"]),
         ({"physics__friction.stribeck": {"torque": 0.1}}, ["friction.stribeck.speed", "missing"]),
         ({"measurement__source": "guess"}, ["measurement.source", "one of"]),
+        ({"cmd_vel_type": "twst"}, ["cmd_vel_type", "one of auto, twist_stamped, twist"]),
         ({"controller__integrator": "sideways"}, ["controller.integrator", "backward, forward"]),
     ],
 )

@@ -19,7 +19,8 @@ from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.model.settings import MODEL_PARAMETERS, ModelSettings
 from tomr_power_model.robot import shipped_robot
 from tomr_power_model.robot.parameters import check_all
-from tomr_power_model.wang2024 import Coefficients, Samples, Wang2024Model, fit_wang2024
+from tomr_power_model.wang2024 import Coefficients, Wang2024Model
+from tomr_power_model.wang2024.fit import Samples, fit_wang2024
 from tomr_power_model.wang2024.state import Chassis, state_of
 
 BAG = Path(__file__).parents[3] / "bags" / "square"

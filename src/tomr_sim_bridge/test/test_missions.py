@@ -172,7 +172,8 @@ def test_faults_are_in_force_from_start_to_end(make_robot: Callable[..., Robot])
     for samples in drive(mission, simulation, seed=1):
         for sample in samples:
             if sample.topic == "ground_truth/faults":
-                status = sample.message.fields["status"][1].fields  # type: ignore[index]
+                statuses = [item.fields for item in sample.message.fields["status"]]
+                status = next(item for item in statuses if item["name"] == "encoder_lost")
                 values = {p.fields["key"]: float(p.fields["value"]) for p in status["values"]}
                 time = round((sample.stamp_ns - 5_000_000_000) / 1e9, 3)
                 found[time] = (values["active"], values["wheel"], values["severity"])

@@ -30,6 +30,7 @@ _SURE = 0.99
 _STRIKING_TICKS = 10  # in which one window must have been so
 _TICK = to_ns(0.05)
 _TOO_LONG = to_ns(0.5)  # between two frames that belong to one window
+_OF_A_WHEEL = (CONTROLS.start, ENCODERS.start)  # faults of wheel 0; the others' follow
 
 
 @frozen
@@ -48,6 +49,10 @@ class Judge(Protocol):
 
     def clear(self) -> None:
         """Forget what was seen."""
+        ...
+
+    def interrupt(self) -> None:
+        """What comes next does not join up with what was seen."""
         ...
 
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
@@ -74,15 +79,19 @@ class WindowJudge:
         """Forget what was seen: as if the robot had stood still."""
         self._window = np.zeros((WINDOW, CHANNELS))
         self._slot: int | None = None
+        self._lacking = WINDOW
         self._opinion = Opinion(np.eye(len(STATES))[NORMAL], sure=False)
         self._recent: deque[Array] = deque(maxlen=_STRIKING_TICKS)
         self._belief.clear()
 
+    def interrupt(self) -> None:
+        """Say nothing new until the window holds no other than joined frames."""
+        self._slot, self._lacking = None, WINDOW
+
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         """Look at the newest frame."""
         if elapsed_ns > _TOO_LONG:
-            self._window[:] = 0.0
-            self._slot = None
+            self.interrupt()
         slot = frame.stamp_ns // _TICK
         count = 1 if self._slot is None else slot - self._slot
         self._slot = slot
@@ -94,7 +103,14 @@ class WindowJudge:
         """Opinion after one more tick of the network."""
         self._window[:-1] = self._window[1:]
         self._window[-1] = seen
+        self._lacking = max(self._lacking - 1, 0)
+        if self._lacking:
+            return self._opinion
         likelihoods = self._network.log_likelihoods(self._window)
+        blind = [start + wheel for wheel, _ in unseen.blind for start in _OF_A_WHEEL]
+        if int(np.argmax(likelihoods)) in blind:
+            likelihoods[:] = 0.0
+        likelihoods[blind] = likelihoods[NORMAL]
         for idle in unseen.wheels:  # what an idle wheel hides it cannot refute either
             faults = [CONTROLS.start + idle, ENCODERS.start + idle]
             likelihoods[faults] = np.maximum(likelihoods[faults], likelihoods[NORMAL])
@@ -127,6 +143,10 @@ class CodeJudge:
         self._smoothed: Array | None = None
         self._leading = -1
         self._led = 0
+
+    def interrupt(self) -> None:
+        """What leads has to lead anew."""
+        self._smoothed, self._led = None, 0
 
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         """Look at the newest frame."""

@@ -29,8 +29,12 @@ MOTOR = 3  # of wheel 0; those of wheels 1 and 2 follow
 # Something is wrong that is none of these, or what is wrong cannot be told.
 DISOBEYS = State("does not follow its commands", Level.ERROR)
 UNKNOWN = State("unknown", Level.WARN)
+POWER_SENSOR = tuple(State(f"power sensor fault {n}", Level.WARN, n - 1) for n in (1, 2, 3))
 WAITING = State("waiting", Level.OK)  # for a first command: what it asks for is not known
 STALE = State("stale", Level.STALE)  # nothing can be compared
+NOT_ENOUGH = State("not enough data", Level.STALE)  # too many gaps to say anything
 # Nothing is wrong as far as can be told, and in this motion nothing could be told.
 NOT_OBSERVABLE = State("not observable in this motion", Level.OK)
-FAULTLESS = frozenset({STATES[NORMAL].name, WAITING.name, STALE.name, NOT_OBSERVABLE.name})
+FAULTLESS = frozenset(
+    {STATES[NORMAL].name, WAITING.name, STALE.name, NOT_ENOUGH.name, NOT_OBSERVABLE.name}
+)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Self
 
-from attrs import frozen
+from attrs import evolve, frozen
 
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
 from tomr_fault_diag.residuals.settings import RESIDUAL_PARAMETERS, ResidualSettings
@@ -12,6 +12,9 @@ from tomr_power_model.files import load_yaml
 from tomr_power_model.model.settings import MODEL_PARAMETERS, ModelSettings
 from tomr_power_model.robot.description import closest
 from tomr_power_model.robot.parameters import ParameterSpec, check_all
+
+# Whose sections of a robot.yaml hold settings of the diagnosis; a later one counts more.
+STAGE_NODES = ("power_model", "power_residuals", "fault_classifier", "tomr_diagnosis")
 
 # The stages share some parameters by name and meaning; a name stands once.
 PARAMETERS: Mapping[str, ParameterSpec] = {
@@ -41,6 +44,16 @@ class DiagnosisSettings:
             ModelSettings.of(checked),
             ResidualSettings.of(checked),
             ClassifierSettings.of(checked),
+        )
+
+    def at_phase(self, share: float) -> Self:
+        """The same with the grid of decisions shifted by a share of its period."""
+        ticks = self.model.ticks
+        shifted = evolve(ticks, phase=round(share * ticks.period))
+        return evolve(
+            self,
+            model=evolve(self.model, ticks=shifted),
+            residuals=evolve(self.residuals, ticks=shifted),
         )
 
 

@@ -8,6 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import yaml
@@ -66,6 +67,21 @@ def fitted_text(
     changed = ParameterisedRobot(values, str(source)).given(dict(zip(keys, rounded, strict=True)))
     sections[EVERY_NODE] = _own_values_alone(changed.values, parameters)
     sections[CALIBRATION] = {**identity, **provenance}
+    return sections_text(sections, header, comments)
+
+
+def sections_text(
+    sections: Mapping[str, Mapping[str, object]],
+    header: Sequence[str],
+    comments: Mapping[str, str] = MappingProxyType({}),
+) -> str:
+    """Text of a ROS 2 parameter file.
+
+    Args:
+        sections: flat parameters by node.
+        header: lines of comment at the top.
+        comments: behind values of the description, by key.
+    """
     lines = [f"# {one_line(line)}".rstrip() for line in header]
     for node, flat in sections.items():
         lines += [f"{_scalar(node)}:", "  ros__parameters:"]

@@ -42,6 +42,7 @@ from tomr_power_model.dynamics.layout import (
     POWER_TORQUE,
     POWER_VOLTAGE,
     POWER_WHEEL,
+    RADIUS,
     RESISTANCE,
     ROLLER_SLIP,
     ROTOR,
@@ -63,6 +64,9 @@ STICKING_SPEED = 0.1
 OBEYED = 1.3  # of dry friction: a voltage that asks a resting wheel for more has no effect
 MESHING_SWEEPS = 8  # at most, of friction that grows with the torque that the gear carries
 SETTLED = 1e-6  # N m
+NEWTON_STEPS = 8  # at most, from a power to its current
+SMALL_CURRENT = 1e-3  # A, over which the slope of the power is taken
+LEAST_SLOPE = 0.2  # W/A: a power that hardly depends on the current is no equation for it
 
 
 def carried_force(
@@ -149,3 +153,49 @@ def drive_powers(p: Numbers, motion: Mutable, out: Mutable, n: int) -> None:
     """`drive_power` of many rows; p one robot, motion (rows, ..), out (rows, ..)."""
     for row in range(len(motion)):
         drive_power(p, motion[row], out[row], n)
+
+
+def wheel_at(p: Numbers, m: Numbers, w: int, a: int) -> Wheel:
+    """What friction may depend on, of a wheel that moves as measured, its gear unloaded."""
+    speed = m[a + MOTION_SPEED]
+    return Wheel(speed, p[w + LOAD], 0.0, m[a + MOTION_ANGLE], p[w + NOMINAL_RADIUS], p[w + GEAR])
+
+
+def motor_currents(p: Numbers, m: Numbers, drawn: Numbers, out: Mutable, n: int) -> None:
+    """The two currents that each motor may carry at a measured power [W]: out[2 i], out[2 i + 1].
+
+    Newton's steps from either side of the current at which the power is least, where both meet
+    should less than that have been measured.
+    """
+    stride = int(p[STRIDE])
+    for i in range(n):
+        w, a = HEADER + i * stride, MOTION_HEADER + i * MOTION_WHEEL
+        back = p[w + CONSTANT] * m[a + MOTION_SPEED]
+        hot = p[w + RESISTANCE] * (1.0 + COPPER * m[a + MOTION_RISE])
+        least, reach = -0.5 * back / hot, 1.0 + math.sqrt(abs(drawn[i]) / hot)
+        for side in range(2):
+            way = 2.0 * side - 1.0
+            current = least + way * (reach + abs(least))
+            for _ in range(NEWTON_STEPS):
+                power = supplied(p, w, (hot * current + back) * current)
+                power += driver_power(p, w, current)
+                more = current + way * SMALL_CURRENT
+                above = supplied(p, w, (hot * more + back) * more) + driver_power(p, w, more)
+                slope = way * max((above - power) / SMALL_CURRENT, LEAST_SLOPE)
+                change = (drawn[i] - power) / slope
+                current = way * max(way * (current + change), way * least)
+                if abs(change) < SMALL_CURRENT:
+                    break
+            out[2 * i + side] = current
+
+
+def tractions(p: Numbers, m: Numbers, current: Numbers, out: Mutable, n: int) -> None:
+    """Force of each contact [N] and the part that dry friction leaves open [N], wheel by wheel."""
+    stride = int(p[STRIDE])
+    for i in range(n):
+        w, a = HEADER + i * stride, MOTION_HEADER + i * MOTION_WHEEL
+        speed, wheel = m[a + MOTION_SPEED], wheel_at(p, m, w, a)
+        dry, moves = max(dry_torque(p, w, wheel), 0.0), math.tanh(speed / STICKING_SPEED)
+        torque = p[w + CONSTANT] * current[i] - p[w + VISCOUS] * speed - dry * moves
+        torque -= moving_torque(p, w, wheel) + p[w + AXLE_INERTIA] * m[a + MOTION_ACCELERATION]
+        out[2 * i], out[2 * i + 1] = torque / p[w + RADIUS], dry * (1.0 - abs(moves)) / p[w + RADIUS]

@@ -22,7 +22,16 @@ from tomr_power_model.robot.description import effect_spec
 from tomr_power_model.robot.parameters import ParameterSpec, Value
 from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
 
-GROUPS = ("robot", "motor", "controller", "supply", "physics", "sensors", "measurement")
+GROUPS = (
+    "robot",
+    "motor",
+    "controller",
+    "supply",
+    "physics",
+    "sensors",
+    "measurement",
+    "unmodelled",
+)
 _ROS_OWN = ("use_sim_time", "qos_overrides", "start_type_description_service")
 
 
@@ -100,11 +109,16 @@ def _spec_of(name: str, wheels: tuple[str, str, str]) -> ParameterSpec | None:
     return None
 
 
-def declare_specs(node: Node, specs: Iterable[ParameterSpec]) -> dict[str, Value]:
-    """Declare a node's own parameters; returns their checked values by name."""
+def declare_specs(
+    node: Node, specs: Iterable[ParameterSpec], fallback: Mapping[str, object] | None = None
+) -> dict[str, Value]:
+    """Declare a node's own parameters; returns their checked values by name.
+
+    `fallback`: values of parameters that are not given to the node, in place of their defaults.
+    """
     table = {spec.name: spec for spec in specs}
     place = node.get_name()
-    given = given_parameters(node)
+    given = {**(fallback or {}), **given_parameters(node)}
     values: dict[str, Value] = {}
     for name, spec in table.items():
         if name not in given and spec.default is None:

@@ -9,8 +9,10 @@ from attrs import frozen
 
 from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
-from tomr_power_model.robot.parameters import ParameterSpec, Value, check_all
+from tomr_power_model.robot.parameters import SHARED_PARAMETERS, ParameterSpec, Value, check_all
 from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
+from tomr_power_model.unmodelled import LearntTerm
+from tomr_power_model.unmodelled.described import PREFIX, terms_of
 
 WHEELS = 3
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_/-]{0,99}")
@@ -103,6 +105,7 @@ class Robot:
     sensors: Sensors
     measurement: Measurement
     physics: Mapping[str, PerWheel]
+    unmodelled: tuple[LearntTerm, ...] = ()  # what was learnt and has no name
 
     @property
     def wheel_topics(self) -> tuple[str, str, str]:
@@ -162,6 +165,7 @@ def robot_from_parameters(values: Mapping[str, object], place: str) -> Robot:
             total=str(checked["measurement.total"]),
         ),
         physics=MappingProxyType(physics),
+        unmodelled=terms_of(values, names, place),
     )
 
 
@@ -290,8 +294,12 @@ def _reject_unknown(values: Mapping[str, object], names: tuple[str, ...], place:
         for name in names
         for spec in MOTOR_PARAMETERS
     }
+    shared = {spec.name: spec for spec in SHARED_PARAMETERS}
     for key in values:
-        if key in fixed or key in overrides or split_effect(key):
+        if key in fixed or key in overrides or split_effect(key) or key.startswith(PREFIX):
+            continue
+        if key in shared:
+            shared[key].check(values[key], place)
             continue
         near = closest(key, [*fixed, *(f"physics.{effect}" for effect in EFFECTS)])
         raise InputError(f"{place}: {key} is unknown: {near}")

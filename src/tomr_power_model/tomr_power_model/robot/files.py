@@ -6,7 +6,9 @@ from pathlib import Path
 
 from tomr_power_model.errors import InputError
 from tomr_power_model.files import load_yaml, read_text
+from tomr_power_model.robot.commissioned import COMMISSIONING, check_commissioned
 from tomr_power_model.robot.description import Robot, robot_from_parameters
+from tomr_power_model.robot.parameters import SHARED_PARAMETERS, USE_SIM_TIME
 
 EVERY_NODE = "/**"
 # Section in which tomr_calibrate keeps which robot its values were fitted to.
@@ -34,6 +36,7 @@ def read_description(source: Path | str) -> dict[str, object]:
     if not section:
         raise InputError(f"{source}: no `/**: ros__parameters:` section: see robots/reference.yaml")
     check_identity(sections.get(CALIBRATION, {}), section, str(source))
+    check_commissioned(sections.get(COMMISSIONING, {}), section, str(source))
     return dict(section)
 
 
@@ -51,11 +54,15 @@ def check_identity(
 
 
 def read_node_sections(source: Path | str, nodes: Iterable[str]) -> dict[str, object]:
-    """Flat parameters that a description gives to some nodes in their own sections, merged."""
+    """Flat parameters that a description gives to some nodes: those for all nodes, then those of
+    their own sections, merged. Without use_sim_time, which is no node's own."""
     sections = read_sections(source)
-    merged: dict[str, object] = {}
+    shared = {spec.name for spec in SHARED_PARAMETERS}
+    common = sections.get(EVERY_NODE, {})
+    merged = {name: value for name, value in common.items() if name in shared}
     for node in nodes:
         merged.update(sections.get(node) or sections.get(f"/{node}") or {})
+    merged.pop(USE_SIM_TIME.name, None)
     return merged
 
 

@@ -118,6 +118,25 @@ def _text(value: object) -> str:
     return value
 
 
+NAMELESS = "tomr"  # the robot outside of any namespace
+HARDWARE_ID = ParameterSpec(
+    "hardware_id",
+    f"of this robot, in every status; empty: its namespace, else {NAMELESS}",
+    "str",
+    "",
+)
+CMD_VEL_TYPE = ParameterSpec(
+    "cmd_vel_type",
+    "message type of cmd_vel, auto: that of its publishers; a Twist counts from when it arrives",
+    "str",
+    "auto",
+    choices=("auto", "twist_stamped", "twist"),
+)
+USE_SIM_TIME = ParameterSpec("use_sim_time", "time comes from /clock", "bool", False)
+# What a description may hold for all nodes besides the robot, in its /** section.
+SHARED_PARAMETERS = (CMD_VEL_TYPE, HARDWARE_ID, USE_SIM_TIME)
+
+
 def check_all(
     specs: Iterable[ParameterSpec], values: Mapping[str, object], place: str
 ) -> dict[str, Value]:

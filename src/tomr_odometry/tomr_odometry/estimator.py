@@ -1,0 +1,311 @@
+"""Streaming odometry: messages in, an estimate per tick out; driven by stamps alone."""
+
+import math
+from collections import deque
+from collections.abc import Iterator
+from heapq import merge
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_odometry.kernel import AX, CREEP, DRAG, FRICTION, GYRO, SLOPE, VX, WZ, YAW, step
+from tomr_odometry.settings import OdometrySettings
+from tomr_odometry.start import body_of, creep_shape, start
+from tomr_odometry.traction import Traction, Tractions
+from tomr_power_model.drive.sources import PowerReading
+from tomr_power_model.model.encoders import RecentStamps
+from tomr_power_model.model.ticks import Arrival, TickClock, to_ns
+from tomr_power_model.robot import GRAVITY, WHEELS, Robot
+
+Array = NDArray[np.float64]
+Triple = tuple[float, float, float]
+
+_WINDOW_NS = to_ns(0.05)  # over which a rim's speed is taken
+_LEAST_STEP_NS = to_ns(0.004)  # between encoder samples that are used
+_FRESH_NS = to_ns(0.25)  # how long a sensor may be silent
+_FROZEN_NS = to_ns(1.0)  # how long encoders that should count may not, and be waited for
+_FROZEN_COUNTS = 4.0  # that they should have counted
+_NO_IMU = np.full(6, np.nan)
+_NO_FORCES = np.zeros((0, 4))
+_TURNING = 0.02  # m/s: below it there is no slip ratio
+_SLIDES = 0.5  # probability from which a wheel is said to slide
+_SLOW = 0.02  # m/s: sliding slower than that is none
+_TRACTION_TIME = 0.3  # s, over which traction is averaged where creep depends on it
+_GRAVITY_TIME = 0.5  # s, over which a new gravity would be taken for granted
+_LIFTED = 1.5  # m/s^2 off the usual weight
+_LIFTED_TILT = 0.6  # rad/s of rolling or pitching
+_CARRIED_NS = to_ns(0.7)  # how long after such a moment the robot may still be carried
+_CARRIED_SPEED = 0.6  # m/s/sqrt(Hz)
+
+
+@frozen
+class Estimate:
+    """What is known at a tick."""
+
+    stamp_ns: int
+    pose: Array  # x, y [m], yaw [rad], in the odometry frame
+    pose_covariance: Array  # (3, 3)
+    twist: Array  # in base_link [m/s, m/s, rad/s]
+    twist_covariance: Array
+    slip: Array  # ratio of each wheel, signed
+    sliding: Array  # m/s, rim less ground
+    probability: Array  # that each wheel slides
+    traction: Array  # N, NaN where not known
+    available: Array  # N that a wheel was seen to transmit where it slid last, NaN before
+    is_slipping: bool
+    is_carried: bool
+    missing: tuple[str, ...]  # sensors that are silent
+    sensors: tuple[tuple[str, str], ...]
+    assumed: tuple[str, ...]
+    learnt: tuple[tuple[str, float], ...]
+
+    @property
+    def words(self) -> str:
+        """What it comes to, in words."""
+        if self.is_carried:
+            return "carried or lifted: the pose is not known"
+        said = "slipping" if self.is_slipping else "gripping"
+        return f"{said}; without {', '.join(self.missing)}" if self.missing else said
+
+
+class SlipOdometry:
+    """The core of `slip_odometry` and `tomr_odometry`."""
+
+    def __init__(self, robot: Robot, settings: OdometrySettings | None = None) -> None:
+        self.settings = given = settings or OdometrySettings()
+        self._robot = robot
+        self._clock = TickClock(given.ticks)
+        self._tractions = Tractions(robot)
+        self._body, self._radius = body_of(robot)
+        # Magnitudes of currents are good for creep, but no evidence of what the body does.
+        self._are_evidence = robot.measurement.signed
+        self._clear()
+
+    def _clear(self) -> None:
+        self._tractions.clear()
+        self._queues: dict[str, deque[tuple[int, str, tuple[float, ...]]]] = {}
+        self._time = 0  # of the filter's state [ns]
+        self._mode = np.zeros(4)
+        self._x, self._P = start(self._robot, self.settings.noise)
+        self._last: deque[tuple[int, Array]] = deque()
+        self._first: Array | None = None
+        self._stamps = RecentStamps()
+        self._quantum = 2e-2  # rad, smallest step of the encoders seen
+        self._forces = np.full(WHEELS, np.nan)
+        self._used = np.zeros(WHEELS)
+        self._available = np.full(WHEELS, np.nan)
+        self._inertial: list[tuple[float, ...]] = []
+        self._tractive: list[Traction] = []
+        self._heard: dict[str, int] = {}
+        self._weight = math.nan
+        self._carried_until = 0
+
+    def command(self, stamp_ns: int, twist: Triple) -> Arrival:
+        """Take a commanded twist [m/s, m/s, rad/s]."""
+        return self._arrive("command", stamp_ns, twist, periodic=False)
+
+    def encoders(self, stamp_ns: int, position: Triple, velocity: Triple) -> Arrival:
+        """Take wheel angles [rad]; the speeds that a message tells are not used."""
+        return self._arrive("encoders", stamp_ns, position)
+
+    def imu(self, stamp_ns: int, values: tuple[float, ...]) -> Arrival:
+        """Take angular rates [rad/s] and specific forces [m/s^2], x, y and z each."""
+        return self._arrive("imu", stamp_ns, values)
+
+    def power(self, reading: PowerReading) -> Arrival:
+        """Take what a motor draws."""
+        value = reading.current if self._robot.measurement.quantity != "power" else reading.power
+        return self._arrive(f"power {reading.wheel}", reading.stamp_ns, (value,))
+
+    def _arrive(
+        self, stream: str, stamp_ns: int, values: tuple[float, ...], periodic: bool = True
+    ) -> Arrival:
+        arrival = self._clock.arrive(stream, stamp_ns, periodic)
+        if arrival is Arrival.RESTARTED:
+            self._clear()
+        if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
+            self._queues.setdefault(stream, deque()).append((stamp_ns, stream, values))
+        return arrival
+
+    def due(self) -> Iterator[Estimate]:
+        """Estimates for the ticks that the stamps have reached, in order."""
+        for tick in self._clock.due():
+            for stamp, stream, values in self._until(tick):
+                self._heard[stream] = stamp
+                self._take(stamp, stream, values)
+            if self._time:
+                yield self._estimate(tick)
+
+    def _until(self, tick: int) -> list[tuple[int, str, tuple[float, ...]]]:
+        """All samples up to a tick, in the order of their stamps."""
+        found = []
+        for queue in self._queues.values():
+            own = []
+            while queue and queue[0][0] <= tick:
+                own.append(queue.popleft())
+            found.append(own)
+        return list(merge(*found))
+
+    def _take(self, stamp: int, stream: str, values: tuple[float, ...]) -> None:
+        if stream == "command":
+            self._tractions.command(stamp, (values[0], values[1], values[2]))
+        elif stream == "encoders":
+            self._rims(stamp, np.array(values))
+        elif stream == "imu":
+            if self.settings.use_imu and self._time:
+                self._inertial.append(values)
+                self._feel(stamp, values)
+        elif self.settings.use_power and self._time and int(stream[-1]) < WHEELS:
+            found = self._tractions.power(stamp, int(stream[-1]), values[0])
+            if found is not None:
+                self._tractive.append(found)
+
+    def _feel(self, stamp: int, values: tuple[float, ...]) -> None:
+        """Notice a robot that is lifted: its weight changes, or it rolls and pitches."""
+        weight, tilting = values[5], math.hypot(values[0], values[1])
+        if not math.isfinite(weight):
+            return
+        before = self._weight if math.isfinite(self._weight) else weight
+        is_lifted = abs(weight - before) > _LIFTED or tilting > _LIFTED_TILT
+        if abs(before) > 0.5 * GRAVITY and is_lifted:
+            self._carried_until = stamp + _CARRIED_NS
+        share = 0.01 / _GRAVITY_TIME
+        self._weight = before + share * (weight - before)
+
+    def _is_fresh(self, stream: str, now: int) -> bool:
+        return now - self._heard.get(stream, -_FRESH_NS) < _FRESH_NS
+
+    def _rims(self, stamp: int, angle: Array) -> None:
+        """Take an encoder sample: the filter goes on to it."""
+        if not np.isfinite(angle).all():
+            return
+        self._stamps.add(stamp, (angle[0], angle[1], angle[2]))
+        (time,) = self._stamps.times([stamp])
+        if self._first is None:
+            self._first, self._time = angle, time
+        elif time - self._time < _LEAST_STEP_NS or self._is_frozen(time, angle):
+            return
+        else:
+            self._go_on(time, angle)
+        self._last.append((time, angle))
+        self._tractions.encoders(time, (angle[0], angle[1], angle[2]))
+        while len(self._last) > 2 and self._last[1][0] <= time - _WINDOW_NS:
+            self._last.popleft()
+
+    def _is_frozen(self, time: int, angle: Array) -> bool:
+        """Whether encoders repeat themselves although the wheels should have turned on."""
+        if not np.array_equal(angle, self._last[-1][1]) or time - self._time > _FROZEN_NS:
+            return False
+        turning = np.abs(self._body.rows @ self._x[VX : WZ + 1]) / self._radius
+        expected = float(turning.max()) * 1e-9 * (time - self._time)
+        return expected > _FROZEN_COUNTS * self._quantum
+
+    def _go_on(self, time: int, angle: Array) -> None:
+        """A step of the filter to an encoder sample."""
+        noise, dt = self.settings.noise, 1e-9 * (time - self._time)
+        assert self._first is not None
+        moved = np.abs(angle - self._last[-1][1])
+        if (moved > 1e-7).any():
+            self._quantum = min(self._quantum, float(moved[moved > 1e-7].min()))
+        way = (angle - self._first) * self._radius
+        speed = (angle - self._last[-1][1]) * self._radius / dt
+        variance = (self._quantum * self._radius) ** 2 / 12.0
+        variance = variance + (noise.jitter * speed) ** 2 + noise.rim**2
+        inertial = np.mean(self._inertial, axis=0) if self._inertial else _NO_IMU
+        forces = self._evidence(dt)
+        self._inertial, self._tractive = [], []
+        self._advance(time, dt, np.stack([way, variance]), inertial, forces)
+        self._time = time
+        if time < self._carried_until:
+            lost = _CARRIED_SPEED**2 * dt
+            for place in (0, 1, 2, VX, VX + 1, WZ):
+                self._P[place, place] += lost
+        sliding = self._mode[:3] > _SLIDES
+        self._available = np.where(sliding, np.abs(self._forces), self._available)
+
+    def _evidence(self, dt: float) -> Array:
+        """Forces for the filter, if they are evidence; keeps what creep and messages need."""
+        noise, keep = self.settings.noise, math.exp(-dt / _TRACTION_TIME)
+        for found in self._tractive:
+            self._forces[found.wheel] = found.force
+        known = np.nan_to_num(self._forces) / self._body.load
+        self._used = known + keep * (self._used - known)
+        is_aided = self.settings.use_imu and self._is_fresh("imu", self._heard["encoders"])
+        if not self._tractive or not self._are_evidence or not is_aided:
+            return _NO_FORCES
+        rows = [(f.wheel, f.force, noise.force**2 + f.std**2, f.speed) for f in self._tractive]
+        return np.array(rows)
+
+    def _advance(self, time: int, dt: float, rims: Array, inertial: Array, forces: Array) -> None:
+        used = creep_shape(self._robot, self._used)
+        self._P = step(
+            self._x, self._P, self._body, self.settings.noise, self._mode, used, dt,
+            rims, inertial, forces,
+        )  # fmt: skip
+
+    def _estimate(self, tick: int) -> Estimate:
+        x, P, body = self._x, self._P, self._body
+        dt = 1e-9 * (tick - self._time)
+        twist = x[VX : WZ + 1] + x[AX : AX + 3] * min(max(dt, 0.0), 0.05)
+        moved = twist * dt
+        yaw = x[YAW] + 0.5 * moved[2]
+        c, s = math.cos(yaw), math.sin(yaw)
+        pose = x[:3] + [c * moved[0] - s * moved[1], s * moved[0] + c * moved[1], moved[2]]
+        ground = body.rows @ twist
+        (first, old), (last, new) = self._last[0], self._last[-1]
+        rim = (new - old) / max(1e-9 * (last - first), 1e-3) * self._radius
+        creeps = x[CREEP] * creep_shape(self._robot, self._used) * math.hypot(twist[0], twist[1])
+        sliding = np.where(self._mode[:3] > _SLIDES, rim - ground, creeps)
+        larger = np.maximum(np.abs(rim), np.abs(rim - sliding))
+        slip = np.where(larger > _TURNING, sliding / np.maximum(larger, _TURNING), 0.0)
+        missing, sensors = self._sensors(tick)
+        return Estimate(
+            stamp_ns=tick,
+            pose=pose,
+            pose_covariance=P[:3, :3].copy(),
+            twist=twist,
+            twist_covariance=P[VX : WZ + 1, VX : WZ + 1].copy(),
+            slip=np.clip(slip, -1.0, 1.0),
+            sliding=sliding,
+            probability=self._mode[:3].copy(),
+            traction=self._forces.copy(),
+            available=self._available.copy(),
+            is_slipping=bool(np.any((self._mode[:3] > _SLIDES) & (np.abs(sliding) > _SLOW))),
+            is_carried=tick < self._carried_until,
+            missing=missing,
+            sensors=sensors,
+            assumed=self._assumed(missing),
+            learnt=self._learnt(),
+        )
+
+    def _sensors(self, tick: int) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:
+        """Sensors that are silent, and what is used of each."""
+        wanted = {"encoders": "encoders", "imu": "imu/data"}
+        wanted |= {
+            f"power {wheel}": f"{name}/power"
+            for wheel, name in enumerate(self._robot.wheel_topics)
+            if self._robot.measurement.source != "total_only"
+        }
+        off = {"imu"} if not self.settings.use_imu else set()
+        fresh = {name: self._is_fresh(name, tick) and name not in off for name in wanted}
+        missing = tuple(said for name, said in wanted.items() if not fresh[name])
+        return missing, tuple(
+            (said, "used" if fresh[name] else "silent" if name in self._heard else "not there")
+            for name, said in wanted.items()
+        )
+
+    def _assumed(self, missing: tuple[str, ...]) -> tuple[str, ...]:
+        found = []
+        if self._robot.effect("contact.creep") is None:
+            found.append("wheels do not creep (no contact.creep: see tomr_odometry learn)")
+        if "imu/data" in missing:
+            found.append("wheels do not slide: without an IMU nothing sure tells that they do")
+        return tuple(found)
+
+    def _learnt(self) -> tuple[tuple[str, float], ...]:
+        x = self._x
+        named = [("creep", x[CREEP]), ("roller_drag", x[DRAG]), ("gyro_bias", x[GYRO])]
+        named += [("slope_x", x[SLOPE]), ("slope_y", x[SLOPE + 1])]
+        named += [(f"friction_{wheel + 1}", x[FRICTION + wheel]) for wheel in range(WHEELS)]
+        return tuple((name, float(value)) for name, value in named)

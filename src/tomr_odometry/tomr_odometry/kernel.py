@@ -1,0 +1,242 @@
+"""One step of the filter, as functions of arrays.
+
+State (22): pose in the odometry frame; twist and its rate in base_link; way of each rim as far as
+its contact gave it to the body; biases of accelerometer and gyro; pull of the floor's slope in the
+odometry frame; unknown friction of each wheel; roller drag and creep.
+
+An encoder counts its rim's way, always: the measurement is never rejected. What slips is the process
+that ties the rim to the body, d(rim_i) = (row_i v + creep s_i |v|) dt + noise, whose noise is small
+while the wheel grips and large while it slides. So counts do not turn into velocities, their quantum
+does not random-walk, and where nothing slides the pose is that of plain wheel odometry.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+X, Y, YAW, VX, VY, WZ, AX, AY, AW = range(9)
+RIM, ACCELEROMETER, GYRO, SLOPE, FRICTION, DRAG, CREEP = 9, 12, 14, 15, 17, 20, 21
+SIZE = 22
+FORCE_WHEEL, FORCE, FORCE_VARIANCE, FORCE_SPEED = range(4)  # columns of measured tractions
+STICKING = 0.01  # m/s, sliding below which the rollers' drag fades
+RESTING = 0.3  # rad/s, below which dry friction does
+TAILS = 2.0  # of the encoders' variance, where sliding is looked for
+
+
+class Noise(NamedTuple):
+    """Standard deviations: of what begins unknown, of what drives the states, of sensors."""
+
+    start_twist: float = 0.02  # m/s, rad/s
+    accelerometer_bias: float = 0.15  # m/s^2
+    gyro_bias: float = 0.015  # rad/s
+    slope: float = 0.02  # m/s^2
+    friction: float = 0.8  # N
+    drag: float = 0.08
+    creep: float = 0.02
+    rate: float = 1.5  # m/s^2, of the body's acceleration
+    turn_rate: float = 6.0  # rad/s^2, of its turning
+    rate_time: float = 0.25  # s, over which both are forgotten
+    grip: float = 2e-4  # m/s/sqrt(Hz): of a rim against the ground
+    grip_share: float = 5e-4  # of its speed, the same
+    doubt: float = 10.0  # factor on both where a wheel slid a moment ago
+    doubt_time: float = 0.5  # s, over which that is forgotten
+    slide: float = 0.4  # m/s, of sliding
+    slip_rate: float = 0.1  # 1/s, at which wheels lose grip
+    grip_rate: float = 3.0  # 1/s, at which they find it again
+    way: float = 0.005  # m/s/sqrt(Hz) per m/s of travel, of the pose
+    turn: float = 0.005  # rad/s/sqrt(Hz) per m/s, of the heading
+    slid: float = 0.05  # m/s/sqrt(Hz), of the pose while a wheel slides
+    slid_yaw: float = 0.02  # rad/s/sqrt(Hz)
+    walk_bias: float = 2e-3  # m/s^2/sqrt(s)
+    walk_gyro: float = 1e-4
+    walk_slope: float = 2e-4
+    walk_friction: float = 0.03  # N/sqrt(s)
+    accelerometer: float = 0.06  # m/s^2
+    gyro: float = 4e-3  # rad/s
+    force: float = 1.5  # N, besides its own noise
+    gate: float = 16.0  # squared normalised innovation of the IMU, beyond which it counts less
+    force_gate: float = 16.0  # the same of forces
+    jitter: float = 1e-4  # s, of the encoders' stamps
+    rim: float = 3e-5  # m, of a rim besides the quantum
+
+
+class Body(NamedTuple):
+    """The robot's numbers that the filter needs."""
+
+    rows: Array  # rim speed per twist [-, -, m], (3, 3)
+    to_twist: Array  # its inverse
+    along: Array  # sliding along the axles per twist, (3, 3)
+    load: Array  # N, (3,)
+    inertia: Array  # (3, 3)
+    mass: float  # kg
+    center: Array  # of the mass [m], (2,)
+
+
+def predict(x: Array, P: Array, b: Body, n: Noise, mode: Array, used: Array, dt: float) -> Array:
+    """Go on by dt [s]; returns the covariance.
+
+    mode: probabilities that the wheels slide, and whether one did a moment ago (1 to 0), (4,).
+    used: how far traction makes each wheel creep, per unit of the creep's coefficient, (3,).
+    """
+    v, a = x[VX : WZ + 1].copy(), x[AX : AW + 1].copy()
+    keep, half = math.exp(-dt / n.rate_time), 0.5 * dt * dt
+    step = v * dt + a * half
+    yaw = x[YAW] + 0.5 * step[2]
+    c, s = math.cos(yaw), math.sin(yaw)
+    dx, dy = c * step[0] - s * step[1], s * step[0] + c * step[1]
+    f = np.eye(SIZE)
+    f[X, YAW], f[Y, YAW] = -dy, dx
+    turn = np.array([[c, -s, -0.5 * dy], [s, c, 0.5 * dx], [0.0, 0.0, 1.0]])
+    f[X : YAW + 1, VX : WZ + 1] = turn * dt
+    f[X : YAW + 1, AX : AW + 1] = turn * half
+    ground = b.rows @ v
+    travel = math.sqrt(v[0] ** 2 + v[1] ** 2)
+    way = np.array([v[0], v[1], 0.0]) / max(travel, 1e-3)
+    q = np.zeros(SIZE)
+    for i in range(3):
+        lead = b.rows[i] + x[CREEP] * used[i] * way
+        f[RIM + i, VX : WZ + 1] = lead * dt
+        f[RIM + i, AX : AW + 1] = lead * half
+        f[RIM + i, CREEP] = used[i] * travel * dt
+        x[RIM + i] += b.rows[i] @ step + x[CREEP] * used[i] * travel * dt
+        f[VX + i, AX + i] = dt
+        f[AX + i, AX + i] = keep
+        loose = 1.0 + n.doubt * mode[3]
+        q[RIM + i] = (n.grip**2 + (n.grip_share * ground[i]) ** 2) * loose**2 * dt
+        q[RIM + i] += mode[i] * (n.slide * dt) ** 2
+        q[FRICTION + i] = n.walk_friction**2 * dt
+        x[VX + i] += a[i] * dt
+        x[AX + i] *= keep
+    x[X] += dx
+    x[Y] += dy
+    x[YAW] += step[2]
+    # What the model leaves out adds up along the way, and while wheels slide.
+    lost = (n.way * travel) ** 2 + (n.slid * mode[3]) ** 2
+    q[X] = q[Y] = lost * dt
+    q[YAW] = ((n.turn * travel) ** 2 + (n.slid_yaw * mode[3]) ** 2) * dt
+    q[AX] = q[AY] = n.rate**2 * (1.0 - keep * keep)
+    q[AW] = n.turn_rate**2 * (1.0 - keep * keep)
+    q[ACCELEROMETER] = q[ACCELEROMETER + 1] = n.walk_bias**2 * dt
+    q[GYRO] = n.walk_gyro**2 * dt
+    q[SLOPE] = q[SLOPE + 1] = n.walk_slope**2 * dt
+    return f @ P @ f.T + np.diag(q)
+
+
+def judge(x: Array, P: Array, n: Noise, mode: Array, rims: Array, dt: float) -> None:
+    """Bayes' rule on whether each wheel slides; its rim is loosened accordingly.
+
+    rims: ways by the encoders [m] and their variances, (2, 3).
+    """
+    wide = (n.slide * dt) ** 2
+    for i in range(3):
+        k, was = RIM + i, mode[i]
+        grips = max(P[k, k] - was * wide, 0.0) + TAILS * rims[1, i]
+        slides = grips + wide
+        square = (rims[0, i] - x[k]) ** 2
+        exponent = min(0.5 * square * (1.0 / grips - 1.0 / slides), 50.0)
+        odds = math.sqrt(grips / slides) * math.exp(exponent)
+        prior = was * (1.0 - n.grip_rate * dt) + (1.0 - was) * n.slip_rate * dt
+        now = prior * odds / (prior * odds + 1.0 - prior)
+        now = min(max(now, 1e-6), 1.0 - 1e-6)
+        P[k, k] += (now - was) * wide
+        mode[i] = now
+
+
+def correct(
+    x: Array, P: Array, h: Array, innovation: Array, variance: Array, gate: float
+) -> Array:
+    """Measurements made at once, (m, SIZE), (m,), (m,); returns the covariance."""
+    ph = P @ h.T
+    s = h @ ph
+    for i in range(len(innovation)):
+        square = innovation[i] ** 2
+        if variance[i] > 0.0 and square > gate * (s[i, i] + variance[i]):
+            s[i, i] = square / gate  # an outlier counts less
+        else:
+            s[i, i] += abs(variance[i])
+    gain = np.linalg.solve(s, ph.T.copy()).T
+    x += gain @ innovation
+    P = P - gain @ ph.T
+    return 0.5 * (P + P.T)
+
+
+def motion_rows(
+    x: Array, n: Noise, rims: Array, inertial: Array
+) -> tuple[Array, Array, Array]:
+    """Rows of the rims' ways and of the IMU, NaN where it says nothing.
+
+    inertial: angular rates [rad/s] and specific forces [m/s^2] in base_link, (6,).
+    """
+    h, innovation, variance = np.zeros((6, SIZE)), np.zeros(6), np.zeros(6)
+    for i in range(3):
+        h[i, RIM + i] = 1.0
+        innovation[i] = rims[0, i] - x[RIM + i]
+        variance[i] = -rims[1, i]  # no gate: sliding is what `judge` knows of
+    m = 3
+    vx, vy, wz = x[VX], x[VY], x[WZ]
+    if math.isfinite(inertial[2]):
+        h[m, WZ] = h[m, GYRO] = 1.0
+        innovation[m], variance[m] = inertial[2] - wz - x[GYRO], n.gyro**2
+        m += 1
+    if math.isfinite(inertial[3]) and math.isfinite(inertial[4]):
+        c, s = math.cos(x[YAW]), math.sin(x[YAW])
+        gx, gy = c * x[SLOPE] + s * x[SLOPE + 1], c * x[SLOPE + 1] - s * x[SLOPE]
+        h[m, AX], h[m, VY], h[m, WZ], h[m, ACCELEROMETER] = 1.0, -wz, -vy, 1.0
+        h[m, SLOPE], h[m, SLOPE + 1], h[m, YAW] = -c, -s, -gy
+        innovation[m] = inertial[3] - (x[AX] - wz * vy - gx + x[ACCELEROMETER])
+        k = m + 1
+        h[k, AY], h[k, VX], h[k, WZ], h[k, ACCELEROMETER + 1] = 1.0, wz, vx, 1.0
+        h[k, SLOPE], h[k, SLOPE + 1], h[k, YAW] = s, -c, gx
+        innovation[k] = inertial[4] - (x[AY] + wz * vx - gy + x[ACCELEROMETER + 1])
+        variance[m] = variance[k] = n.accelerometer**2
+        m += 2
+    return h[:m], innovation[:m], variance[:m]
+
+
+def force_rows(x: Array, b: Body, forces: Array) -> tuple[Array, Array, Array]:
+    """Rows of tractions: wheel, force [N], variance, speed of the wheel [rad/s], (m, 4)."""
+    count = len(forces)
+    h, innovation, variance = np.zeros((count, SIZE)), np.zeros(count), np.zeros(count)
+    v, a, m = x[VX : WZ + 1].copy(), x[AX : AW + 1].copy(), b.mass
+    cx, cy, vx, vy, wz = b.center[0], b.center[1], v[0], v[1], v[2]
+    c, s = math.cos(x[YAW]), math.sin(x[YAW])
+    gx, gy = c * x[SLOPE] + s * x[SLOPE + 1], c * x[SLOPE + 1] - s * x[SLOPE]
+    taken = b.inertia @ a
+    taken[0] -= m * wz * (vy + wz * cx) + m * gx
+    taken[1] += m * wz * (vx - wz * cy) - m * gy
+    taken[2] += m * wz * (cx * vx + cy * vy) - m * (cx * gy - cy * gx)
+    drags = b.along.T @ (np.tanh(b.along @ v / STICKING) * b.load)
+    for k in range(count):
+        wheel = int(forces[k, FORCE_WHEEL])
+        way = b.to_twist[:, wheel].copy()  # the wheel's traction per force on the body
+        dragged = way @ drags
+        sign = math.tanh(forces[k, FORCE_SPEED] / RESTING)
+        expected = way @ taken + x[DRAG] * dragged + sign * x[FRICTION + wheel]
+        h[k, AX : AW + 1] = way @ b.inertia
+        h[k, SLOPE] = -m * (way[0] * c - way[1] * s)
+        h[k, SLOPE + 1] = -m * (way[0] * s + way[1] * c)
+        h[k, VX], h[k, VY] = m * wz * way[1], -m * wz * way[0]
+        h[k, DRAG], h[k, FRICTION + wheel] = dragged, sign
+        innovation[k] = forces[k, FORCE] - expected
+        variance[k] = forces[k, FORCE_VARIANCE]
+    return h, innovation, variance
+
+
+def step(
+    x: Array, P: Array, b: Body, n: Noise, mode: Array, used: Array, dt: float,
+    rims: Array, inertial: Array, forces: Array,
+) -> Array:  # fmt: skip
+    """From one encoder sample to the next; `x` and `mode` go on in place; the covariance."""
+    mode[3] = max(mode[3] * math.exp(-dt / n.doubt_time), mode[0], mode[1], mode[2])
+    P = predict(x, P, b, n, mode, used, dt)
+    judge(x, P, n, mode, rims, dt)
+    h, innovation, variance = motion_rows(x, n, rims, inertial)
+    P = correct(x, P, h, innovation, variance, n.gate)
+    if len(forces):
+        h, innovation, variance = force_rows(x, b, forces)
+        P = correct(x, P, h, innovation, variance, n.force_gate)
+    return P

@@ -1,0 +1,49 @@
+"""A picture of a drive: its path by wheels, as estimated and true; slip over time."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from tomr_odometry.estimator import Estimate
+from tomr_odometry.reference import Path2D
+from tomr_odometry.summary import estimated_path
+from tomr_power_model.canvas import AFTER, BEFORE, MEASURED, sheet
+from tomr_power_model.robot import Robot
+
+_WHEELS = ("#1d4ed8", "#c2410c", "#15803d")
+_ELLIPSES = 12
+_WITHIN_95 = 5.991
+
+
+def draw(
+    file: Path, robot: Robot, items: Sequence[Estimate], wheels: Path2D, reference: Path2D | None
+) -> None:
+    """Write the picture as PNG."""
+    ours = estimated_path(items)
+    with sheet(2, 1, 4.2, heights=(2.0, 1.0)) as (page, (plane, over_time)):
+        start = ours.pose[0]
+        by_wheels = wheels.laid_on(start, wheels.at(ours.stamps[:1])[0]).pose
+        plane.plot(by_wheels[:, 0], by_wheels[:, 1], color=BEFORE, lw=1.0, label="by the wheels")
+        plane.plot(ours.pose[:, 0], ours.pose[:, 1], color=AFTER, lw=1.4, label="estimated, 95 %")
+        if reference is not None:
+            true = reference.laid_on(start, reference.at(ours.stamps[:1])[0]).pose
+            plane.plot(true[:, 0], true[:, 1], color=MEASURED, lw=1.0, ls="--", label="reference")
+        turn = np.linspace(0.0, 2.0 * np.pi, 60)
+        circle = np.sqrt(_WITHIN_95) * np.stack([np.cos(turn), np.sin(turn)])
+        for item in items[:: max(len(items) // _ELLIPSES, 1)]:
+            values, axes = np.linalg.eigh(item.pose_covariance[:2, :2])
+            ring = axes @ (np.sqrt(np.maximum(values, 0.0))[:, None] * circle)
+            plane.plot(item.pose[0] + ring[0], item.pose[1] + ring[1], color=AFTER, lw=0.4)
+        plane.set_aspect("equal", adjustable="datalim")
+        plane.set_xlabel("x [m]")
+        plane.set_ylabel("y [m]")
+        plane.legend(fontsize=7)
+        seconds = 1e-9 * (ours.stamps - ours.stamps[0])
+        slip = np.array([item.slip for item in items])
+        for name, column, color in zip(robot.wheel_names, slip.T, _WHEELS, strict=True):
+            over_time.plot(seconds, column, color=color, lw=0.8, label=name)
+        over_time.set_xlabel("time [s]")
+        over_time.set_ylabel("slip ratio")
+        over_time.legend(fontsize=7)
+        page.savefig(file)

@@ -1,0 +1,68 @@
+"""A robot's numbers for the filter, and the state with which it begins."""
+
+import numpy as np
+
+from tomr_odometry.kernel import (
+    ACCELEROMETER,
+    AX,
+    AY,
+    AW,
+    CREEP,
+    DRAG,
+    FRICTION,
+    GYRO,
+    SIZE,
+    SLOPE,
+    VX,
+    WZ,
+    Array,
+    Body,
+    Noise,
+)
+from tomr_power_model.dynamics import layout as at
+from tomr_power_model.dynamics.numbers import laid_out, wheel_records
+from tomr_power_model.dynamics.vehicle import vehicle_of
+from tomr_power_model.robot import WHEELS, Robot
+
+
+def body_of(robot: Robot) -> tuple[Body, Array]:
+    """Numbers of the filter from those of the dynamics, and the wheels' radii [m]."""
+    p = laid_out(vehicle_of(robot))
+    wheel = wheel_records(p)
+    rows = wheel[:, at.ROLL : at.ROLL + 3] * wheel[:, at.RADIUS, None]
+    body = Body(
+        rows=rows,
+        to_twist=np.linalg.inv(rows),
+        along=wheel[:, at.ALONG : at.ALONG + 3].copy(),
+        load=wheel[:, at.LOAD].copy(),
+        inertia=p[at.INERTIA : at.INERTIA + 9].reshape(3, 3).copy(),
+        mass=float(p[at.MASS]),
+        center=p[[at.CENTER_X, at.CENTER_Y]],
+    )
+    return body, wheel[:, at.RADIUS].copy()
+
+
+def start(robot: Robot, n: Noise) -> tuple[Array, Array]:
+    """At rest, at the origin, with what the description says; state and covariance."""
+    x, std = np.zeros(SIZE), np.zeros(SIZE)
+    x[DRAG] = robot.everywhere("contact.roller_drag", "coefficient")[0]
+    coefficients = robot.everywhere("contact.creep", "coefficient")
+    x[CREEP] = sum(coefficients) / WHEELS
+    known = robot.everywhere("contact.creep", "uncertainty")[0]
+    std[VX : WZ + 1] = n.start_twist
+    std[[AX, AY]], std[AW] = n.rate, n.turn_rate
+    std[ACCELEROMETER : ACCELEROMETER + 2] = n.accelerometer_bias
+    std[GYRO] = n.gyro_bias
+    std[SLOPE : SLOPE + 2] = n.slope
+    std[FRICTION : FRICTION + WHEELS] = n.friction
+    std[DRAG], std[CREEP] = n.drag, known or n.creep
+    return x, np.diag(std**2)
+
+
+def creep_shape(robot: Robot, used: Array) -> Array:
+    """How far each wheel creeps per unit of the mean coefficient, from its traction over load."""
+    coefficient = np.array(robot.everywhere("contact.creep", "coefficient"))
+    growth = np.array(robot.everywhere("contact.creep", "growth"))
+    mean = float(coefficient.mean())
+    share = coefficient / mean if mean > 0.0 else np.ones(WHEELS)
+    return np.asarray(share * used * (1.0 + growth * used**2))

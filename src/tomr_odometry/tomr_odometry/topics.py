@@ -1,0 +1,171 @@
+"""Which topics the odometry reads, and what it publishes."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_odometry.estimator import Estimate, SlipOdometry
+from tomr_odometry.settings import OdometrySettings
+from tomr_power_model.messages.intake import Unusable, WheelFinder, stamp_of, twist_of
+from tomr_power_model.messages.plain import Level, Plain, Status, diagnostics, header, joint_state
+from tomr_power_model.messages.types import (
+    DIAGNOSTICS,
+    IMU,
+    JOINT_STATE,
+    ODOMETRY,
+    TWIST,
+    TWIST_STAMPED,
+)
+from tomr_power_model.model.ticks import Arrival
+from tomr_power_model.robot import Robot
+from tomr_power_model.topics.inputs import Input, guarded, measured_inputs
+
+ODOM_TOPIC, SLIP_TOPIC, STATUS_TOPIC = "odom_slip", "slip", "/diagnostics"
+TF_TOPIC, TF = "/tf", "tf2_msgs/msg/TFMessage"
+STATUS_PERIOD = 100_000_000  # ns of data
+OUTPUTS = {ODOM_TOPIC: ODOMETRY, SLIP_TOPIC: JOINT_STATE, STATUS_TOPIC: DIAGNOSTICS}
+
+
+@frozen
+class Published:
+    """A message on a topic."""
+
+    topic: str
+    stamp_ns: int
+    message: Plain
+
+
+def imu_of(message: Any) -> tuple[float, ...]:
+    """Angular rates [rad/s] and specific forces [m/s^2] of an Imu; NaN where it says none."""
+    rate, force = message.angular_velocity, message.linear_acceleration
+    values = [float(rate.x), float(rate.y), float(rate.z)]
+    values += [float(force.x), float(force.y), float(force.z)]
+    # A covariance that begins with -1 says that the quantity is not measured.
+    for first, covariance in (
+        (0, message.angular_velocity_covariance),
+        (3, message.linear_acceleration_covariance),
+    ):
+        if len(covariance) and float(covariance[0]) == -1.0:
+            values[first : first + 3] = [math.nan] * 3
+    if not math.isfinite(values[2]) and not math.isfinite(values[3]):
+        raise Unusable("neither the yaw rate nor the acceleration is finite")
+    return tuple(value if math.isfinite(value) else math.nan for value in values)
+
+
+def odometry_inputs(robot: Robot, core: SlipOdometry, twist_type: str) -> tuple[Input, ...]:
+    """The inputs of a core."""
+
+    def command(message: Any, receive_ns: int) -> Arrival:
+        return core.command(stamp_of(message, receive_ns, fallback=True), twist_of(message))
+
+    def imu(message: Any, receive_ns: int) -> Arrival:
+        return core.imu(stamp_of(message, receive_ns), imu_of(message))
+
+    inputs = [Input("cmd_vel", twist_type, guarded(command), (TWIST, TWIST_STAMPED))]
+    wheels = WheelFinder(robot.wheel_names)
+    inputs += measured_inputs(robot, core.encoders, core.power, wheels)
+    if core.settings.use_imu:
+        inputs.append(Input("imu/data", IMU, guarded(imu)))
+    return tuple(inputs)
+
+
+def _covariance(planar: NDArray[Any], unknown: float) -> list[float]:
+    """A covariance over x, y, yaw as one over six coordinates, those out of plane fixed."""
+    places = (0, 1, 5)
+    full = [0.0] * 36
+    for i in (2, 3, 4):
+        full[7 * i] = unknown
+    for i, row in zip(places, planar.tolist(), strict=True):
+        for j, value in zip(places, row, strict=True):
+            full[6 * i + j] = value
+    return full
+
+
+def _vector(x: float, y: float, z: float) -> Plain:
+    return Plain("geometry_msgs/msg/Vector3", {"x": x, "y": y, "z": z})
+
+
+def _turn(yaw: float) -> Plain:
+    half = 0.5 * yaw
+    fields = {"x": 0.0, "y": 0.0, "z": math.sin(half), "w": math.cos(half)}
+    return Plain("geometry_msgs/msg/Quaternion", fields)
+
+
+def _odometry(item: Estimate, settings: OdometrySettings) -> Plain:
+    x, y, yaw = item.pose.tolist()
+    vx, vy, wz = item.twist.tolist()
+    point = Plain("geometry_msgs/msg/Point", {"x": x, "y": y, "z": 0.0})
+    pose = Plain("geometry_msgs/msg/Pose", {"position": point, "orientation": _turn(yaw)})
+    twist = Plain(
+        TWIST, {"linear": _vector(vx, vy, 0.0), "angular": _vector(0.0, 0.0, wz)}
+    )
+    return Plain(
+        ODOMETRY,
+        {
+            "header": header(item.stamp_ns, settings.odom_frame),
+            "child_frame_id": settings.base_frame,
+            "pose": Plain(
+                "geometry_msgs/msg/PoseWithCovariance",
+                {"pose": pose, "covariance": _covariance(item.pose_covariance, 1e-6)},
+            ),
+            "twist": Plain(
+                "geometry_msgs/msg/TwistWithCovariance",
+                {"twist": twist, "covariance": _covariance(item.twist_covariance, 1e-6)},
+            ),
+        },
+    )
+
+
+def _transform(item: Estimate, settings: OdometrySettings) -> Plain:
+    x, y, yaw = item.pose.tolist()
+    moved = {"translation": _vector(x, y, 0.0), "rotation": _turn(yaw)}
+    stamped = {
+        "header": header(item.stamp_ns, settings.odom_frame),
+        "child_frame_id": settings.base_frame,
+        "transform": Plain("geometry_msgs/msg/Transform", moved),
+    }
+    return Plain(TF, {"transforms": [Plain("geometry_msgs/msg/TransformStamped", stamped)]})
+
+
+def _status(robot: Robot, item: Estimate) -> Status:
+    """What the estimate rests on; a number alone in each value, for PlotJuggler."""
+    values = [("slipping", f"{float(item.is_slipping):g}")]
+    for name, probability, used, most in zip(
+        robot.wheel_topics, item.probability, item.traction, item.available, strict=True
+    ):
+        values += [
+            (f"{name}_slip_probability", f"{probability:.4g}"),
+            (f"{name}_traction_used", f"{used:.4g}"),
+            (f"{name}_traction_available", f"{most:.4g}"),
+        ]
+    values += [(name, f"{value:.5g}") for name, value in item.learnt]
+    level = Level.WARN if item.is_slipping or item.missing else Level.OK
+    return Status("slip_odometry", level, item.words, tuple(values), "tomr")
+
+
+def estimate_messages(robot: Robot, item: Estimate, settings: OdometrySettings) -> Iterator[Published]:
+    """What is published of an estimate.
+
+    `slip` has for each wheel its slip ratio as position [-], how fast its contact slides as velocity
+    [m/s], and the force that it transmits as effort [N], NaN where not known.
+    """
+    yield Published(ODOM_TOPIC, item.stamp_ns, _odometry(item, settings))
+    yield Published(
+        SLIP_TOPIC,
+        item.stamp_ns,
+        joint_state(
+            item.stamp_ns,
+            robot.wheel_names,
+            position=item.slip.tolist(),
+            velocity=item.sliding.tolist(),
+            effort=item.traction.tolist(),
+        ),
+    )
+    if item.stamp_ns % STATUS_PERIOD == 0:
+        message = diagnostics(item.stamp_ns, [_status(robot, item)])
+        yield Published(STATUS_TOPIC, item.stamp_ns, message)
+    if settings.publish_tf:
+        yield Published(TF_TOPIC, item.stamp_ns, _transform(item, settings))

@@ -1,0 +1,204 @@
+"""Force of each contact from the power of its motor and the motion of its encoder.
+
+    r F = k i - friction(omega) - J omega'
+
+Power leaves two currents of it. The driver's law tells which: the voltage that a driver holds follows
+from commands and measured speeds (`dynamics.step.control`); where that is not exact enough, the
+current that rolling would take helps. What doubt is left is part of the force's standard deviation.
+"""
+
+import math
+from collections import deque
+
+import numpy as np
+from attrs import frozen
+
+from tomr_power_model.dynamics import layout as at
+from tomr_power_model.dynamics.binding import plain
+from tomr_power_model.dynamics.numbers import laid_out, no_input
+from tomr_power_model.dynamics.vehicle import vehicle_of
+from tomr_power_model.robot import WHEELS, Robot
+
+Triple = tuple[float, float, float]
+_SPAN_NS = 60_000_000  # of the encoder samples that tell speed and acceleration
+_FEWEST = 4  # samples
+_STALE_NS = 250_000_000
+_FOLLOW = 0.05  # of what is missing, by which a driver's sum of errors follows the measured power
+_MOVING = 1.0  # rad/s
+_LAW_VOLTS, _LAW_SHARE = 0.15, 0.03  # V and of it: how exactly a driver's law tells its voltage
+_ROLLING_NEWTONS = 10.0  # of a contact's force that rolling would take, where the wheel may slide
+_ROUGH_SHARE, _ROUGHEST = 0.04, 60.0  # of a new sample in the mean; N
+_POWER_SHARE = 0.01  # of a measured power
+_LEAST_SLOPE = 2.0  # W/A
+_SURE = 1e-3  # odds of the other current below which the measurement is taken at its word
+
+
+@frozen
+class Traction:
+    """Force of one contact along its wheel's rolling direction."""
+
+    stamp_ns: int
+    wheel: int
+    force: float  # N
+    std: float  # of noise and of what dry friction leaves open [N]
+    speed: float  # of the wheel [rad/s]
+
+
+class Tractions:
+    """Streaming: commands, encoder samples and readings in, forces of the contacts out."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._numbers = laid_out(vehicle_of(robot)).tolist()
+        self._laws = plain(tuple(robot.physics))
+        self._delay = round(1e9 * robot.controller.delay)
+        self._period = round(1e9 * self._numbers[at.PERIOD])
+        self._window = round(0.5e9 * robot.sensors.power_window)
+        self._unsigned = not robot.measurement.signed
+        self._is_current = robot.measurement.quantity == "motor_current"
+        volts = robot.supply.nominal_voltage
+        noise = math.hypot(robot.sensors.current_noise, robot.sensors.current_resolution)
+        self._noise = noise if self._is_current else noise * volts
+        self._radius = robot.wheel_radius
+        self._constant = [motor.wheel_constant for motor in robot.motors]
+        self._resistance = [motor.resistance for motor in robot.motors]
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all: what the drivers hold is that of a robot at rest."""
+        self._state = [0.0] * at.state_size(WHEELS)
+        self._input = list(no_input(WHEELS))
+        self._samples: deque[tuple[int, Triple]] = deque()
+        self._commands: deque[tuple[int, Triple]] = deque()
+        self._now = 0
+        self._speed = [0.0] * WHEELS
+        self._gain = [0.0] * WHEELS
+        self._is_commanded = False
+        self._before = [(math.nan, math.nan)] * WHEELS
+        self._rough = [0.0] * WHEELS
+        self._fitted: tuple[list[float], list[float], list[float]] | None = None
+
+    def command(self, stamp_ns: int, twist: Triple) -> None:
+        """Take a command [m/s, m/s, rad/s]."""
+        self._commands.append((stamp_ns + self._delay, twist))
+        self._is_commanded = True
+
+    def encoders(self, stamp_ns: int, angle: Triple) -> None:
+        """Take wheel angles [rad] and run the drivers' law up to them."""
+        samples = self._samples
+        if samples and samples[-1][0] < stamp_ns:
+            (before, old), elapsed = samples[-1], 1e-9 * (stamp_ns - samples[-1][0])
+            seen = [(new - was) / elapsed for new, was in zip(angle, old, strict=True)]
+            self._run(before, stamp_ns, seen)
+        samples.append((stamp_ns, angle))
+        self._fitted = None
+        while len(samples) > _FEWEST and samples[1][0] <= stamp_ns - _SPAN_NS:
+            samples.popleft()
+
+    def _run(self, start: int, end: int, seen: list[float]) -> None:
+        state, given, control = self._state, self._input, self._laws.control
+        for wheel in range(WHEELS):
+            state[at.STATE_HEADER + wheel * at.STATE_WHEEL + at.MEASURED] = seen[wheel]
+        if self._now < start - self._period:
+            self._now = start
+        while self._now + self._period <= end:
+            while self._commands and self._commands[0][0] <= self._now + self._period // 2:
+                given[at.COMMAND : at.COMMAND + 3] = self._commands.popleft()[1]
+            control(self._numbers, state, given, WHEELS)
+            self._now += self._period
+
+    def _fit(self) -> tuple[list[float], list[float], list[float]]:
+        """Angles [rad], speeds and accelerations at the newest encoder sample, by a parabola."""
+        newest, last = self._samples[-1]
+        times = np.array([1e-9 * (stamp - newest) for stamp, _ in self._samples])
+        times /= -times[0]
+        angles = np.array([angle for _, angle in self._samples]) - last
+        powers = np.stack([np.ones_like(times), times, times * times])
+        shape = np.linalg.solve(powers @ powers.T, powers @ angles)
+        scale = 1e-9 * (newest - self._samples[0][0])
+        return list(last), (shape[1] / scale).tolist(), (2.0 / scale**2 * shape[2]).tolist()
+
+    def _motion(self, time_ns: int) -> list[float] | None:
+        """Wheels' speeds and accelerations at some time, as the inverse dynamics take them."""
+        if len(self._samples) < _FEWEST:
+            return None
+        if self._fitted is None:
+            self._fitted = self._fit()
+        ahead = 1e-9 * (time_ns - self._samples[-1][0])
+        motion = [math.nan, math.nan]
+        for wheel, (angle, speed, change) in enumerate(zip(*self._fitted, strict=True)):
+            volts = self._state[at.STATE_HEADER + wheel * at.STATE_WHEEL + at.VOLTS]
+            held = volts if self._is_commanded else math.nan
+            motion += [speed + change * ahead, change, angle, 0.0, 0.0, held]
+        return motion
+
+    def power(self, stamp_ns: int, wheel: int, drawn: float) -> Traction | None:
+        """Force of a contact from a measured power [W], or current [A]; None if nothing tells."""
+        motion = self._motion(stamp_ns - self._window)
+        if motion is None or not self._is_commanded or drawn != drawn:
+            return None
+        if stamp_ns - self._samples[-1][0] > _STALE_NS:
+            return None
+        current, noise, is_sure = self._current(wheel, drawn, motion)
+        currents = [0.0] * WHEELS
+        currents[wheel] = current
+        forces = [0.0] * (2 * WHEELS)
+        self._laws.tractions(self._numbers, motion, currents, forces, WHEELS)
+        speed = motion[at.MOTION_HEADER + wheel * at.MOTION_WHEEL + at.MOTION_SPEED]
+        if is_sure and abs(speed) > _MOVING:
+            self._follow(wheel, current, speed)
+        force = forces[2 * wheel]
+        rough = self._roughness(wheel, force)
+        newtons = self._constant[wheel] / self._radius
+        std = math.hypot(newtons * noise, forces[2 * wheel + 1], rough)
+        return Traction(stamp_ns, wheel, force, std, speed)
+
+    def _roughness(self, wheel: int, force: float) -> float:
+        """Standard deviation of what changes from sample to sample [N]: a driver that sees coarse
+        counts shakes its motor."""
+        before, older = self._before[wheel]
+        self._before[wheel] = (force, before)
+        if older == older:
+            second = min((force - 2.0 * before + older) ** 2, _ROUGHEST**2) / 6.0
+            self._rough[wheel] += _ROUGH_SHARE * (second - self._rough[wheel])
+        return math.sqrt(self._rough[wheel])
+
+    def _current(self, wheel: int, drawn: float, motion: list[float]) -> tuple[float, float, bool]:
+        """A motor's current [A], its noise, and whether the measurement's sign is beyond doubt."""
+        place = at.MOTION_HEADER + wheel * at.MOTION_WHEEL
+        constant, cold = self._constant[wheel], self._resistance[wheel]
+        back = constant * motion[place + at.MOTION_SPEED]
+        by_law = (motion[place + at.MOTION_VOLTAGE] - back) / cold
+        law_std = (_LAW_VOLTS + _LAW_SHARE * abs(motion[place + at.MOTION_VOLTAGE])) / cold
+        if self._is_current and not self._unsigned:
+            return drawn, self._noise, True
+        if self._is_current:
+            found = [-abs(drawn), abs(drawn)]
+        else:
+            readings, both = [0.0] * WHEELS, [0.0] * (2 * WHEELS)
+            readings[wheel] = drawn
+            self._laws.motor_currents(self._numbers, motion, readings, both, WHEELS)
+            found = both[2 * wheel : 2 * wheel + 2]
+        rolling = [0.0] * (WHEELS * at.POWER_WHEEL)
+        self._laws.drive_power(self._numbers, motion, rolling, WHEELS)
+        expected = rolling[wheel * at.POWER_WHEEL + at.POWER_CURRENT]
+        spread = _ROLLING_NEWTONS * self._radius / constant
+        cost = [
+            ((one - by_law) / law_std) ** 2 + ((one - expected) / spread) ** 2 for one in found
+        ]
+        side = int(cost[1] < cost[0])
+        current, apart = found[side], found[1] - found[0]
+        slope = abs(2.0 * cold * current + back)
+        noise = self._noise
+        if not self._is_current:
+            noise = (self._noise + _POWER_SHARE * abs(drawn)) / max(slope, _LEAST_SLOPE)
+        other = math.exp(-0.5 * min(abs(cost[1] - cost[0]), 100.0))  # odds of the other current
+        return current, math.hypot(noise, math.sqrt(other) * apart), other < _SURE
+
+    def _follow(self, wheel: int, current: float, speed: float) -> None:
+        """Let a driver's sum of errors follow what its motor draws."""
+        gain = self._numbers[at.INTEGRAL_GAIN]
+        if gain > 0.0:
+            place = at.STATE_HEADER + wheel * at.STATE_WHEEL
+            volts = self._resistance[wheel] * current + self._constant[wheel] * speed
+            volts -= self._state[place + at.VOLTS]
+            self._state[place + at.INTEGRAL] += _FOLLOW * volts / gain
