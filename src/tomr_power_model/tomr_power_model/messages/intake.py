@@ -3,6 +3,7 @@
 Every function returns plain numbers or raises `Unusable` with the reason: a node warns and goes on.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -63,16 +64,15 @@ def twist_of(message: Any) -> Triple:
     """v_x, v_y [m/s], omega_z [rad/s] of a Twist or TwistStamped."""
     twist = getattr(message, "twist", message)
     values = (float(twist.linear.x), float(twist.linear.y), float(twist.angular.z))
-    if not all(abs(value) <= LARGEST.twist for value in values):  # NaN is not
-        raise Unusable("the twist is not finite, or no robot's")
+    for value in values:
+        _check(value, LARGEST.twist, "the twist")
     return values
 
 
 def yaw_rate_of(message: Any) -> float:
     """Yaw rate of an Imu [rad/s]."""
     rate = float(message.angular_velocity.z)
-    if not abs(rate) <= LARGEST.yaw_rate:
-        raise Unusable("the yaw rate is not finite, or no robot's")
+    _check(rate, LARGEST.yaw_rate, "the yaw rate")
     return rate
 
 
@@ -142,6 +142,13 @@ class WheelFinder:
         return _within(first, largest), _within(second, largest), _within(third, largest)
 
 
+def _check(value: float, largest: float, what: str) -> None:
+    if not math.isfinite(value):
+        raise Unusable(f"{what} is not finite")
+    if abs(value) > largest:
+        raise Unusable(f"{what} is {value:g}, more than can be")
+
+
 def _within(value: float, largest: float) -> float:
     """The value, NaN where a sensor cannot have measured it."""
     number = float(value)
@@ -151,10 +158,9 @@ def _within(value: float, largest: float) -> float:
 def battery_of(message: Any) -> tuple[float, float]:
     """Voltage [V], NaN if unknown, and current [A], negative while drawing."""
     voltage, current = float(message.voltage), float(message.current)
-    if not abs(current) <= LARGEST.current:
-        raise Unusable("the current is not finite, or none that can be measured")
-    if abs(voltage) > LARGEST.voltage:
-        raise Unusable("the voltage is none that can be measured")
+    _check(current, LARGEST.current, "the current")
+    if not math.isnan(voltage):
+        _check(voltage, LARGEST.voltage, "the voltage")
     return voltage, current
 
 
