@@ -44,6 +44,7 @@ Progress = Callable[[str, float], None]
 
 STEPS = "steps"
 _BLOCK_TICKS = 200
+_HOPELESS = 1.5  # times the caution that may be needed: more shoves will not bring it down
 
 
 @frozen
@@ -222,13 +223,22 @@ class _Work:
     ) -> Tuned:
         """The narrowest bands with which false alarms can be as rare as wanted."""
         choice, share = self.request.bands, 0.55
+        first = evolve(plan, shoves=plan.first)
         while True:
             self.progress("simulating healthy hours", share)
             bands = bands_of(fitted, choice)
-            shoved = self.rehearsed(described, bands, settings, plan)
-            level = _level(self.request, fitted, bands, settings, shoved, plan)
+            evidence = _real_peaks(fitted, bands, settings)
             wider = choice.wider * choice.margin
-            if level.needed <= choice.most_caution or wider > choice.widest:
+            # A few shoves tell where many are not worth while.
+            for asked, most in (
+                (first, _HOPELESS * choice.most_caution),
+                (plan, choice.most_caution),
+            ):
+                shoved = self.rehearsed(described, bands, settings, asked)
+                level = _level(self.request, evidence, shoved, plan)
+                if level.needed > most and wider <= choice.widest:
+                    break
+            else:
                 return Tuned(choice.margin, bands, shoved, level)
             choice, share = evolve(choice, margin=wider), min(share + 0.07, 0.8)
 
@@ -275,21 +285,27 @@ def _observe(job: tuple[Path, str, str]) -> Observed:
     return observe(bag, name, load_robot(source), DiagnosisSettings.of(given, source))
 
 
-def _level(
-    request: CommissionRequest,
-    fitted: Sequence[Observed],
-    bands: BandSettings,
-    settings: ClassifierSettings,
-    shoved: Shoved,
-    plan: Rehearsal,
-) -> AlarmLevel:
-    """From real driving, block by block, and from simulated shoves."""
+@frozen
+class _Real:
+    """Peaks of evidence in real driving, block by block."""
+
+    peaks: tuple[float, ...]
+    hours: float
+
+
+def _real_peaks(
+    fitted: Sequence[Observed], bands: BandSettings, settings: ClassifierSettings
+) -> _Real:
     peaks: list[float] = []
     for drive in fitted:
         peaks += block_peaks(evidence_in(frames_of(drive, bands), settings), _BLOCK_TICKS)
-    hours = sum(drive.hours for drive in fitted)
+    return _Real(tuple(peaks), sum(drive.hours for drive in fitted))
+
+
+def _level(request: CommissionRequest, real: _Real, shoved: Shoved, plan: Rehearsal) -> AlarmLevel:
+    """From real driving and from simulated shoves."""
     tails = (
-        Tail.of("healthy driving", peaks, len(peaks) / hours, request.alarm),
+        Tail.of("healthy driving", real.peaks, len(real.peaks) / real.hours, request.alarm),
         Tail.of("simulated shoves", shoved.peaks, plan.shoves_per_hour, request.alarm),
     )
     shipped = ClassifierSettings().caution
