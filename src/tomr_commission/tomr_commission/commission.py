@@ -20,9 +20,9 @@ from tomr_commission.commissioned import (
     suite_version,
 )
 from tomr_commission.evidence import decisions, evidence_in
-from tomr_commission.explained import FOLDER, Split, explain_drives
+from tomr_commission.explained import EXPLAINED, FOLDER, Split, explain_drives
 from tomr_commission.injected import try_injected
-from tomr_commission.observed import Observed, frames_of, observe
+from tomr_commission.observed import Observed, frames_of, observe, tells_currents
 from tomr_commission.parallel import on_all_cores
 from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse
 from tomr_commission.request import CommissionRequest
@@ -38,12 +38,14 @@ from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.drive.cut import names_of
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.drive.record import Drive
+from tomr_power_model.errors import InputError
 from tomr_power_model.robot import load_robot, read_description, read_node_sections
 
 Progress = Callable[[str, float], None]
 
 STEPS = "steps"
 _BLOCK_TICKS = 200
+_CURRENTS = "neither shoves nor faults were simulated: the robot tells currents, not powers"
 _HOPELESS = 1.5  # times the caution that may be needed: more shoves will not bring it down
 
 
@@ -62,6 +64,7 @@ class Commissioned:
     floors: tuple[Floor, ...]
     text: str  # of commissioned.yaml
     date: str
+    notes: tuple[str, ...] = ()
 
     @property
     def is_go(self) -> bool:
@@ -97,7 +100,14 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     chosen = evolve(classifier, caution=level.caution)
     progress("validating", 0.85)
     said = [decisions(frames_of(drive, bands), chosen) for drive in (*fitted, held)]
-    trials = [*try_injected(held, bands, chosen), *work.simulated(described, bands, chosen)]
+    trials = try_injected(held, bands, chosen)
+    notes = [note for drive in work.drives for note in drive.notes]
+    if tells_currents(held):
+        notes.append(_CURRENTS)
+    else:
+        simulated, note = work.simulated(described, bands, chosen)
+        trials += simulated
+        notes += [note] if note else []
     floors = floors_of(trials)
     outcome = Outcome(
         request, explained, tuple(fitted), held, bands, level, said[-1], tuple(said[:-1])
@@ -113,6 +123,7 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
         regimes=tuple(regime_table(fitted, bands)),
         margin=tuned.margin,
         shoved=tuned.shoved,
+        notes=tuple(notes),
         plan=plan,
         trials=tuple(trials),
         floors=tuple(floors),
@@ -142,6 +153,9 @@ class _Work:
         skips = repr(sorted(request.skips.items()))
         key = digest([suite_version(), repr(sorted(values.items())), skips, *prints])
         drives = tuple(read_drive(bag, robot) for bag in request.bags)
+        for bag, drive in zip(request.bags, drives, strict=True):
+            if not len(drive.command_time):
+                raise InputError(f"{bag}: no cmd_vel: record it too, the simulation needs it")
         check_wheels(drives, robot, str(request.robot))
         check_values(drives[0], values, str(request.robot))
         split = Split.of(request.bags, drives[0].duration)
@@ -162,6 +176,7 @@ class _Work:
 
         key = digest([self.key, repr(request.tolerance)])
         found = self.store.values("explained", key, make)
+        (request.out / FOLDER / EXPLAINED).unlink(missing_ok=True)  # of an earlier run
         for name, text in found["files"].items():
             write_atomically(request.out / FOLDER / name, text)
         return found
@@ -170,7 +185,7 @@ class _Work:
         """The explained description; None: nothing was missing."""
         if not explained["explained"]:
             return None
-        return self.request.out / FOLDER / "robot_explained.yaml"
+        return self.request.out / FOLDER / EXPLAINED
 
     def source(self, described: Path | None) -> str | Path:
         """What the rest is done with."""
@@ -234,7 +249,11 @@ class _Work:
                 (first, _HOPELESS * choice.most_caution),
                 (plan, choice.most_caution),
             ):
-                shoved = self.rehearsed(described, bands, settings, asked)
+                shoved = (
+                    Shoved((), (), 0.0)
+                    if tells_currents(fitted[0])
+                    else self.rehearsed(described, bands, settings, asked)
+                )
                 level = _level(self.request, evidence, shoved, plan)
                 if level.needed > most and wider <= choice.widest:
                     break
@@ -251,7 +270,7 @@ class _Work:
     ) -> Shoved:
         """Simulated shoves."""
         source, usage = str(self.source(described)), self.usage()
-        parts = (self.key, sorted(read_description(source).items()), bands, settings, usage, plan)
+        parts = (*self._parts(source, settings), bands, usage, plan)
         key = digest(map(repr, parts))
         held = self.store.values(
             f"rehearsed_{key}",
@@ -266,17 +285,26 @@ class _Work:
 
     def simulated(
         self, described: Path | None, bands: BandSettings, settings: ClassifierSettings
-    ) -> list[Trial]:
-        """Simulated faults; none for a robot that the simulator cannot do."""
+    ) -> tuple[list[Trial], str]:
+        """Simulated faults, and a note where the simulator cannot do the robot."""
         self.progress("simulating faults", 0.9)
         source, usage = str(self.source(described)), self.usage()
-        parts = (self.key, sorted(read_description(source).items()), bands, settings, usage)
 
-        def make() -> list[dict[str, Any]]:
-            return [asdict(trial) for trial in try_simulated(source, bands, settings, usage)]
+        def make() -> dict[str, Any]:
+            try:
+                trials = try_simulated(source, bands, settings, usage)
+            except InputError as error:
+                return {"trials": [], "note": f"no faults were simulated: {error}"}
+            return {"trials": [asdict(trial) for trial in trials], "note": ""}
 
-        found = self.store.values("simulated", digest(map(repr, parts)), make)
-        return [Trial(**values) for values in found]
+        key = digest(map(repr, (*self._parts(source, settings), bands, usage)))
+        found = self.store.values("simulated", key, make)
+        return [Trial(**values) for values in found["trials"]], found["note"]
+
+    def _parts(self, source: str, settings: ClassifierSettings) -> tuple[object, ...]:
+        """What everything simulated hangs on, weights of the classifier included."""
+        described = sorted(read_description(source).items())
+        return self.key, described, settings, stamp_of("", settings)
 
 
 def _observe(job: tuple[Path, str, str]) -> Observed:
