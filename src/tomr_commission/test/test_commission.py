@@ -55,7 +55,7 @@ def steps() -> Iterator[dict[str, Mock]]:
         patch("tomr_fault_diag.residuals.calibrated._LEAST", 100),
         patch(f"{HERE}.explain_drives", return_value=explained()) as explain,
         patch(f"{HERE}.rehearse", return_value=Shoved((0.0,) * 60, (0.0,) * 20, 0.1)) as rehearse,
-        patch(f"{HERE}.try_simulated", return_value=[]) as simulate,
+        patch(f"{HERE}.try_simulated", side_effect=InputError("no rollers")) as simulate,
         patch(f"{HERE}.try_injected", return_value=[FOUND]) as inject,
     ):
         yield {"inject": inject, "explain": explain, "rehearse": rehearse, "simulate": simulate}
@@ -85,6 +85,7 @@ def test_short_drive_is_a_no_go_that_says_what_to_record(done: Path) -> None:
     assert [reason["remedy"] for reason in found["reasons"]] == [
         "record the drive of tomr_commission plan, and give it as well"
     ]
+    assert found["notes"] == ["no faults were simulated: no rollers"]
     page = (done / "commission.html").read_text()
     assert "NO-GO" in page
     assert page.count("data:image/png") == 2
@@ -123,6 +124,7 @@ def test_commissioned_file_is_commissioned_again_from_its_description(
 
 
 def test_rerun_does_nothing_twice(tmp_path: Path, steps: dict[str, Mock]) -> None:
+    # All shoves are simulated after the first few.
     long = [steps[name] for name in ("explain", "rehearse", "simulate")]
     before = [step.call_count for step in long]
     with patch(f"{HERE}._observe", side_effect=_observe) as observe:
@@ -130,7 +132,7 @@ def test_rerun_does_nothing_twice(tmp_path: Path, steps: dict[str, Mock]) -> Non
         texts = (tmp_path / "commissioned.yaml").read_text()
         run(tmp_path)
     assert observe.call_count == 1
-    assert [step.call_count - count for step, count in zip(long, before, strict=True)] == [1, 1, 1]
+    assert [step.call_count - count for step, count in zip(long, before, strict=True)] == [1, 2, 1]
     assert (tmp_path / "commissioned.yaml").read_text() == texts
     run(tmp_path, "--tolerance", "0.02")
     assert steps["explain"].call_count == before[0] + 2

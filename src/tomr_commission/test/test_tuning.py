@@ -32,8 +32,8 @@ def test_bands_widen_until_shoves_pass(steady: Callable[..., Observed]) -> None:
         return Shoved(tuple(narrow) if bands.relative < 0.15 else (0.0,) * 300, (0.0,) * 100, 1.0)
 
     with patch.object(_Work, "rehearsed", rehearsed):
-        tuned = work.tuned(None, [steady(sigma=0.1)], ClassifierSettings(), Rehearsal())
+        tuned = work.tuned(None, [steady(sigma=0.1, ticks=2500)], ClassifierSettings(), Rehearsal())
     # 8 % of the 4 W hold 99.9 %: times 1.5 they are below 15 %, times 1.7 once more above.
     assert tuned.margin == request.bands.margin * request.bands.wider
     assert tuned.bands.relative > 0.15
-    assert tuned.level.needed == 0.0
+    assert tuned.level.needed < request.bands.most_caution

@@ -7,8 +7,11 @@ where the classifier is exact), so that
 
     rate(level) = sum over sources of  events per hour * P(peak > u) * exp(-(level - u) / scale)
 
-The level that gives the chosen rate is taken with the upper ends of P (Clopper-Pearson) and scale
-(gamma). A generalised Pareto tail is fitted beside it, and its shape reported.
+What the peaks leave open of P (Jeffreys) and of the scale (gamma, a usual scale counting as a few
+peaks) is drawn by chance, and the level is taken at which so many of the draws as `confidence` says
+have the chosen rate or less. A source without any peak has no tail to extrapolate: it counts as
+nothing, and the report says for how long it was watched. A generalised Pareto tail is fitted
+beside, and its shape reported.
 """
 
 import math
@@ -18,7 +21,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import beta, gamma, genpareto
+from scipy.stats import genpareto
 
 from tomr_commission.evidence import MOST_CAUTION, SURE
 from tomr_commission.request import AlarmChoice
@@ -27,7 +30,7 @@ Array = NDArray[np.float64]
 
 _CAP = MOST_CAUTION + SURE  # decades: higher peaks are known to be higher, no more
 _USUAL_SCALE, _USUAL_WEIGHT = 4.0, 4  # decades of a tail, and the peaks that this counts as
-_DRAWS = 4000
+_DRAWS, _SEED = 4000, 1
 _LEAST_RATE = 1e-12
 
 
@@ -77,29 +80,19 @@ class Tail:
     def rate(self, level: float) -> float:
         """Events per hour with a peak beyond a level, as estimated."""
         share = self.above / max(self.events, 1)
-        return self._rate(level, share, self.scale)
+        return self.events_per_hour * share * math.exp(-self._beyond(level) / self.scale)
 
-    def high_rate(self, level: float, confidence: float) -> float:
-        """The same with the upper ends of the share over the threshold and of the scale."""
-        if not self.above:
-            return 0.0  # nothing was ever held against it: only the time says how sure that is
-        share = float(beta.ppf(confidence, self.above + 1, max(self.events - self.above, 1)))
-        scale = self.scale * self.certain / float(gamma.ppf(1.0 - confidence, self.certain))
-        return self._rate(level, share, scale)
-
-    def draws(self, level: float, random: np.random.Generator) -> Array:
-        """Rates that the peaks are compatible with."""
+    def draws(self, level: float) -> Array:
+        """Rates that the peaks are compatible with, always of the same random numbers."""
         if not self.above:
             return np.zeros(_DRAWS)
+        random = np.random.default_rng(_SEED)
         share = random.beta(self.above + 0.5, self.events - self.above + 0.5, _DRAWS)
-        weight = random.gamma(self.certain, 1.0, _DRAWS) / self.certain
-        return np.asarray(
-            self.events_per_hour * share * np.exp(-(level - self.threshold) * weight / self.scale)
-        )
+        scale = self.scale * self.certain / random.gamma(self.certain, 1.0, _DRAWS)
+        return np.asarray(self.events_per_hour * share * np.exp(-self._beyond(level) / scale))
 
-    def _rate(self, level: float, share: float, scale: float) -> float:
-        beyond = max(level - self.threshold, 0.0)
-        return self.events_per_hour * share * math.exp(-beyond / scale)
+    def _beyond(self, level: float) -> float:
+        return max(level - self.threshold, 0.0)
 
 
 @frozen
@@ -123,7 +116,7 @@ class AlarmLevel:
 def alarm_level(
     tails: Sequence[Tail], wanted: float, shipped: float, choice: AlarmChoice
 ) -> AlarmLevel:
-    """The caution at which false alarms are as rare as wanted, by the upper ends of the tails.
+    """The caution at which false alarms are as rare as wanted, with the confidence chosen.
 
     Args:
         tails: of all sources.
@@ -132,9 +125,12 @@ def alarm_level(
         choice: how to choose.
     """
 
+    def drawn(caution: float) -> Array:
+        return np.asarray(sum(tail.draws(caution + SURE) for tail in tails))
+
     def excess(caution: float) -> float:
-        rates = (tail.high_rate(caution + SURE, choice.confidence) for tail in tails)
-        return math.log(max(sum(rates), _LEAST_RATE)) - math.log(wanted)
+        rate = float(np.quantile(drawn(caution), choice.confidence))
+        return math.log(max(rate, _LEAST_RATE)) - math.log(wanted)
 
     highest = 10.0 * MOST_CAUTION
     needed = 0.0
@@ -142,9 +138,7 @@ def alarm_level(
         needed = highest if excess(highest) > 0.0 else float(brentq(excess, 0.0, highest))
     caution = min(max(needed, shipped - choice.below_shipped), MOST_CAUTION)
     caution = math.ceil(10.0 * caution) / 10.0
-    random = np.random.default_rng(1)
-    drawn = sum((tail.draws(caution + SURE, random) for tail in tails), np.zeros(_DRAWS))
-    low, high = np.quantile(drawn, (0.025, 0.975))
+    low, high = np.quantile(drawn(caution), (0.025, 0.975))
     expected = sum(tail.rate(caution + SURE) for tail in tails)
     return AlarmLevel(caution, wanted, needed, expected, float(low), float(high), tuple(tails))
 

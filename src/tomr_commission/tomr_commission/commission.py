@@ -20,9 +20,9 @@ from tomr_commission.commissioned import (
     suite_version,
 )
 from tomr_commission.evidence import decisions, evidence_in
-from tomr_commission.explained import FOLDER, Split, explain_drives
+from tomr_commission.explained import EXPLAINED, FOLDER, Split, explain_drives
 from tomr_commission.injected import try_injected
-from tomr_commission.observed import Observed, frames_of, observe
+from tomr_commission.observed import Observed, frames_of, observe, tells_currents
 from tomr_commission.parallel import on_all_cores
 from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse
 from tomr_commission.request import CommissionRequest
@@ -38,12 +38,15 @@ from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.drive.cut import names_of
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.drive.record import Drive
+from tomr_power_model.errors import InputError
 from tomr_power_model.robot import load_robot, read_description, read_node_sections
 
 Progress = Callable[[str, float], None]
 
 STEPS = "steps"
 _BLOCK_TICKS = 200
+_CURRENTS = "neither shoves nor faults were simulated: the robot tells currents, not powers"
+_HOPELESS = 1.5  # times the caution that may be needed: more shoves will not bring it down
 
 
 @frozen
@@ -61,6 +64,7 @@ class Commissioned:
     floors: tuple[Floor, ...]
     text: str  # of commissioned.yaml
     date: str
+    notes: tuple[str, ...] = ()
 
     @property
     def is_go(self) -> bool:
@@ -96,7 +100,14 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     chosen = evolve(classifier, caution=level.caution)
     progress("validating", 0.85)
     said = [decisions(frames_of(drive, bands), chosen) for drive in (*fitted, held)]
-    trials = [*try_injected(held, bands, chosen), *work.simulated(described, bands, chosen)]
+    trials = try_injected(held, bands, chosen)
+    notes = [note for drive in work.drives for note in drive.notes]
+    if tells_currents(held):
+        notes.append(_CURRENTS)
+    else:
+        simulated, note = work.simulated(described, bands, chosen)
+        trials += simulated
+        notes += [note] if note else []
     floors = floors_of(trials)
     outcome = Outcome(
         request, explained, tuple(fitted), held, bands, level, said[-1], tuple(said[:-1])
@@ -112,6 +123,7 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
         regimes=tuple(regime_table(fitted, bands)),
         margin=tuned.margin,
         shoved=tuned.shoved,
+        notes=tuple(notes),
         plan=plan,
         trials=tuple(trials),
         floors=tuple(floors),
@@ -141,6 +153,9 @@ class _Work:
         skips = repr(sorted(request.skips.items()))
         key = digest([suite_version(), repr(sorted(values.items())), skips, *prints])
         drives = tuple(read_drive(bag, robot) for bag in request.bags)
+        for bag, drive in zip(request.bags, drives, strict=True):
+            if not len(drive.command_time):
+                raise InputError(f"{bag}: no cmd_vel: record it too, the simulation needs it")
         check_wheels(drives, robot, str(request.robot))
         check_values(drives[0], values, str(request.robot))
         split = Split.of(request.bags, drives[0].duration)
@@ -161,6 +176,7 @@ class _Work:
 
         key = digest([self.key, repr(request.tolerance)])
         found = self.store.values("explained", key, make)
+        (request.out / FOLDER / EXPLAINED).unlink(missing_ok=True)  # of an earlier run
         for name, text in found["files"].items():
             write_atomically(request.out / FOLDER / name, text)
         return found
@@ -169,7 +185,7 @@ class _Work:
         """The explained description; None: nothing was missing."""
         if not explained["explained"]:
             return None
-        return self.request.out / FOLDER / "robot_explained.yaml"
+        return self.request.out / FOLDER / EXPLAINED
 
     def source(self, described: Path | None) -> str | Path:
         """What the rest is done with."""
@@ -222,13 +238,26 @@ class _Work:
     ) -> Tuned:
         """The narrowest bands with which false alarms can be as rare as wanted."""
         choice, share = self.request.bands, 0.55
+        first = evolve(plan, shoves=plan.first)
         while True:
             self.progress("simulating healthy hours", share)
             bands = bands_of(fitted, choice)
-            shoved = self.rehearsed(described, bands, settings, plan)
-            level = _level(self.request, fitted, bands, settings, shoved, plan)
+            evidence = _real_peaks(fitted, bands, settings)
             wider = choice.wider * choice.margin
-            if level.needed <= choice.most_caution or wider > choice.widest:
+            # A few shoves tell where many are not worth while.
+            for asked, most in (
+                (first, _HOPELESS * choice.most_caution),
+                (plan, choice.most_caution),
+            ):
+                shoved = (
+                    Shoved((), (), 0.0)
+                    if tells_currents(fitted[0])
+                    else self.rehearsed(described, bands, settings, asked)
+                )
+                level = _level(self.request, evidence, shoved, plan)
+                if level.needed > most and wider <= choice.widest:
+                    break
+            else:
                 return Tuned(choice.margin, bands, shoved, level)
             choice, share = evolve(choice, margin=wider), min(share + 0.07, 0.8)
 
@@ -241,7 +270,7 @@ class _Work:
     ) -> Shoved:
         """Simulated shoves."""
         source, usage = str(self.source(described)), self.usage()
-        parts = (self.key, sorted(read_description(source).items()), bands, settings, usage, plan)
+        parts = (*self._parts(source, settings), bands, usage, plan)
         key = digest(map(repr, parts))
         held = self.store.values(
             f"rehearsed_{key}",
@@ -256,17 +285,26 @@ class _Work:
 
     def simulated(
         self, described: Path | None, bands: BandSettings, settings: ClassifierSettings
-    ) -> list[Trial]:
-        """Simulated faults; none for a robot that the simulator cannot do."""
+    ) -> tuple[list[Trial], str]:
+        """Simulated faults, and a note where the simulator cannot do the robot."""
         self.progress("simulating faults", 0.9)
         source, usage = str(self.source(described)), self.usage()
-        parts = (self.key, sorted(read_description(source).items()), bands, settings, usage)
 
-        def make() -> list[dict[str, Any]]:
-            return [asdict(trial) for trial in try_simulated(source, bands, settings, usage)]
+        def make() -> dict[str, Any]:
+            try:
+                trials = try_simulated(source, bands, settings, usage)
+            except InputError as error:
+                return {"trials": [], "note": f"no faults were simulated: {error}"}
+            return {"trials": [asdict(trial) for trial in trials], "note": ""}
 
-        found = self.store.values("simulated", digest(map(repr, parts)), make)
-        return [Trial(**values) for values in found]
+        key = digest(map(repr, (*self._parts(source, settings), bands, usage)))
+        found = self.store.values("simulated", key, make)
+        return [Trial(**values) for values in found["trials"]], found["note"]
+
+    def _parts(self, source: str, settings: ClassifierSettings) -> tuple[object, ...]:
+        """What everything simulated hangs on, weights of the classifier included."""
+        described = sorted(read_description(source).items())
+        return self.key, described, settings, stamp_of("", settings)
 
 
 def _observe(job: tuple[Path, str, str]) -> Observed:
@@ -275,21 +313,27 @@ def _observe(job: tuple[Path, str, str]) -> Observed:
     return observe(bag, name, load_robot(source), DiagnosisSettings.of(given, source))
 
 
-def _level(
-    request: CommissionRequest,
-    fitted: Sequence[Observed],
-    bands: BandSettings,
-    settings: ClassifierSettings,
-    shoved: Shoved,
-    plan: Rehearsal,
-) -> AlarmLevel:
-    """From real driving, block by block, and from simulated shoves."""
+@frozen
+class _Real:
+    """Peaks of evidence in real driving, block by block."""
+
+    peaks: tuple[float, ...]
+    hours: float
+
+
+def _real_peaks(
+    fitted: Sequence[Observed], bands: BandSettings, settings: ClassifierSettings
+) -> _Real:
     peaks: list[float] = []
     for drive in fitted:
         peaks += block_peaks(evidence_in(frames_of(drive, bands), settings), _BLOCK_TICKS)
-    hours = sum(drive.hours for drive in fitted)
+    return _Real(tuple(peaks), sum(drive.hours for drive in fitted))
+
+
+def _level(request: CommissionRequest, real: _Real, shoved: Shoved, plan: Rehearsal) -> AlarmLevel:
+    """From real driving and from simulated shoves."""
     tails = (
-        Tail.of("healthy driving", peaks, len(peaks) / hours, request.alarm),
+        Tail.of("healthy driving", real.peaks, len(real.peaks) / real.hours, request.alarm),
         Tail.of("simulated shoves", shoved.peaks, plan.shoves_per_hour, request.alarm),
     )
     shipped = ClassifierSettings().caution

@@ -12,11 +12,12 @@ from tomr_power_model.robot import shipped_robots
 from tomr_reality_gap.explain import explain
 from tomr_reality_gap.report.html import channel_lines
 from tomr_reality_gap.report.json import report_fields
-from tomr_reality_gap.report.write import report_files
+from tomr_reality_gap.report.write import EXPLAINED, report_files
 from tomr_reality_gap.request import Request
 
 Progress = Callable[[str, float], None]
 FOLDER = "gap"
+__all__ = ["EXPLAINED", "FOLDER", "Split", "explain_drives"]
 _REST = 1e9  # s: to the end of a recording
 
 

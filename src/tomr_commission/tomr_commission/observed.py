@@ -120,6 +120,11 @@ def observe(bag: Path, name: str, robot: Robot, settings: DiagnosisSettings) -> 
     return Observed.of(name, frames)
 
 
+def tells_currents(drive: Observed) -> bool:
+    """Whether motors are compared by their currents."""
+    return str(drive.units[MOTORS.start]) == "A"
+
+
 def band_of(observed: Observed, bands: BandSettings) -> Array:
     """Half widths of the bands, (n, 10): those of the residual stage."""
     least, relative, transient = (np.empty(RESIDUALS) for _ in range(3))

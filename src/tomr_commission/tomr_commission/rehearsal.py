@@ -61,6 +61,7 @@ class Rehearsal:
     """How the simulated hours are made."""
 
     shoves: int = 390
+    first: int = 90  # of them, that tell whether the others are worth while
     force: tuple[float, float] = (0.5, 3.0)  # N per kg of the robot
     duration: tuple[float, float] = (0.03, 0.2)  # s
     off: float = 0.02  # share by which every value of the robot may be off its explained one

@@ -30,7 +30,7 @@ class AlarmChoice:
     block: float = 10.0  # s: peaks of evidence farther apart count as independent
     kept: float = 0.25  # share of the blocks, those with the highest peaks, that make the tail
     least_peaks: int = 8  # in the tail
-    confidence: float = 0.9  # of the upper end of the tail's scale that is taken
+    confidence: float = 0.8  # that the rate is as low as wanted
     below_shipped: float = 3.0  # decades that the level may lie under the shipped one, at most
 
 

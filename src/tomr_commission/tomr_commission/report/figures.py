@@ -49,8 +49,8 @@ def _tail(panel: object, tail: Tail, colour: str) -> None:
     panel.plot(tail.peaks, counted, ".", color=colour, label=tail.source)  # type: ignore[attr-defined]
     rates = [tail.rate(float(at)) for at in grid]
     panel.plot(grid, rates, color=colour, lw=1.2, label="its tail")  # type: ignore[attr-defined]
-    highs = [tail.high_rate(float(at), 0.9) for at in grid]
-    panel.plot(grid, highs, color=colour, lw=0.8, ls=":", label="its upper end")  # type: ignore[attr-defined]
+    highs = [float(np.quantile(tail.draws(float(at)), 0.975)) for at in grid]
+    panel.plot(grid, highs, color=colour, lw=0.8, ls=":", label="its 95 % upper end")  # type: ignore[attr-defined]
 
 
 def held_picture(found: Commissioned) -> str:

@@ -90,6 +90,7 @@ def fields(found: Commissioned) -> dict[str, Any]:
             for drive, said in zip(outcome.fitted, outcome.fitted_said, strict=True)
         ],
         "floors": [asdict(floor) for floor in found.floors],
+        "notes": list(found.notes),
         "trials": [asdict(trial) for trial in found.trials],
     }
     cleaned: dict[str, Any] = _finite(value)
