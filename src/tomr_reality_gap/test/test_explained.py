@@ -71,6 +71,14 @@ def test_nodes_draw_what_was_learnt_if_another_drive_repeats_it(
     np.testing.assert_allclose(predicted(learnt, twist, 2.0) - plain, [0.0, more, 0.0], atol=1e-3)
 
 
+def test_a_long_table_is_read_again_as_it_was_written(tmp_path: Path) -> None:
+    line = np.linspace(-3.0, 3.0, 60)
+    values = np.random.default_rng(1).standard_normal((2, 3600))
+    term = LearntTerm(FAMILIES["force.place"], (), (line, line), values)
+    learnt = explained(tmp_path, {}, unmodelled=SimpleNamespace(term=term, is_repeatable=True))
+    np.testing.assert_allclose(learnt.unmodelled[0].values, values, rtol=1e-4)
+
+
 def predicted(robot: Robot, twist: tuple[float, float, float], until: float) -> np.ndarray:
     """Powers of the motors as the nodes' core expects them in the last half second [W]."""
     predictor = PowerPredictor(robot)

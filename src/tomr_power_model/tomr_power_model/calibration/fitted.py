@@ -29,6 +29,7 @@ IDENTITY_KEYS = (
     "motor.gear_ratio",
 )
 _DIGITS = 6
+_ONE_LINE = 10**9  # characters: a table's list is long
 
 
 def fitted_text(
@@ -108,7 +109,7 @@ def _lines(tree: Tree, indent: int, prefix: str, comments: Mapping[str, str]) ->
         if isinstance(value, dict):
             lines += [start, *_lines(value, indent + 2, name + ".", comments)]
             continue
-        dumped = yaml.safe_dump(_plain(value), default_flow_style=True, width=10_000)
+        dumped = yaml.safe_dump(_plain(value), default_flow_style=True, width=_ONE_LINE)
         text = dumped.partition("\n")[0]
         comment = f"  # {comments[name]}" if name in comments else ""
         lines.append(f"{start} {text}{comment}")
