@@ -121,6 +121,20 @@ def test_friction_left_out_altogether_is_friction_and_iron_loss_its_rival(
         assert -5.0 < odds["electrical.iron_loss at all_wheels"] < 0.0
 
 
+def test_coulomb_friction_alone_is_not_taken_for_iron_loss(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    """Beside a viscous friction a tenth too large, which iron loss would explain as well."""
+    robot = simulation.robot
+    physics = {**robot.physics, "friction.viscous": ({"coefficient": 0.0044},) * 3}
+    value = simulation.predict([evolve(robot, physics=physics)])[0]
+    _, found = searched(simulation, value, FRICTION, ("physics.friction.coulomb",))
+    (hypothesis,) = found.best.model.hypotheses
+    assert hypothesis.name == "friction.coulomb at all_wheels"
+    odds = {other.name for _, other in log_odds_of(hypothesis, found.alternatives[0])}
+    assert "electrical.iron_loss at all_wheels" in odds
+
+
 def test_two_wrongs_that_hide_each_other_are_found_together(
     simulation: RecordingSimulation,  # noqa: F811
 ) -> None:

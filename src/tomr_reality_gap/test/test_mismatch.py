@@ -7,16 +7,19 @@ from attrs import evolve
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.effects.scales import Scales
 from tomr_power_model.estimation.noise import rows_of
-from tomr_power_model.robot import shipped_robot
+from tomr_power_model.estimation.parameter import ParameterisedRobot, per_wheel
+from tomr_power_model.robot import read_description, shipped_robot
 from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection
 from tomr_reality_gap.fit.jacobian import linearise
-from tomr_reality_gap.fit.learnt import with_terms
+from tomr_reality_gap.fit.learnt import motion_in, with_terms
+from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
 from tomr_reality_gap.fit.simulator_discrepancy import discrepancy_torques
 from tomr_reality_gap.fit.unmodelled import Remainder, shape_of, unmodelled_effect
+from tomr_reality_gap.hypotheses.catalogue import nuisances
 from tomr_reality_gap.hypotheses.scales import scales_of
 from tomr_reality_gap.mismatch.locate import located
 from tomr_reality_gap.mismatch.orders import ripple_orders
@@ -104,6 +107,36 @@ def test_what_has_no_name_is_found_with_its_wheel_and_variable(
     # It is laid on any drive beside what is named.
     termed = with_terms(simulation, robot, (effect.term,)).predict([robot])[0]
     assert (termed - resisting).std() < 0.4 * (plain - resisting).std()
+
+
+def test_a_tether_is_told_with_its_anchor_and_a_gust_as_what_comes_and_goes(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    """8 N/m beyond 0.3 m from (0.2, 0.0); 3 N along x for four seconds in eight."""
+    robot = simulation.robot
+    motion = motion_in(simulation, robot)
+    away = np.hypot(motion.x - 0.2, motion.y)
+    pull = 8.0 * np.maximum(away - 0.3, 0.0) / away
+    tether = motion.resisting(-(pull * (motion.x - 0.2))[:, 0], -(pull * motion.y)[:, 0])
+    blows = 3.0 * (np.floor(motion.time[:, 0] / 4.0) % 2)
+    gust = motion.resisting(blows, 0.0 * blows)
+    found = []
+    for torque in (tether, gust):
+        value = next(simulation.respond(robot, torque[None]))
+        dataset = Dataset((as_recorded(simulation, value),))
+        base = ParameterisedRobot(dict(read_description("reference")), "reference")
+        parameters = nuisances(per_wheel(base.values, robot.wheel_names, "x"), robot.wheel_names, 0)
+        jacobian = linearise(dataset, Model(base, parameters, ()), ())
+        rest = Remainder.of(dataset, jacobian.value, jacobian.matrix)
+        found.append(unmodelled_effect(rest, robot, _scales(simulation)))
+    pulls, comes = found
+    assert pulls is not None
+    assert comes is not None
+    assert (pulls.family.family_id, pulls.is_repeatable) == ("force.place", True)
+    told = {name: item.value for name, item in pulls.laws[0].parameters.items()}
+    expected = {"stiffness": 8.0, "slack": 0.3, "x": 0.2, "y": 0.0}
+    assert told == pytest.approx(expected, abs=0.03)
+    assert (comes.family.family_id, comes.is_repeatable, comes.laws) == ("force.time", False, ())
 
 
 def test_what_the_users_simulation_resists_more_is_taken_off(

@@ -6,6 +6,7 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
+from tomr_power_model.effects.scales import Scales
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.response import controller_alternatives
@@ -74,7 +75,7 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
     effect, plain = _unmodelled(dataset, found, ready), None
     if effect is not None:
         plain = dataset
-        dataset, found, effect = _beside(plain, found, effect, named)
+        dataset, found, effect = _beside(plain, found, effect, named, ready.scales)
     baseline = SimulatorBaseline.of(ready.simulations, dataset, found.noise, base.robot)
     if effect is not None and baseline is not None and baseline.shows(effect):
         effect, dataset, plain = None, plain or dataset, None
@@ -96,15 +97,25 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
 
 
 def _beside(
-    plain: Dataset, found: Selection, effect: Unmodelled, named: Callable[[Dataset], Selection]
+    plain: Dataset,
+    found: Selection,
+    effect: Unmodelled,
+    named: Callable[[Dataset], Selection],
+    scales: Scales,
 ) -> tuple[Dataset, Selection, Unmodelled]:
     """Names sought once more, beside an unnamed term, and the term fitted anew beside them.
 
-    Names that only stood in for the term have bent it: fitted without any, it comes first, if
-    fewer names then leave less.
+    Names that only stood in for what no name has have bent it. What depends on nothing that names
+    depend on is sought without any of them, and comes first if fewer names then leave less.
     """
     if found.best.model.hypotheses:
-        tried = _settled(plain, _refitted(plain, found.without.model, effect), named)
+        bare = found.without.model
+        rest = _remainder(plain, bare)
+        alone = unmodelled_effect(rest, bare.described.robot, scales)
+        if alone is not None and alone.family.is_strange:
+            effect = alone
+        first = _refitted(plain, bare, effect)
+        tried = _settled(plain, first, named)
         names = [len(item.best.model.hypotheses) for item in (found, tried[1])]
         sigma = tried[1].noise.sigma
         left = [_left(data, item, sigma) for data, item in ((plain, found), tried[:2])]

@@ -8,6 +8,7 @@ Array = NDArray[np.float64]
 
 MOVING = 0.1  # rad/s: the sign of slower motion is not sure
 STANDING = 0.05  # rad/s
+_SPAN = 0.02  # s, to either side, of a measured speed
 LONG_AGO = 60.0  # s or rad since a stand that was never seen
 
 
@@ -57,7 +58,9 @@ def motion_of(inverse: Array, time: Array, *, speed: Array, current: Array, angl
     heading = np.cumsum(moved[:, 2])
     middle = heading - 0.5 * moved[:, 2]
     cos, sin = np.cos(middle), np.sin(middle)
-    stands = np.abs(speed) < STANDING
+    # As measured as well: friction that is not known holds a wheel that simulated ones have left.
+    measured = _rate(angle, period, max(round(_SPAN / period), 1))
+    stands = np.abs(measured) < STANDING
     return Motion(
         time=time[:, None],
         speed=speed,
@@ -70,9 +73,15 @@ def motion_of(inverse: Array, time: Array, *, speed: Array, current: Array, angl
         velocity_y=(sin * twist[:, 0] + cos * twist[:, 1])[:, None],
         direction=np.arctan2(twist[:, 1], twist[:, 0])[:, None],
         since_stand=_since(stands, np.full_like(speed, period)),
-        turned=_since(stands, np.abs(speed) * period),
+        turned=_since(stands, np.abs(measured) * period),
         to_wheels=inverse.T,
     )
+
+
+def _rate(angle: Array, period: float, half: int) -> Array:
+    """Speed over `half` periods to either side."""
+    padded = np.concatenate([angle[:1].repeat(half, 0), angle, angle[-1:].repeat(half, 0)])
+    return np.asarray((padded[2 * half :] - padded[: -2 * half]) / (2 * half * period))
 
 
 def _since(stands: NDArray[np.bool_], steps: Array) -> Array:

@@ -105,7 +105,7 @@ def _stand_ins(responses: Responses, best: FittedModel, number: int) -> list[Mod
             if other.name not in model.names and other.name not in candidates:
                 candidates[other.name] = model.swapped(number, other, offsets)
     nearest = responses.nearest(best, number) if responses.candidates else []
-    tried = list(candidates.values())[:_STAND_INS]
-    known = {item.hypotheses[number].name for item in tried}
-    more = [item for item in nearest if item.hypotheses[number].name not in known]
-    return [*tried, *more[:_STAND_INS]]
+    # What was worked out beside the other findings is the better start.
+    calculated = {item.hypotheses[number].name: item for item in nearest[:_STAND_INS]}
+    tried = dict(list(candidates.items())[:_STAND_INS])
+    return list({**tried, **calculated}.values())

@@ -26,7 +26,7 @@ _TINY = 1e-9
 _NEGLIGIBLE = 1e-6  # of the largest eigenvalue
 _POSITIVE = ("slack", "radius", "decay")
 _BEYOND = 1.0  # of the range, on either side, that a law is trusted beyond the table
-_FINER = 4  # knots of a law's table for each of the learnt one
+_FINER = {1: 4, 2: 2}  # knots of a law's table for each of the learnt one, by its axes
 
 
 @frozen
@@ -213,7 +213,8 @@ class LawAt:
     def term(self) -> LearntTerm:
         """The law as a table that reaches farther than what was learnt, and is finer."""
         pairs = zip(self.table.knots, self.table.family.axes, strict=True)
-        knots = tuple(_farther(points, axis.is_periodic) for points, axis in pairs)
+        finer = _FINER[len(self.table.knots)]
+        knots = tuple(_farther(points, finer, axis.is_periodic) for points, axis in pairs)
         at, learnt = _places(knots), self.learnt
         values = np.atleast_2d(self.law.value(self.parameters, at))
         rows = np.broadcast_to(values, (len(learnt.values), len(at)))
@@ -279,11 +280,11 @@ def _places(knots: Sequence[Array]) -> Array:
     return np.array(list(product(*knots)), dtype=np.float64)
 
 
-def _farther(points: Array, is_periodic: bool) -> Array:
+def _farther(points: Array, finer: int, is_periodic: bool) -> Array:
     if is_periodic:
         return points
     low, high = float(points[0]), float(points[-1])
-    beyond, step = _BEYOND * (high - low), (points[1] - points[0]) / _FINER
+    beyond, step = _BEYOND * (high - low), (points[1] - points[0]) / finer
     first = low if low >= 0.0 and low < step else low - beyond
     return np.asarray(first + step * np.arange(math.ceil((high + beyond - first) / step) + 1))
 

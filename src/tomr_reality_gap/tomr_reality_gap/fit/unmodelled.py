@@ -31,10 +31,11 @@ _MOMENT = 0.25  # s: of every four one is left out
 _MOMENTS = 4
 _INEXACT = 0.01  # of a channel's standard deviation, besides its noise
 _SHOWS = 1.0  # eigenvalue of a nuisance's information beyond which it is fitted
-_WHEEL_SHARE = 0.2  # of the wheel that shows most
+_WHEEL_SHARE = 0.1  # of the wheel that shows most
 _TOLD = 0.3  # share of what is left that a term must predict
 _SMALL = 0.02  # of a channel's standard deviation: less is not worth a word
 _LAGS = 80
+_LAW = 0.8  # of the squares that are left: a law that explains so much is no chance
 _NEAR = 0.35  # of the best share: worth a closer look
 _EVENT = 0.45  # of what a term of time explains: as much of it, and it is repeatable
 
@@ -92,6 +93,7 @@ class Unmodelled:
     evidence: float  # log, correlation of what is left accounted for
     is_large: bool  # in some channel, against what it shows in all
     change: Array  # what it adds to every value, (n,)
+    explained: float  # of the squares that are left without it, those of noise included
     sigma: Array  # of the term's values, like them
 
     @property
@@ -149,6 +151,11 @@ def unmodelled_effect(
         best = events
     if best is None or (best.share < _TOLD and not is_sure):
         return None
+    if best is events:  # few stretches may not meet again, but a law that holds for all is one
+        for item in [item for item in tried if item.table.family.is_strange]:
+            found = fitted(rest, item, robot, motions)
+            if found.laws and found.explained > _LAW:
+                return found
     return fitted(rest, best, robot, motions)
 
 
@@ -231,8 +238,15 @@ def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]
         _evidence(rest.dataset, alone, left),
         _is_large(rest.dataset, change),
         change,
+        _explained(rest, alone, change),
         np.stack(sigma),
     )
+
+
+def _explained(rest: Remainder, alone: Array, change: Array) -> float:
+    lacking, count = rest.residual - change * rest.weight, rest.base.shape[1]
+    lacking = lacking - rest.base @ solve(Gram.of(rest.base, lacking), range(count)).mean
+    return 1.0 - float(lacking @ lacking) / max(float(alone @ alone), 1e-300)
 
 
 def _normal_equations(rest: Remainder, columns: Array, left: Array) -> Evidence:

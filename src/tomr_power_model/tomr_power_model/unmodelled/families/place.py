@@ -18,6 +18,7 @@ class TorqueByPlace(Family):
     acts = "torque"
     axes: ClassVar = _FLOOR
     words = "a resistance that depends on the place on the floor"
+    is_strange = True
 
     @staticmethod
     def coordinates(motion: Motion) -> Array:
@@ -36,6 +37,7 @@ class ForceByPlace(Family):
     acts = "force"
     axes: ClassVar = _FLOOR
     words = "a force on the body that depends on where it is"
+    is_strange = True
 
     @staticmethod
     def coordinates(motion: Motion) -> Array:

@@ -19,6 +19,7 @@ class TorqueSinceStand(Family):
     acts = "torque"
     axes: ClassVar = (Axis("time since a stand", "s", 24),)
     words = "a resistance that depends on the time since the wheel last stood"
+    is_strange = True
 
     @staticmethod
     def coordinates(motion: Motion) -> Array:
@@ -37,6 +38,7 @@ class TorqueTurnedSinceStand(Family):
     acts = "torque"
     axes: ClassVar = (Axis("angle turned since a stand", "rad", 24),)
     words = "a resistance that depends on how far the wheel has turned since it last stood"
+    is_strange = True
 
     @staticmethod
     def coordinates(motion: Motion) -> Array:

@@ -16,6 +16,7 @@ class ForceByVelocity(Family):
     acts = "force"
     axes: ClassVar = (Axis("velocity along x", "m/s", 5), Axis("velocity along y", "m/s", 5))
     words = "a force on the body that depends on its velocity in the world"
+    is_strange = True
 
     @staticmethod
     def coordinates(motion: Motion) -> Array:
