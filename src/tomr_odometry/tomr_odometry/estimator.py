@@ -33,6 +33,8 @@ _SLIDES = 0.5  # probability from which a wheel is said to slide
 _SLOW = 0.02  # m/s: sliding slower than that is none
 _TRACTION_TIME = 0.3  # s, over which traction is averaged where creep depends on it
 _GRAVITY_TIME = 0.5  # s, over which a new gravity would be taken for granted
+_AHEAD = 0.25  # s, for which the motion of the last encoder sample is taken to go on
+_LOST_SPEED = 1.0  # m/s, by which a robot without encoders may be off
 _LIFTED = 1.5  # m/s^2 off the usual weight
 _LIFTED_TILT = 0.6  # rad/s of rolling or pitching
 _CARRIED_NS = to_ns(0.7)  # how long after such a moment the robot may still be carried
@@ -78,6 +80,10 @@ class SlipOdometry:
         self._clock = TickClock(given.ticks)
         self._tractions = Tractions(robot)
         self._body, self._radius = body_of(robot)
+        # Without an IMU wheels may slide unseen: the covariance has to allow for it.
+        self._unaided = given.noise._replace(
+            way=given.noise.unaided_way, turn=given.noise.unaided_turn, slip_rate=0.0
+        )
         # Magnitudes of currents are good for creep, but no evidence of what the body does.
         self._are_evidence = robot.measurement.signed
         self._clear()
@@ -239,19 +245,24 @@ class SlipOdometry:
 
     def _advance(self, time: int, dt: float, rims: Array, inertial: Array, forces: Array) -> None:
         used = creep_shape(self._robot, self._used)
+        is_aided = bool(np.isfinite(inertial[2]))
+        noise = self.settings.noise if is_aided else self._unaided
         self._P = step(
-            self._x, self._P, self._body, self.settings.noise, self._mode, used, dt,
+            self._x, self._P, self._body, noise, self._mode, used, dt,
             rims, inertial, forces,
         )  # fmt: skip
 
     def _estimate(self, tick: int) -> Estimate:
         x, P, body = self._x, self._P, self._body
-        dt = 1e-9 * (tick - self._time)
+        ahead = 1e-9 * (tick - self._time)
+        dt = min(ahead, _AHEAD)
         twist = x[VX : WZ + 1] + x[AX : AX + 3] * min(max(dt, 0.0), 0.05)
         moved = twist * dt
         yaw = x[YAW] + 0.5 * moved[2]
         c, s = math.cos(yaw), math.sin(yaw)
-        pose = x[:3] + [c * moved[0] - s * moved[1], s * moved[0] + c * moved[1], moved[2]]
+        pose = x[:3].copy()
+        pose += (c * moved[0] - s * moved[1], s * moved[0] + c * moved[1], moved[2])
+        lost = (_LOST_SPEED * (ahead - dt)) ** 2  # encoders are silent: anything may happen
         ground = body.rows @ twist
         (first, old), (last, new) = self._last[0], self._last[-1]
         rim = (new - old) / max(1e-9 * (last - first), 1e-3) * self._radius
@@ -263,9 +274,9 @@ class SlipOdometry:
         return Estimate(
             stamp_ns=tick,
             pose=pose,
-            pose_covariance=P[:3, :3].copy(),
+            pose_covariance=P[:3, :3] + lost * np.eye(3),
             twist=twist,
-            twist_covariance=P[VX : WZ + 1, VX : WZ + 1].copy(),
+            twist_covariance=P[VX : WZ + 1, VX : WZ + 1] + lost * np.eye(3),
             slip=np.clip(slip, -1.0, 1.0),
             sliding=sliding,
             probability=self._mode[:3].copy(),

@@ -6,6 +6,7 @@ from typing import Self, cast
 from attrs import field, frozen
 
 from tomr_odometry.kernel import Noise
+from tomr_power_model.errors import InputError
 from tomr_power_model.model.settings import tick_settings
 from tomr_power_model.model.ticks import TickSettings, to_ns
 from tomr_power_model.robot.parameters import ParameterSpec, check_all
@@ -24,11 +25,15 @@ PARAMETERS: tuple[ParameterSpec, ...] = (
 )
 
 
+def _ticks() -> TickSettings:
+    return TickSettings(period=to_ns(0.02))
+
+
 @frozen
 class OdometrySettings:
     """Timing, noise, and which sensors to use."""
 
-    ticks: TickSettings = TickSettings(period=to_ns(0.02))
+    ticks: TickSettings = field(factory=_ticks)
     noise: Noise = field(factory=Noise)
     use_power: bool = True
     use_imu: bool = True
@@ -54,7 +59,5 @@ class OdometrySettings:
         known = [spec.name for spec in PARAMETERS]
         unknown = [name for name in values if name not in known]
         if unknown:
-            from tomr_power_model.errors import InputError
-
             raise InputError(f"{place}: {unknown[0]} is unknown: give {', '.join(known)}")
         return cls.of(cast(Mapping[str, object], check_all(PARAMETERS, values, place)))

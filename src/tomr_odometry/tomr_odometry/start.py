@@ -4,9 +4,9 @@ import numpy as np
 
 from tomr_odometry.kernel import (
     ACCELEROMETER,
+    AW,
     AX,
     AY,
-    AW,
     CREEP,
     DRAG,
     FRICTION,
@@ -32,7 +32,7 @@ def body_of(robot: Robot) -> tuple[Body, Array]:
     rows = wheel[:, at.ROLL : at.ROLL + 3] * wheel[:, at.RADIUS, None]
     body = Body(
         rows=rows,
-        to_twist=np.linalg.inv(rows),
+        to_twist=np.asarray(np.linalg.inv(rows), dtype=np.float64),
         along=wheel[:, at.ALONG : at.ALONG + 3].copy(),
         load=wheel[:, at.LOAD].copy(),
         inertia=p[at.INERTIA : at.INERTIA + 9].reshape(3, 3).copy(),

@@ -108,8 +108,12 @@ class StageNode(Node):
 
     def offer(self, topic: str, kind: type[Outgoing]) -> None:
         """Prepare a topic to publish on."""
+        self.offer_type(topic, TYPES[kind])
+
+    def offer_type(self, topic: str, type_name: str) -> None:
+        """Prepare a topic to publish messages of a type on."""
         self._outlets[topic] = self.create_publisher(
-            message_class(TYPES[kind]),
+            message_class(type_name),
             topic,
             STAGE_QOS,
             event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
@@ -117,7 +121,11 @@ class StageNode(Node):
 
     def send(self, message: Outgoing) -> None:
         """Publish a record on its topic."""
-        self._outlets[message.topic].publish(to_ros(message.plain))
+        self.publish(message.topic, message.plain)
+
+    def publish(self, topic: str, message: Plain) -> None:
+        """Publish a plain message on a topic that was offered."""
+        self._outlets[topic].publish(to_ros(message))
 
 
 class StopRequest:

@@ -11,8 +11,9 @@ class Creep(Effect):
 
         coefficient f (1 + growth f^2),   f = traction / N_i
 
-    Rollers that drag or are soft let a wheel turn faster than it travels. Neither power nor encoders
-    tell it: `tomr_odometry learn` finds it where the pose is known. It moves the odometry alone.
+    Rollers that drag or are soft let a wheel turn faster than it travels. Neither power nor
+    encoders tell it: `tomr_odometry learn` finds it where the pose is known. It moves the odometry
+    alone.
     """
 
     effect_id = "contact.creep"
