@@ -1,6 +1,6 @@
 """Odometry that knows of slip, against plain wheel odometry: the Robotino, and drives with slip.
 
-    .venv/bin/python bench/odometry.py robotino [--every 3]
+    .venv/bin/python bench/odometry.py robotino [--every 3] [--bags DIR]
     .venv/bin/python bench/odometry.py slips --out corrected
 
 robotino: the creep of each floor learnt on every second heading and scored on the others; learnt on
@@ -29,9 +29,10 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from tomr_odometry.cli import main as tomr_odometry
+from tomr_odometry.creep import Creep
 from tomr_odometry.learn.cli import learnt_text
 from tomr_odometry.learn.drives import Leg, read_legs
-from tomr_odometry.learn.fit import Batch, Creep, fit_creep
+from tomr_odometry.learn.fit import Batch, fit_creep
 from tomr_odometry.start import body_of
 from tomr_power_model.cli import run_main
 from tomr_power_model.robot import load_robot
@@ -42,8 +43,7 @@ ROBOT = "robotino_v2"
 REFERENCE = "ground_truth/odom"
 MARKER = float(np.radians(0.9))  # by which the camera's marker is turned
 DATASETS = {"gray": "robotino", "green": "robotino", "brown": "robotino_brown"}
-NO_CREEP = Creep((0.0, 0.0, 0.0), 0.0, 0.0)
-PLAYED = 24  # drives of a floor that the estimator itself is run on
+PLAYED = 8  # drives of a floor that the estimator itself is run on
 
 
 @frozen
@@ -144,7 +144,7 @@ def robotino(options: argparse.Namespace) -> int:
     with TemporaryDirectory() as scratch:
         floors: dict[str, Floor] = {}
         for name, dataset in DATASETS.items():
-            folder = Path(scratch) / dataset
+            folder = (options.bags or Path(scratch)) / dataset
             if not (recordings() / dataset).exists():
                 print(f"skipped: {recordings() / dataset} is absent; set TOMR_RECORDINGS")
                 return 0
@@ -212,6 +212,7 @@ def _main(arguments: Sequence[str] | None) -> int:
     commands = parser.add_subparsers(required=True)
     one = commands.add_parser("robotino")
     one.add_argument("--every", type=int, default=1, help="of the headings: every n-th")
+    one.add_argument("--bags", type=Path, metavar="DIR", help="where imported drives are kept")
     one.set_defaults(run=robotino)
     other = commands.add_parser("slips")
     other.add_argument("--out", type=Path, required=True, metavar="DIR")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tomr_odometry.kernel import AX, CREEP, DRAG, FRICTION, GYRO, SLOPE, VX, WZ, YAW, step
 from tomr_odometry.settings import OdometrySettings
-from tomr_odometry.start import body_of, creep_shape, start
+from tomr_odometry.start import body_of, start
 from tomr_odometry.traction import Traction, Tractions
 from tomr_power_model.drive.sources import PowerReading
 from tomr_power_model.model.encoders import RecentStamps
@@ -93,7 +93,7 @@ class SlipOdometry:
         self._queues: dict[str, deque[tuple[int, str, tuple[float, ...]]]] = {}
         self._time = 0  # of the filter's state [ns]
         self._mode = np.zeros(4)
-        self._x, self._P = start(self._robot, self.settings.noise)
+        self._x, self._P = start(self._robot, self.settings.noise, self.settings.creep)
         self._last: deque[tuple[int, Array]] = deque()
         self._first: Array | None = None
         self._stamps = RecentStamps()
@@ -203,9 +203,9 @@ class SlipOdometry:
         """Whether encoders repeat themselves although the wheels should have turned on."""
         if not np.array_equal(angle, self._last[-1][1]) or time - self._time > _FROZEN_NS:
             return False
-        turning = np.abs(self._body.rows @ self._x[VX : WZ + 1]) / self._radius
-        expected = float(turning.max()) * 1e-9 * (time - self._time)
-        return expected > _FROZEN_COUNTS * self._quantum
+        (first, old), (last, new) = self._last[0], self._last[-1]
+        turned = float(np.abs(new - old).max()) / max(last - first, 1) * (time - self._time)
+        return turned > _FROZEN_COUNTS * self._quantum
 
     def _go_on(self, time: int, angle: Array) -> None:
         """A step of the filter to an encoder sample."""
@@ -244,7 +244,7 @@ class SlipOdometry:
         return np.array(rows)
 
     def _advance(self, time: int, dt: float, rims: Array, inertial: Array, forces: Array) -> None:
-        used = creep_shape(self._robot, self._used)
+        used = self.settings.creep.shape(self._used)
         is_aided = bool(np.isfinite(inertial[2]))
         noise = self.settings.noise if is_aided else self._unaided
         self._P = step(
@@ -266,7 +266,7 @@ class SlipOdometry:
         ground = body.rows @ twist
         (first, old), (last, new) = self._last[0], self._last[-1]
         rim = (new - old) / max(1e-9 * (last - first), 1e-3) * self._radius
-        creeps = x[CREEP] * creep_shape(self._robot, self._used) * math.hypot(twist[0], twist[1])
+        creeps = x[CREEP] * self.settings.creep.shape(self._used) * math.hypot(*twist[:2])
         sliding = np.where(self._mode[:3] > _SLIDES, rim - ground, creeps)
         larger = np.maximum(np.abs(rim), np.abs(rim - sliding))
         slip = np.where(larger > _TURNING, sliding / np.maximum(larger, _TURNING), 0.0)
@@ -308,8 +308,8 @@ class SlipOdometry:
 
     def _assumed(self, missing: tuple[str, ...]) -> tuple[str, ...]:
         found = []
-        if self._robot.effect("contact.creep") is None:
-            found.append("wheels do not creep (no contact.creep: see tomr_odometry learn)")
+        if not self.settings.creep.is_known:
+            found.append("wheels do not creep: not learnt, see tomr_odometry learn")
         if "imu/data" in missing:
             found.append("wheels do not slide: without an IMU nothing sure tells that they do")
         return tuple(found)

@@ -5,6 +5,7 @@ from typing import Self, cast
 
 from attrs import field, frozen
 
+from tomr_odometry.creep import CREEP_PARAMETERS, Creep
 from tomr_odometry.kernel import Noise
 from tomr_power_model.errors import InputError
 from tomr_power_model.model.settings import tick_settings
@@ -19,6 +20,7 @@ PARAMETERS: tuple[ParameterSpec, ...] = (
     _S("gap", "a silence or jump of stamps that starts afresh", "float", 1.0, "s", 0.1, 60.0),
     _S("use_imu", "take imu/data where it is there", "bool", True),
     _S("use_power", "take the motors' power where it is there", "bool", True),
+    *CREEP_PARAMETERS,
     _S("odom_frame", "frame of the pose", "str", "odom"),
     _S("base_frame", "frame of the robot", "str", "base_link"),
     _S("publish_tf", "odom_frame to base_frame on /tf as well", "bool", False),
@@ -35,6 +37,7 @@ class OdometrySettings:
 
     ticks: TickSettings = field(factory=_ticks)
     noise: Noise = field(factory=Noise)
+    creep: Creep = field(factory=Creep)
     use_power: bool = True
     use_imu: bool = True
     odom_frame: str = "odom"
@@ -46,6 +49,7 @@ class OdometrySettings:
         """Settings from checked parameters."""
         return cls(
             ticks=tick_settings(values),
+            creep=Creep.of(values),
             use_power=bool(values["use_power"]),
             use_imu=bool(values["use_imu"]),
             odom_frame=str(values["odom_frame"]),

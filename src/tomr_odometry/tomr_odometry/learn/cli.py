@@ -3,28 +3,29 @@
 import argparse
 import json
 from collections.abc import Mapping, Sequence
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
+from tomr_odometry.creep import Creep
 from tomr_odometry.learn.drives import Leg, read_legs
-from tomr_odometry.learn.fit import Batch, Creep, fit_creep
+from tomr_odometry.learn.fit import Batch, fit_creep
 from tomr_odometry.start import body_of
-from tomr_power_model.calibration.fitted import fitted_text
 from tomr_power_model.cli import EXIT_OK
 from tomr_power_model.errors import InputError
-from tomr_power_model.robot import load_robot, read_description
+from tomr_power_model.robot import load_robot, read_node_sections, shipped_robots
 
-ROBOT_FILE, REPORT_FILE = "robot_learnt.yaml", "learnt.json"
+ROBOT_FILE, REPORT_FILE, NODE = "robot_learnt.yaml", "learnt.json", "slip_odometry"
 _EPILOG = """\
 examples:
   tomr_odometry learn lab/* --robot my_robot.yaml --reference ground_truth/odom --out learnt
   tomr_odometry learn a b --floor lab=a --floor hall=b --reference tf:base_link --out learnt
 
 One floor: each wheel's own creep, for that floor. Several floors: what they have in common, for
-floors not seen, with its uncertainty. OUT/robot_learnt.yaml holds contact.creep."""
+floors not seen, with its uncertainty. OUT/robot_learnt.yaml holds it (creep.*)."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -69,22 +70,32 @@ def _floors(options: argparse.Namespace) -> dict[str, list[Path]]:
 
 
 def learnt_text(source: str, creep: Creep, bags: Sequence[str]) -> str:
-    """Text of a robot.yaml with the creep."""
-    values = {
-        key: value
-        for key, value in read_description(source).items()
-        if not key.startswith("physics.contact.creep.")
-    }
-    names = load_robot(source).wheel_names
-    prefix = "physics.contact.creep."
-    for name, coefficient in zip(names, creep.coefficient, strict=True):
-        values[f"{prefix}{name}.coefficient"] = float(f"{coefficient:.5g}")
-    values[f"{prefix}growth"] = float(f"{creep.growth:.5g}")
-    values[f"{prefix}uncertainty"] = float(f"{creep.uncertainty:.3g}")
-    header = [f"{source}, contact.creep by tomr_odometry learn"]
-    return fitted_text(
-        source, values, (), (), half_widths=(), header=header, provenance={"creep_bags": list(bags)}
-    )
+    """Text of a robot.yaml with the creep in the node's section; the rest stays as written."""
+    kept = read_node_sections(source, [NODE])
+    values = {name: value for name, value in kept.items() if not name.startswith("creep.")}
+    lines, in_section = [], False
+    for line in _text(source).splitlines():
+        if line[:1] not in ("", " ", "#"):
+            in_section = line.rstrip() == f"{NODE}:"
+        if not in_section:
+            lines.append(line)
+    rounded = ", ".join(f"{value:.5g}" for value in creep.coefficient)
+    lines += [
+        f"{NODE}:",
+        f"  # learnt from {', '.join(bags)}" if bags else "  # learnt",
+        "  ros__parameters:",
+        f"    creep: {{coefficient: [{rounded}], growth: {creep.growth:.5g}, "
+        f"uncertainty: {creep.uncertainty:.3g}}}",
+        *(f"    {name}: {json.dumps(value)}" for name, value in values.items()),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _text(source: str) -> str:
+    if source in shipped_robots():
+        robots = files("tomr_power_model").joinpath("robots")
+        return robots.joinpath(f"{source}.yaml").read_text(encoding="utf-8")
+    return Path(source).read_text(encoding="utf-8")
 
 
 def _report(floors: Mapping[str, Sequence[Leg]], creep: Creep, body: Any) -> dict[str, Any]:
@@ -127,7 +138,7 @@ def learn(arguments: Sequence[str] | None) -> int:
     (options.out / ROBOT_FILE).write_text(text)
     (options.out / REPORT_FILE).write_text(json.dumps(found, indent=2) + "\n")
     coefficients = ", ".join(f"{value:.3g}" for value in creep.coefficient)
-    print(f"contact.creep: {coefficients}; growth {creep.growth:.3g} +- {creep.uncertainty:.2g}")
+    print(f"creep: {coefficients}; growth {creep.growth:.3g} +- {creep.uncertainty:.2g}")
     for name, item in found["floors"].items():
         print(
             f"{name}: end error of the wheels {item['end_error_of_wheels_m']:.3f} m -> "

@@ -8,10 +8,10 @@ uncertainty on a floor not seen.
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from attrs import frozen
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from tomr_odometry.creep import Creep
 from tomr_odometry.kernel import Body
 from tomr_odometry.learn.drives import Leg
 
@@ -21,15 +21,6 @@ _YAW = 0.15  # m/rad: how much the heading at the end counts
 _PRIOR = 0.5  # standard deviation of a coefficient before the drives, and of the growth
 _START = 0.5
 _ROUNDS = 12  # of the fixed point for the speed of travel
-
-
-@frozen
-class Creep:
-    """The relation: coefficient of each wheel, growth, and the uncertainty of their mean."""
-
-    coefficient: tuple[float, float, float]
-    growth: float
-    uncertainty: float
 
 
 class Batch:
