@@ -43,7 +43,7 @@ ROBOT = "robotino_v2"
 REFERENCE = "ground_truth/odom"
 MARKER = float(np.radians(0.9))  # by which the camera's marker is turned
 DATASETS = {"gray": "robotino", "green": "robotino", "brown": "robotino_brown"}
-PLAYED = 8  # drives of a floor that the estimator itself is run on
+PLAYED = 6  # drives of a floor that the estimator itself is run on
 
 
 @frozen

@@ -104,6 +104,7 @@ class SlipOdometry:
         self._inertial: list[tuple[float, ...]] = []
         self._tractive: list[Traction] = []
         self._heard: dict[str, int] = {}
+        self._is_aided = False
         self._weight = math.nan
         self._carried_until = 0
 
@@ -237,16 +238,15 @@ class SlipOdometry:
             self._forces[found.wheel] = found.force
         known = np.nan_to_num(self._forces) / self._body.load
         self._used = known + keep * (self._used - known)
-        is_aided = self.settings.use_imu and self._is_fresh("imu", self._heard["encoders"])
-        if not self._tractive or not self._are_evidence or not is_aided:
+        self._is_aided = self.settings.use_imu and self._is_fresh("imu", self._heard["encoders"])
+        if not self._tractive or not self._are_evidence or not self._is_aided:
             return _NO_FORCES
         rows = [(f.wheel, f.force, noise.force**2 + f.std**2, f.speed) for f in self._tractive]
         return np.array(rows)
 
     def _advance(self, time: int, dt: float, rims: Array, inertial: Array, forces: Array) -> None:
         used = self.settings.creep.shape(self._used)
-        is_aided = bool(np.isfinite(inertial[2]))
-        noise = self.settings.noise if is_aided else self._unaided
+        noise = self.settings.noise if self._is_aided else self._unaided
         self._P = step(
             self._x, self._P, self._body, noise, self._mode, used, dt,
             rims, inertial, forces,

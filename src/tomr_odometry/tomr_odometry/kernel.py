@@ -185,11 +185,12 @@ def motion_rows(x: Array, n: Noise, rims: Array, inertial: Array) -> tuple[Array
         c, s = math.cos(x[YAW]), math.sin(x[YAW])
         gx, gy = c * x[SLOPE] + s * x[SLOPE + 1], c * x[SLOPE + 1] - s * x[SLOPE]
         h[m, AX], h[m, VY], h[m, WZ], h[m, ACCELEROMETER] = 1.0, -wz, -vy, 1.0
-        h[m, SLOPE], h[m, SLOPE + 1], h[m, YAW] = -c, -s, -gy
+        # A slope must not turn the heading: it is known far less than the gyro's integral.
+        h[m, SLOPE], h[m, SLOPE + 1] = -c, -s
         innovation[m] = inertial[3] - (x[AX] - wz * vy - gx + x[ACCELEROMETER])
         k = m + 1
         h[k, AY], h[k, VX], h[k, WZ], h[k, ACCELEROMETER + 1] = 1.0, wz, vx, 1.0
-        h[k, SLOPE], h[k, SLOPE + 1], h[k, YAW] = s, -c, gx
+        h[k, SLOPE], h[k, SLOPE + 1] = s, -c
         innovation[k] = inertial[4] - (x[AY] + wz * vx - gy + x[ACCELEROMETER + 1])
         variance[m] = variance[k] = n.accelerometer**2
         m += 2
