@@ -200,9 +200,10 @@ def test_imports_are_declared(package: Path) -> None:
                 assert requirement in pinned, f"{file} imports {name}: not in requirements.txt"
 
 
-@each_package(
-    "tomr_power_model", "tomr_fault_diag", "tomr_reality_gap", "tomr_sim_bridge", "tomr_view"
-)
+ROS_FREE = ("fault_diag", "odometry", "power_model", "reality_gap", "sim_bridge", "view")
+
+
+@each_package(*(f"tomr_{name}" for name in ROS_FREE))
 def test_only_nodes_import_rclpy(package: Path) -> None:
     allowed = {"nodes", "cli"}
     for file in (package / package.name).rglob("*.py"):
@@ -234,7 +235,14 @@ def test_launch_files_start_commands_that_exist() -> None:
                 named = [given.get("package"), given.get("executable")]
                 if all(isinstance(value, ast.Constant) for value in named):
                     started.add(tuple(value.value for value in named))
-    nodes = {"power_model", "power_residuals", "fault_classifier", "tomr_diagnosis", "sim_bridge"}
+    nodes = {
+        "power_model",
+        "power_residuals",
+        "fault_classifier",
+        "tomr_diagnosis",
+        "sim_bridge",
+        "slip_odometry",
+    }
     assert {command for _, command in started} == nodes
     assert started <= known
 

@@ -28,9 +28,10 @@ examples:
   tomr_odometry drive --robot my_robot.yaml --out corrected
   tomr_odometry drive --robot my_robot.yaml --out corrected --reference ground_truth/odom
 
-OUT/bag holds odom_slip (nav_msgs/Odometry), slip (JointState: slip ratios as positions, sliding [m/s]
-as velocities, traction [N] as efforts) and /diagnostics; OUT/odometry.json and OUT/odometry.png the
-summary and the path by wheels and as estimated. Exit codes: 0 done, 2 bad input."""
+OUT/bag holds odom_slip (nav_msgs/Odometry), slip (JointState: slip ratios as positions, sliding
+[m/s] as velocities, traction [N] as efforts) and /diagnostics; OUT/odometry.json and
+OUT/odometry.png the summary and the path by wheels and as estimated.
+Exit codes: 0 done, 2 bad input."""
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tomr_odometry.kernel import AX, CREEP, DRAG, FRICTION, GYRO, SLOPE, VX, WZ, YAW, step
 from tomr_odometry.settings import OdometrySettings
-from tomr_odometry.start import body_of, creep_shape, start
+from tomr_odometry.start import body_of, start
 from tomr_odometry.traction import Traction, Tractions
 from tomr_power_model.drive.sources import PowerReading
 from tomr_power_model.model.encoders import RecentStamps
@@ -33,6 +33,8 @@ _SLIDES = 0.5  # probability from which a wheel is said to slide
 _SLOW = 0.02  # m/s: sliding slower than that is none
 _TRACTION_TIME = 0.3  # s, over which traction is averaged where creep depends on it
 _GRAVITY_TIME = 0.5  # s, over which a new gravity would be taken for granted
+_AHEAD = 0.25  # s, for which the motion of the last encoder sample is taken to go on
+_LOST_SPEED = 1.0  # m/s, by which a robot without encoders may be off
 _LIFTED = 1.5  # m/s^2 off the usual weight
 _LIFTED_TILT = 0.6  # rad/s of rolling or pitching
 _CARRIED_NS = to_ns(0.7)  # how long after such a moment the robot may still be carried
@@ -78,6 +80,10 @@ class SlipOdometry:
         self._clock = TickClock(given.ticks)
         self._tractions = Tractions(robot)
         self._body, self._radius = body_of(robot)
+        # Without an IMU wheels may slide unseen: the covariance has to allow for it.
+        self._unaided = given.noise._replace(
+            way=given.noise.unaided_way, turn=given.noise.unaided_turn, slip_rate=0.0
+        )
         # Magnitudes of currents are good for creep, but no evidence of what the body does.
         self._are_evidence = robot.measurement.signed
         self._clear()
@@ -87,7 +93,7 @@ class SlipOdometry:
         self._queues: dict[str, deque[tuple[int, str, tuple[float, ...]]]] = {}
         self._time = 0  # of the filter's state [ns]
         self._mode = np.zeros(4)
-        self._x, self._P = start(self._robot, self.settings.noise)
+        self._x, self._P = start(self._robot, self.settings.noise, self.settings.creep)
         self._last: deque[tuple[int, Array]] = deque()
         self._first: Array | None = None
         self._stamps = RecentStamps()
@@ -98,6 +104,7 @@ class SlipOdometry:
         self._inertial: list[tuple[float, ...]] = []
         self._tractive: list[Traction] = []
         self._heard: dict[str, int] = {}
+        self._is_aided = False
         self._weight = math.nan
         self._carried_until = 0
 
@@ -197,9 +204,9 @@ class SlipOdometry:
         """Whether encoders repeat themselves although the wheels should have turned on."""
         if not np.array_equal(angle, self._last[-1][1]) or time - self._time > _FROZEN_NS:
             return False
-        turning = np.abs(self._body.rows @ self._x[VX : WZ + 1]) / self._radius
-        expected = float(turning.max()) * 1e-9 * (time - self._time)
-        return expected > _FROZEN_COUNTS * self._quantum
+        (first, old), (last, new) = self._last[0], self._last[-1]
+        turned = float(np.abs(new - old).max()) / max(last - first, 1) * (time - self._time)
+        return turned > _FROZEN_COUNTS * self._quantum
 
     def _go_on(self, time: int, angle: Array) -> None:
         """A step of the filter to an encoder sample."""
@@ -231,31 +238,35 @@ class SlipOdometry:
             self._forces[found.wheel] = found.force
         known = np.nan_to_num(self._forces) / self._body.load
         self._used = known + keep * (self._used - known)
-        is_aided = self.settings.use_imu and self._is_fresh("imu", self._heard["encoders"])
-        if not self._tractive or not self._are_evidence or not is_aided:
+        self._is_aided = self.settings.use_imu and self._is_fresh("imu", self._heard["encoders"])
+        if not self._tractive or not self._are_evidence or not self._is_aided:
             return _NO_FORCES
         rows = [(f.wheel, f.force, noise.force**2 + f.std**2, f.speed) for f in self._tractive]
         return np.array(rows)
 
     def _advance(self, time: int, dt: float, rims: Array, inertial: Array, forces: Array) -> None:
-        used = creep_shape(self._robot, self._used)
+        used = self.settings.creep.shape(self._used)
+        noise = self.settings.noise if self._is_aided else self._unaided
         self._P = step(
-            self._x, self._P, self._body, self.settings.noise, self._mode, used, dt,
+            self._x, self._P, self._body, noise, self._mode, used, dt,
             rims, inertial, forces,
         )  # fmt: skip
 
     def _estimate(self, tick: int) -> Estimate:
         x, P, body = self._x, self._P, self._body
-        dt = 1e-9 * (tick - self._time)
+        ahead = 1e-9 * (tick - self._time)
+        dt = min(ahead, _AHEAD)
         twist = x[VX : WZ + 1] + x[AX : AX + 3] * min(max(dt, 0.0), 0.05)
         moved = twist * dt
         yaw = x[YAW] + 0.5 * moved[2]
         c, s = math.cos(yaw), math.sin(yaw)
-        pose = x[:3] + [c * moved[0] - s * moved[1], s * moved[0] + c * moved[1], moved[2]]
+        pose = x[:3].copy()
+        pose += (c * moved[0] - s * moved[1], s * moved[0] + c * moved[1], moved[2])
+        lost = (_LOST_SPEED * (ahead - dt)) ** 2  # encoders are silent: anything may happen
         ground = body.rows @ twist
         (first, old), (last, new) = self._last[0], self._last[-1]
         rim = (new - old) / max(1e-9 * (last - first), 1e-3) * self._radius
-        creeps = x[CREEP] * creep_shape(self._robot, self._used) * math.hypot(twist[0], twist[1])
+        creeps = x[CREEP] * self.settings.creep.shape(self._used) * math.hypot(*twist[:2])
         sliding = np.where(self._mode[:3] > _SLIDES, rim - ground, creeps)
         larger = np.maximum(np.abs(rim), np.abs(rim - sliding))
         slip = np.where(larger > _TURNING, sliding / np.maximum(larger, _TURNING), 0.0)
@@ -263,9 +274,9 @@ class SlipOdometry:
         return Estimate(
             stamp_ns=tick,
             pose=pose,
-            pose_covariance=P[:3, :3].copy(),
+            pose_covariance=P[:3, :3] + lost * np.eye(3),
             twist=twist,
-            twist_covariance=P[VX : WZ + 1, VX : WZ + 1].copy(),
+            twist_covariance=P[VX : WZ + 1, VX : WZ + 1] + lost * np.eye(3),
             slip=np.clip(slip, -1.0, 1.0),
             sliding=sliding,
             probability=self._mode[:3].copy(),
@@ -297,8 +308,8 @@ class SlipOdometry:
 
     def _assumed(self, missing: tuple[str, ...]) -> tuple[str, ...]:
         found = []
-        if self._robot.effect("contact.creep") is None:
-            found.append("wheels do not creep (no contact.creep: see tomr_odometry learn)")
+        if not self.settings.creep.is_known:
+            found.append("wheels do not creep: not learnt, see tomr_odometry learn")
         if "imu/data" in missing:
             found.append("wheels do not slide: without an IMU nothing sure tells that they do")
         return tuple(found)

@@ -4,10 +4,11 @@ State (22): pose in the odometry frame; twist and its rate in base_link; way of 
 its contact gave it to the body; biases of accelerometer and gyro; pull of the floor's slope in the
 odometry frame; unknown friction of each wheel; roller drag and creep.
 
-An encoder counts its rim's way, always: the measurement is never rejected. What slips is the process
-that ties the rim to the body, d(rim_i) = (row_i v + creep s_i |v|) dt + noise, whose noise is small
-while the wheel grips and large while it slides. So counts do not turn into velocities, their quantum
-does not random-walk, and where nothing slides the pose is that of plain wheel odometry.
+An encoder counts its rim's way, always: the measurement is never rejected. What slips is the
+process that ties the rim to the body, d(rim_i) = (row_i v + creep s_i |v|) dt + noise, whose noise
+is small while the wheel grips and large while it slides. So counts do not turn into velocities,
+their quantum does not random-walk, and where nothing slides the pose is that of plain wheel
+odometry. The functions use what numba compiles, too.
 """
 
 import math
@@ -49,8 +50,10 @@ class Noise(NamedTuple):
     grip_rate: float = 3.0  # 1/s, at which they find it again
     way: float = 0.005  # m/s/sqrt(Hz) per m/s of travel, of the pose
     turn: float = 0.005  # rad/s/sqrt(Hz) per m/s, of the heading
-    slid: float = 0.05  # m/s/sqrt(Hz), of the pose while a wheel slides
-    slid_yaw: float = 0.02  # rad/s/sqrt(Hz)
+    unaided_way: float = 0.5  # the same without an IMU
+    unaided_turn: float = 0.3
+    slid: float = 0.1  # m/s/sqrt(Hz), of the pose while a wheel slides
+    slid_yaw: float = 0.04  # rad/s/sqrt(Hz)
     walk_bias: float = 2e-3  # m/s^2/sqrt(s)
     walk_gyro: float = 1e-4
     walk_slope: float = 2e-4
@@ -146,9 +149,7 @@ def judge(x: Array, P: Array, n: Noise, mode: Array, rims: Array, dt: float) -> 
         mode[i] = now
 
 
-def correct(
-    x: Array, P: Array, h: Array, innovation: Array, variance: Array, gate: float
-) -> Array:
+def correct(x: Array, P: Array, h: Array, innovation: Array, variance: Array, gate: float) -> Array:
     """Measurements made at once, (m, SIZE), (m,), (m,); returns the covariance."""
     ph = P @ h.T
     s = h @ ph
@@ -164,9 +165,7 @@ def correct(
     return 0.5 * (P + P.T)
 
 
-def motion_rows(
-    x: Array, n: Noise, rims: Array, inertial: Array
-) -> tuple[Array, Array, Array]:
+def motion_rows(x: Array, n: Noise, rims: Array, inertial: Array) -> tuple[Array, Array, Array]:
     """Rows of the rims' ways and of the IMU, NaN where it says nothing.
 
     inertial: angular rates [rad/s] and specific forces [m/s^2] in base_link, (6,).
@@ -186,11 +185,12 @@ def motion_rows(
         c, s = math.cos(x[YAW]), math.sin(x[YAW])
         gx, gy = c * x[SLOPE] + s * x[SLOPE + 1], c * x[SLOPE + 1] - s * x[SLOPE]
         h[m, AX], h[m, VY], h[m, WZ], h[m, ACCELEROMETER] = 1.0, -wz, -vy, 1.0
-        h[m, SLOPE], h[m, SLOPE + 1], h[m, YAW] = -c, -s, -gy
+        # A slope must not turn the heading: it is known far less than the gyro's integral.
+        h[m, SLOPE], h[m, SLOPE + 1] = -c, -s
         innovation[m] = inertial[3] - (x[AX] - wz * vy - gx + x[ACCELEROMETER])
         k = m + 1
         h[k, AY], h[k, VX], h[k, WZ], h[k, ACCELEROMETER + 1] = 1.0, wz, vx, 1.0
-        h[k, SLOPE], h[k, SLOPE + 1], h[k, YAW] = s, -c, gx
+        h[k, SLOPE], h[k, SLOPE + 1] = s, -c
         innovation[k] = inertial[4] - (x[AY] + wz * vx - gy + x[ACCELEROMETER + 1])
         variance[m] = variance[k] = n.accelerometer**2
         m += 2

@@ -52,9 +52,7 @@ def _path(rows: list[tuple[int, float, float, float]], place: str) -> Path2D:
 
 
 def _planar(position: Any, turn: Any) -> tuple[float, float, float]:
-    yaw = math.atan2(
-        2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2)
-    )
+    yaw = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2))
     return float(position.x), float(position.y), yaw
 
 

@@ -5,7 +5,9 @@ from typing import Self, cast
 
 from attrs import field, frozen
 
+from tomr_odometry.creep import CREEP_PARAMETERS, Creep
 from tomr_odometry.kernel import Noise
+from tomr_power_model.errors import InputError
 from tomr_power_model.model.settings import tick_settings
 from tomr_power_model.model.ticks import TickSettings, to_ns
 from tomr_power_model.robot.parameters import ParameterSpec, check_all
@@ -18,18 +20,24 @@ PARAMETERS: tuple[ParameterSpec, ...] = (
     _S("gap", "a silence or jump of stamps that starts afresh", "float", 1.0, "s", 0.1, 60.0),
     _S("use_imu", "take imu/data where it is there", "bool", True),
     _S("use_power", "take the motors' power where it is there", "bool", True),
+    *CREEP_PARAMETERS,
     _S("odom_frame", "frame of the pose", "str", "odom"),
     _S("base_frame", "frame of the robot", "str", "base_link"),
     _S("publish_tf", "odom_frame to base_frame on /tf as well", "bool", False),
 )
 
 
+def _ticks() -> TickSettings:
+    return TickSettings(period=to_ns(0.02))
+
+
 @frozen
 class OdometrySettings:
     """Timing, noise, and which sensors to use."""
 
-    ticks: TickSettings = TickSettings(period=to_ns(0.02))
+    ticks: TickSettings = field(factory=_ticks)
     noise: Noise = field(factory=Noise)
+    creep: Creep = field(factory=Creep)
     use_power: bool = True
     use_imu: bool = True
     odom_frame: str = "odom"
@@ -41,6 +49,7 @@ class OdometrySettings:
         """Settings from checked parameters."""
         return cls(
             ticks=tick_settings(values),
+            creep=Creep.of(values),
             use_power=bool(values["use_power"]),
             use_imu=bool(values["use_imu"]),
             odom_frame=str(values["odom_frame"]),
@@ -54,7 +63,5 @@ class OdometrySettings:
         known = [spec.name for spec in PARAMETERS]
         unknown = [name for name in values if name not in known]
         if unknown:
-            from tomr_power_model.errors import InputError
-
             raise InputError(f"{place}: {unknown[0]} is unknown: give {', '.join(known)}")
         return cls.of(cast(Mapping[str, object], check_all(PARAMETERS, values, place)))

@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from tomr_odometry.creep import Creep
 from tomr_odometry.kernel import (
     ACCELEROMETER,
+    AW,
     AX,
     AY,
-    AW,
     CREEP,
     DRAG,
     FRICTION,
@@ -32,7 +33,7 @@ def body_of(robot: Robot) -> tuple[Body, Array]:
     rows = wheel[:, at.ROLL : at.ROLL + 3] * wheel[:, at.RADIUS, None]
     body = Body(
         rows=rows,
-        to_twist=np.linalg.inv(rows),
+        to_twist=np.asarray(np.linalg.inv(rows), dtype=np.float64),
         along=wheel[:, at.ALONG : at.ALONG + 3].copy(),
         load=wheel[:, at.LOAD].copy(),
         inertia=p[at.INERTIA : at.INERTIA + 9].reshape(3, 3).copy(),
@@ -42,27 +43,16 @@ def body_of(robot: Robot) -> tuple[Body, Array]:
     return body, wheel[:, at.RADIUS].copy()
 
 
-def start(robot: Robot, n: Noise) -> tuple[Array, Array]:
+def start(robot: Robot, n: Noise, creep: Creep) -> tuple[Array, Array]:
     """At rest, at the origin, with what the description says; state and covariance."""
     x, std = np.zeros(SIZE), np.zeros(SIZE)
     x[DRAG] = robot.everywhere("contact.roller_drag", "coefficient")[0]
-    coefficients = robot.everywhere("contact.creep", "coefficient")
-    x[CREEP] = sum(coefficients) / WHEELS
-    known = robot.everywhere("contact.creep", "uncertainty")[0]
+    x[CREEP] = creep.mean
     std[VX : WZ + 1] = n.start_twist
     std[[AX, AY]], std[AW] = n.rate, n.turn_rate
     std[ACCELEROMETER : ACCELEROMETER + 2] = n.accelerometer_bias
     std[GYRO] = n.gyro_bias
     std[SLOPE : SLOPE + 2] = n.slope
     std[FRICTION : FRICTION + WHEELS] = n.friction
-    std[DRAG], std[CREEP] = n.drag, known or n.creep
+    std[DRAG], std[CREEP] = n.drag, creep.uncertainty or n.creep
     return x, np.diag(std**2)
-
-
-def creep_shape(robot: Robot, used: Array) -> Array:
-    """How far each wheel creeps per unit of the mean coefficient, from its traction over load."""
-    coefficient = np.array(robot.everywhere("contact.creep", "coefficient"))
-    growth = np.array(robot.everywhere("contact.creep", "growth"))
-    mean = float(coefficient.mean())
-    share = coefficient / mean if mean > 0.0 else np.ones(WHEELS)
-    return np.asarray(share * used * (1.0 + growth * used**2))

@@ -99,9 +99,7 @@ def _odometry(item: Estimate, settings: OdometrySettings) -> Plain:
     vx, vy, wz = item.twist.tolist()
     point = Plain("geometry_msgs/msg/Point", {"x": x, "y": y, "z": 0.0})
     pose = Plain("geometry_msgs/msg/Pose", {"position": point, "orientation": _turn(yaw)})
-    twist = Plain(
-        TWIST, {"linear": _vector(vx, vy, 0.0), "angular": _vector(0.0, 0.0, wz)}
-    )
+    twist = Plain(TWIST, {"linear": _vector(vx, vy, 0.0), "angular": _vector(0.0, 0.0, wz)})
     return Plain(
         ODOMETRY,
         {
@@ -146,11 +144,13 @@ def _status(robot: Robot, item: Estimate) -> Status:
     return Status("slip_odometry", level, item.words, tuple(values), "tomr")
 
 
-def estimate_messages(robot: Robot, item: Estimate, settings: OdometrySettings) -> Iterator[Published]:
+def estimate_messages(
+    robot: Robot, item: Estimate, settings: OdometrySettings
+) -> Iterator[Published]:
     """What is published of an estimate.
 
-    `slip` has for each wheel its slip ratio as position [-], how fast its contact slides as velocity
-    [m/s], and the force that it transmits as effort [N], NaN where not known.
+    `slip` has for each wheel its slip ratio as position [-], how fast its contact slides as
+    velocity [m/s], and the force that it transmits as effort [N], NaN where not known.
     """
     yield Published(ODOM_TOPIC, item.stamp_ns, _odometry(item, settings))
     yield Published(

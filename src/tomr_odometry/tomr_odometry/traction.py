@@ -2,9 +2,9 @@
 
     r F = k i - friction(omega) - J omega'
 
-Power leaves two currents of it. The driver's law tells which: the voltage that a driver holds follows
-from commands and measured speeds (`dynamics.step.control`); where that is not exact enough, the
-current that rolling would take helps. What doubt is left is part of the force's standard deviation.
+Power leaves two currents of it. The driver's law tells which: the voltage that a driver holds
+follows from commands and measured speeds (`dynamics.step.control`); where that is not exact enough,
+the current that rolling would take helps. What doubt is left is part of the force's deviation.
 """
 
 import math
@@ -21,7 +21,8 @@ from tomr_power_model.robot import WHEELS, Robot
 
 Triple = tuple[float, float, float]
 _SPAN_NS = 60_000_000  # of the encoder samples that tell speed and acceleration
-_FEWEST = 4  # samples
+_FEWEST = 8  # samples
+_RESTING = 0.3  # rad/s
 _STALE_NS = 250_000_000
 _FOLLOW = 0.05  # of what is missing, by which a driver's sum of errors follows the measured power
 _MOVING = 1.0  # rad/s
@@ -171,26 +172,22 @@ class Tractions:
         law_std = (_LAW_VOLTS + _LAW_SHARE * abs(motion[place + at.MOTION_VOLTAGE])) / cold
         if self._is_current and not self._unsigned:
             return drawn, self._noise, True
-        if self._is_current:
-            found = [-abs(drawn), abs(drawn)]
-        else:
-            readings, both = [0.0] * WHEELS, [0.0] * (2 * WHEELS)
-            readings[wheel] = drawn
-            self._laws.motor_currents(self._numbers, motion, readings, both, WHEELS)
-            found = both[2 * wheel : 2 * wheel + 2]
+        if self._is_current:  # a magnitude: a motor that brakes is taken for one that drives
+            way = math.tanh(motion[place + at.MOTION_SPEED] / _RESTING)
+            return abs(drawn) * way, self._noise, False
+        readings, both = [0.0] * WHEELS, [0.0] * (2 * WHEELS)
+        readings[wheel] = drawn
+        self._laws.motor_currents(self._numbers, motion, readings, both, WHEELS)
+        found = both[2 * wheel : 2 * wheel + 2]
         rolling = [0.0] * (WHEELS * at.POWER_WHEEL)
         self._laws.drive_power(self._numbers, motion, rolling, WHEELS)
         expected = rolling[wheel * at.POWER_WHEEL + at.POWER_CURRENT]
         spread = _ROLLING_NEWTONS * self._radius / constant
-        cost = [
-            ((one - by_law) / law_std) ** 2 + ((one - expected) / spread) ** 2 for one in found
-        ]
+        cost = [((one - by_law) / law_std) ** 2 + ((one - expected) / spread) ** 2 for one in found]
         side = int(cost[1] < cost[0])
         current, apart = found[side], found[1] - found[0]
         slope = abs(2.0 * cold * current + back)
-        noise = self._noise
-        if not self._is_current:
-            noise = (self._noise + _POWER_SHARE * abs(drawn)) / max(slope, _LEAST_SLOPE)
+        noise = (self._noise + _POWER_SHARE * abs(drawn)) / max(slope, _LEAST_SLOPE)
         other = math.exp(-0.5 * min(abs(cost[1] - cost[0]), 100.0))  # odds of the other current
         return current, math.hypot(noise, math.sqrt(other) * apart), other < _SURE
 

@@ -198,4 +198,7 @@ def tractions(p: Numbers, m: Numbers, current: Numbers, out: Mutable, n: int) ->
         dry, moves = max(dry_torque(p, w, wheel), 0.0), math.tanh(speed / STICKING_SPEED)
         torque = p[w + CONSTANT] * current[i] - p[w + VISCOUS] * speed - dry * moves
         torque -= moving_torque(p, w, wheel) + p[w + AXLE_INERTIA] * m[a + MOTION_ACCELERATION]
-        out[2 * i], out[2 * i + 1] = torque / p[w + RADIUS], dry * (1.0 - abs(moves)) / p[w + RADIUS]
+        out[2 * i], out[2 * i + 1] = (
+            torque / p[w + RADIUS],
+            dry * (1.0 - abs(moves)) / p[w + RADIUS],
+        )

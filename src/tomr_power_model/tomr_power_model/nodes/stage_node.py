@@ -138,9 +138,13 @@ class StageNode(Node):
 
     def offer(self, topic: str, kind: type[Outgoing]) -> None:
         """Prepare a topic to publish on."""
-        self._note("publishes", topic, TYPES[kind])
+        self.offer_type(topic, TYPES[kind])
+
+    def offer_type(self, topic: str, type_name: str) -> None:
+        """Prepare a topic to publish messages of a type on."""
+        self._note("publishes", topic, type_name)
         self._outlets[topic] = self.create_publisher(
-            message_class(TYPES[kind]),
+            message_class(type_name),
             topic,
             STAGE_QOS,
             event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
@@ -152,7 +156,11 @@ class StageNode(Node):
             return
         if self._namespace and isinstance(message, DiagnosticMessage):
             message = _of_robot(message, self._namespace)
-        self._outlets[message.topic].publish(to_ros(message.plain))
+        self.publish(message.topic, message.plain)
+
+    def publish(self, topic: str, message: Plain) -> None:
+        """Publish a plain message on a topic that was offered."""
+        self._outlets[topic].publish(to_ros(message))
 
     def is_heard(self, topic: str) -> bool:
         """Whether a topic is offered and anybody listens to it."""

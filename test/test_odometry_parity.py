@@ -1,0 +1,85 @@
+"""A recording through the node `slip_odometry` over DDS and through the offline core: the same."""
+
+from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from tomr_odometry.estimator import SlipOdometry
+from tomr_odometry.offline import estimates
+from tomr_odometry.settings import OdometrySettings
+from tomr_odometry.topics import OUTPUTS, estimate_messages
+from tomr_power_model.messages.bag import jazzy_typestore, to_bag
+from tomr_power_model.nodes.stage_node import STAGE_QOS, message_class
+from tomr_power_model.recordings import open_recording
+from tomr_power_model.robot import shipped_robot
+from tomr_power_model.topics.inputs import Complaints
+
+BAG = Path(__file__).parents[1] / "bags" / "square"
+ROBOT = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")
+PATIENCE = 5.0  # s
+RATE = 2.0  # times real time
+
+Key = tuple[str, int]
+
+
+def _offline() -> dict[Key, bytes]:
+    robot, store = shipped_robot("reference"), jazzy_typestore()
+    settings = OdometrySettings.given({"patience": PATIENCE}, "test")
+    core, found = SlipOdometry(robot, settings), {}
+    with open_recording(BAG) as recording:
+        for item in estimates(recording, robot, core, Complaints()):
+            for one in estimate_messages(robot, item, settings):
+                name = one.message.type_name
+                data = bytes(store.serialize_cdr(to_bag(one.message), name))
+                found[one.topic, one.stamp_ns] = data
+    return found
+
+
+def test_node_and_offline_tool_publish_the_same(
+    spawn: Callable[..., Any], wait_until: Callable[..., Any]
+) -> None:
+    if not BAG.exists():
+        pytest.fail(f"{BAG} is missing: make bags")
+    store, online = jazzy_typestore(), {}
+    rclpy.init()
+    node, executor = Node("listener"), SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        for topic, name in OUTPUTS.items():
+
+            def keep(data: bytes, topic: str = topic, name: str = name) -> None:
+                message = store.deserialize_cdr(data, name)
+                stamp = message.header.stamp
+                again = bytes(store.serialize_cdr(message, name))
+                online[topic, stamp.sec * 1_000_000_000 + stamp.nanosec] = again
+
+            node.create_subscription(message_class(name), topic, keep, STAGE_QOS, raw=True)
+        parameters = ["--ros-args", "--params-file", str(ROBOT), "-p", f"patience:={PATIENCE}"]
+        spawn(["slip_odometry", *parameters])
+
+        def connected() -> bool:
+            executor.spin_once(0.01)
+            return all(node.count_publishers(topic) == 1 for topic in OUTPUTS)
+
+        wait_until(connected, "the node")
+        replay = spawn(["bag_replay", "--ros-args", "-p", f"bag:={BAG}", "-p", f"rate:={RATE}"])
+        while replay.popen.poll() is None:
+            executor.spin_once(0.05)
+        offline = _offline()
+
+        def complete() -> bool:
+            executor.spin_once(0.05)
+            return len(online) >= len(offline)
+
+        wait_until(complete, f"{len(offline)} messages, as the offline tool gives")
+    finally:
+        node.destroy_node()
+        rclpy.shutdown()
+    assert set(online) == set(offline)
+    assert [key for key, data in online.items() if data != offline[key]] == []
