@@ -134,7 +134,9 @@ def _problem(given: Attack, code: int, errors: str, output: str) -> str:
     lines = [line for line in errors.splitlines() if line.strip()]
     usage = any(line.startswith("usage:") for line in lines)
     told = given.largest_file is None and given.tool != "tomr_import_robotino" and not usage
-    if told and code == 2 and sum(line.startswith("error:") for line in lines) != 1:
+    said = sum(line.startswith("error:") for line in lines)
+    several = given.tool == "tomr_diagnose" and said > 0  # a line for each recording
+    if told and code == 2 and said != 1 and not several:
         return "no line"
     if told and any(not line.startswith(_QUIET) for line in lines):
         return "other lines"
