@@ -33,6 +33,8 @@ from tomr_reality_gap.verdict import explanation_of
 
 Array = NDArray[np.float64]
 
+_MUCH = 0.3  # of the mismatch left by names: even a little of noise's size is looked into
+_LEAST = 0.05
 _LITTLE = 0.15  # of the noise: what is left of what is drawn is not looked into
 
 
@@ -157,7 +159,7 @@ def _unmodelled(dataset: Dataset, found: Selection, ready: Prepared) -> Unmodell
     robot = found.best.model.described.robot
     described, explained = dataset.predict([ready.base.robot, robot])
     share, size = unexplained(residuals_of(dataset, described, explained))
-    if size < _LITTLE:
+    if size < (_LEAST if share > _MUCH and found.best.model.hypotheses else _LITTLE):
         return None
     gross = is_doubted(share, size, bool(found.best.model.hypotheses))
     rest = _remainder(dataset, found.best.model)
