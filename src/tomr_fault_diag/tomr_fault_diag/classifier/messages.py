@@ -1,7 +1,14 @@
 """A diagnosis as a DiagnosticArray (REP-107)."""
 
 from tomr_fault_diag.classifier.stage import Diagnosis
-from tomr_fault_diag.classifier.states import NORMAL, NOT_OBSERVABLE, STALE, STATES, WAITING
+from tomr_fault_diag.classifier.states import (
+    NAMED,
+    NORMAL,
+    NOT_OBSERVABLE,
+    STALE,
+    STATES,
+    WAITING,
+)
 from tomr_fault_diag.residuals.frame import residual_names
 from tomr_fault_diag.residuals.messages import sentence
 from tomr_power_model.messages.outgoing import DiagnosticMessage
@@ -18,7 +25,7 @@ def diagnosis_message(robot: Robot, diagnosis: Diagnosis, hardware_id: str) -> D
     seconds, rest = divmod(diagnosis.since_ns, NANOSECONDS)
     values = [("state", diagnosis.state.name), ("since", f"{seconds}.{rest:09d}")]
     values.append(("not_observable", ", ".join(diagnosis.unseen.words)))
-    for state, share in zip(STATES, diagnosis.probabilities, strict=False):
+    for state, share in zip(NAMED, diagnosis.probabilities, strict=False):
         values.append((f"p {state.name}", f"{share:.4f}"))
     evidence = evidence_of(robot, diagnosis)
     values.extend((f"evidence {number}", text) for number, text in enumerate(evidence, start=1))

@@ -1,6 +1,5 @@
 """The classifier stage: residual frames in, diagnoses out at 1 Hz and at once on a change."""
 
-import numpy as np
 from attrs import field, frozen
 
 from tomr_fault_diag.classifier.judges import Judge, Opinion
@@ -11,6 +10,7 @@ from tomr_fault_diag.classifier.states import (
     DISOBEYS,
     NORMAL,
     NOT_OBSERVABLE,
+    PUSHED,
     STALE,
     STATES,
     UNKNOWN,
@@ -27,7 +27,7 @@ class Diagnosis:
     stamp_ns: int
     state: State
     since_ns: int
-    probabilities: tuple[float, ...]  # of STATES, given all so far; empty where nothing is known
+    probabilities: tuple[float, ...]  # of NAMED, given all so far; empty where nothing is known
     frame: ResidualFrame
     changed: bool
     wheel: int | None = None  # 0..2 that the state concerns, where it is known
@@ -35,7 +35,8 @@ class Diagnosis:
 
 
 # Whatever comes next may follow at once.
-_QUIET = (None, WAITING, STALE, NOT_OBSERVABLE, STATES[NORMAL])
+_WELL = (STATES[NORMAL], PUSHED)
+_QUIET = (None, WAITING, STALE, NOT_OBSERVABLE, *_WELL)
 
 
 class FaultClassifier:
@@ -127,24 +128,27 @@ class FaultClassifier:
             self._enter(DISOBEYS, frame.stamp_ns, None)
             return
         opinion = self._opinion = self._judge.judge(frame, elapsed, self._unseen)
-        leading = STATES[int(np.argmax(opinion.probabilities))]
-        if leading is STATES[NORMAL] and misfit.unexplained:
+        leading = opinion.leading
+        if leading in _WELL and misfit.unexplained:
             leading = UNKNOWN
-        if leading != self._candidate:
-            self._candidate, self._candidate_since = leading, frame.stamp_ns
-        if leading is UNKNOWN:
+        candidate = STATES[NORMAL] if leading in _WELL else leading
+        if candidate != self._candidate:
+            self._candidate, self._candidate_since = candidate, frame.stamp_ns
+        if leading is UNKNOWN and misfit.unexplained:
             if self._state in _QUIET:
                 self._enter(UNKNOWN, frame.stamp_ns, None)
-        elif leading is STATES[NORMAL] or (misfit.ignores_commands and self._state in _QUIET):
-            self._settle(frame.stamp_ns)
+        elif leading in _WELL or (misfit.ignores_commands and self._state in _QUIET):
+            self._settle(frame.stamp_ns, leading)
         elif opinion.sure and (leading != self._state or opinion.wheel != self._wheel):
             self._enter(leading, self._candidate_since, opinion.wheel)
         elif self._state is None:
             self._enter(STALE, frame.stamp_ns, None)
 
-    def _settle(self, stamp: int) -> None:
+    def _settle(self, stamp: int, leading: State) -> None:
         """Nothing is wrong, any more or still; what that is called depends on the motion."""
         quiet = NOT_OBSERVABLE if self._unseen.everything else STATES[NORMAL]
+        if leading is PUSHED:
+            quiet = PUSHED
         if self._state in _QUIET:
             self._enter(quiet, stamp, None)
         elif stamp - self._candidate_since >= self.settings.recovery_time:
