@@ -63,7 +63,7 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             *ARGUMENTS,
-            stage(rate, package="tomr_power_model", executable="power_model"),
+            stage(rate, hardware_id, package="tomr_power_model", executable="power_model"),
             stage(rate, hardware_id, package="tomr_fault_diag", executable="power_residuals"),
             stage(hardware_id, package="tomr_fault_diag", executable="fault_classifier"),
         ]

@@ -153,7 +153,7 @@ def test_a_robot_that_has_not_been_told_anything_waits() -> None:
     assert waiting.state.level is Level.OK
     robot = shipped_robot("reference")
     status = diagnosis_message(robot, waiting, "").statuses[0]
-    assert status.message == "waiting: no command has come yet"
+    assert status.message == "waiting: no fresh command"
     # Without any power there is more amiss than that.
     lost = Residual(nan, nan, nan, missing="no fresh wheel_1/power")
     (stale,) = _classify([ResidualFrame(BASE + 50 * MS, (unknown, lost, *(unknown,) * 8))])

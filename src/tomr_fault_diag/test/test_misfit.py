@@ -50,6 +50,9 @@ class Sure:
     def clear(self) -> None:
         self.cleared += 1
 
+    def interrupt(self) -> None:
+        pass
+
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         return Opinion(np.eye(6)[self.state], sure=True)
 

@@ -6,6 +6,7 @@ from importlib.resources import files
 import pytest
 import rclpy
 from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
 
 from tomr_fault_diag.nodes.fault_classifier_node import FaultClassifierNode
 from tomr_fault_diag.nodes.power_residuals_node import PowerResidualsNode
@@ -45,3 +46,13 @@ def test_times_of_the_classifier_hold_at_once(node: FaultClassifierNode) -> None
     (result,) = node.set_parameters([Parameter("recovery_time", value=2.5)])
     assert result.successful
     assert node.classifier.settings.recovery_time == to_ns(2.5)
+
+
+@pytest.mark.parametrize("node", ["classifier"], indirect=True)
+def test_a_fault_is_cleared_by_service(node: FaultClassifierNode) -> None:
+    client = node.create_client(Trigger, "~/clear")
+    assert client.wait_for_service(10.0)
+    answer = client.call_async(Trigger.Request())
+    rclpy.spin_until_future_complete(node, answer, timeout_sec=10.0)
+    assert answer.result().success
+    assert answer.result().message == "no fault was named"

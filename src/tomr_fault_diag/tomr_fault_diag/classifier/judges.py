@@ -67,6 +67,7 @@ _GROUPS: tuple[list[int], ...] = (
     [OTHER],
 )
 _HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
+_OF_A_WHEEL = (*_HIDDEN, METERS)
 
 
 @frozen
@@ -97,6 +98,10 @@ class Judge(Protocol):
         """Forget what was seen."""
         ...
 
+    def interrupt(self) -> None:
+        """What comes next does not join up with what was seen."""
+        ...
+
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         """Look at the newest frame, so long after the one before, and what it cannot show."""
         ...
@@ -121,16 +126,20 @@ class WindowJudge:
         """Forget what was seen: as if the robot had stood still."""
         self._window = np.zeros((WINDOW, CHANNELS))
         self._slot: int | None = None
+        self._lacking = WINDOW
         self._opinion = Opinion(np.eye(len(NAMED))[NORMAL], sure=False)
         self._recent: deque[Array] = deque(maxlen=_STRIKING_TICKS)
         self._best = NORMAL
         self._belief.clear()
 
+    def interrupt(self) -> None:
+        """Say nothing new until the window holds no other than joined frames."""
+        self._slot, self._lacking = None, WINDOW
+
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         """Look at the newest frame."""
         if elapsed_ns > _TOO_LONG:
-            self._window[:] = 0.0
-            self._slot = None
+            self.interrupt()
         slot = frame.stamp_ns // _TICK
         count = 1 if self._slot is None else slot - self._slot
         self._slot = slot
@@ -142,7 +151,14 @@ class WindowJudge:
         """Opinion after one more tick of the network."""
         self._window[:-1] = self._window[1:]
         self._window[-1] = seen
+        self._lacking = max(self._lacking - 1, 0)
+        if self._lacking:
+            return self._opinion
         likelihoods = self._network.log_likelihoods(self._window)
+        blind = [kind.start + wheel for wheel, _ in unseen.blind for kind in _OF_A_WHEEL]
+        if int(np.argmax(likelihoods)) in blind:
+            likelihoods[:] = 0.0
+        likelihoods[blind] = likelihoods[NORMAL]
         for idle in unseen.wheels:  # what an idle wheel hides it cannot refute either
             faults = [kind.start + idle for kind in _HIDDEN]
             likelihoods[faults] = np.maximum(likelihoods[faults], likelihoods[NORMAL])
@@ -194,6 +210,10 @@ class CodeJudge:
         self._smoothed: Array | None = None
         self._leading = -1
         self._led = 0
+
+    def interrupt(self) -> None:
+        """What leads has to lead anew."""
+        self._smoothed, self._led = None, 0
 
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         """Look at the newest frame."""

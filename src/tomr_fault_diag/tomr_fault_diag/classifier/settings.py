@@ -7,6 +7,7 @@ from attrs import frozen
 
 from tomr_fault_diag.residuals.frame import INPUT_ORDERS
 from tomr_power_model.errors import InputError
+from tomr_power_model.model.settings import HARDWARE_ID
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot.parameters import ParameterSpec
 
@@ -35,7 +36,7 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
         "speeds_first",
         choices=tuple(INPUT_ORDERS),
     ),
-    _S("hardware_id", "of this robot, in every diagnostic status", "str", "tomr"),
+    HARDWARE_ID,
     _S("evidence_weight", "of window: what one window counts", "float", 0.4, "", 0.01, 1.0),
     _S(
         "caution",
@@ -57,8 +58,16 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
     ),
     _live("filter_time", "of wang2024: of the probabilities", 0.15, "s", 0.0, 10.0),
     _live("confirm_time", "of wang2024: a fault must lead so long to be named", 0.15, "s", 0.0, 10),
+    _live("raise_time", "a fault must be sure so long to be named", 0.0, "s", 0.0, 60.0),
     _live(
         "recovery_time", "normal must lead this long before it is named again", 1.0, "s", 0.0, 60.0
+    ),
+    _S(
+        "latch",
+        "a named fault stays until the service ~/clear is called",
+        "bool",
+        False,
+        read_only=False,
     ),
     _live("report_period", "of /diagnostics besides changes", 1.0, "s", 0.05, 60.0),
 )
@@ -75,7 +84,9 @@ class ClassifierSettings:
     striking: float = 9.0
     filter_time: int = to_ns(0.15)
     confirm_time: int = to_ns(0.15)
+    raise_time: int = 0
     recovery_time: int = to_ns(1.0)
+    latch: bool = False
     report_period: int = to_ns(1.0)
     hardware_id: str = "tomr"
     input_order: str = "speeds_first"
@@ -100,7 +111,9 @@ class ClassifierSettings:
             striking=number("striking"),
             filter_time=to_ns(number("filter_time")),
             confirm_time=to_ns(number("confirm_time")),
+            raise_time=to_ns(number("raise_time")),
             recovery_time=to_ns(number("recovery_time")),
+            latch=bool(values["latch"]),
             report_period=to_ns(number("report_period")),
             hardware_id=str(values["hardware_id"]),
             input_order=str(values["input_order"]),

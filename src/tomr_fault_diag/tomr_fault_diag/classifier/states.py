@@ -51,11 +51,15 @@ DISOBEYS = State("does not follow its commands", Level.ERROR)
 UNKNOWN = State("unknown", Level.WARN)
 WAITING = State("waiting", Level.OK)  # for a first command: what it asks for is not known
 STALE = State("stale", Level.STALE)  # nothing can be compared
+NOT_ENOUGH = State("not enough data", Level.STALE)  # too many gaps to say anything
 # Nothing is wrong as far as can be told, and in this motion nothing could be told.
 NOT_OBSERVABLE = State("not observable in this motion", Level.OK)
 FAULTLESS = frozenset(
-    {STATES[NORMAL].name, PUSHED.name, WAITING.name, STALE.name, NOT_OBSERVABLE.name}
-)
+    {
+        STATES[NORMAL].name, PUSHED.name, WAITING.name, STALE.name, NOT_ENOUGH.name,
+        NOT_OBSERVABLE.name,
+    }
+)  # fmt: skip
 # Those that have a probability of their own, the paper's first. A stuck wheel drags.
 NAMED: tuple[State, ...] = (
     *STATES, *DRAGGING, *DEGRADED, *POWER_SENSOR, PUSHED, BURDENED, UNKNOWN,

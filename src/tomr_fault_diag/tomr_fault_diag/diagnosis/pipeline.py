@@ -19,7 +19,7 @@ from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.dynamics.binding import has_numba
 from tomr_power_model.messages.intake import WheelFinder
-from tomr_power_model.messages.outgoing import Outgoing
+from tomr_power_model.messages.outgoing import DiagnosticMessage, Outgoing
 from tomr_power_model.messages.types import TWIST_STAMPED
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.predictor import PowerPredictor
@@ -37,6 +37,7 @@ class Step:
     predictions: tuple[Prediction, ...] = ()
     frames: tuple[ResidualFrame, ...] = ()
     diagnoses: tuple[Diagnosis, ...] = ()
+    reports: tuple[DiagnosticMessage, ...] = ()  # how the inputs do
 
 
 _NOTHING = Step()
@@ -76,7 +77,12 @@ class Pipeline:
         if not predictions and not frames:
             return _NOTHING
         diagnoses = (self._classifier.classify(frame) for frame in frames)
-        return Step(tuple(predictions), tuple(frames), tuple(d for d in diagnoses if d is not None))
+        return Step(
+            tuple(predictions),
+            tuple(frames),
+            tuple(d for d in diagnoses if d is not None),
+            (*self._predictor.reports(), *self._residuals.reports()),
+        )
 
     def messages(self, step: Step) -> Iterator[Outgoing]:
         """The messages that the nodes publish at such a step."""
@@ -87,3 +93,4 @@ class Pipeline:
             yield residual_message(self.robot, frame, hardware_id)
         for diagnosis in step.diagnoses:
             yield diagnosis_message(self.robot, diagnosis, hardware_id)
+        yield from step.reports

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from std_srvs.srv import Trigger
+
 from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.messages import TOPIC, diagnosis_message
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
@@ -18,7 +20,7 @@ from tomr_power_model.topics.inputs import Input, guarded
 
 
 class FaultClassifierNode(StageNode):
-    """Publishes the diagnosis once a second and at once on a change."""
+    """Publishes the diagnosis once a second and at once on a change; ~/clear lets go of a fault."""
 
     def __init__(self) -> None:
         super().__init__("fault_classifier", CLASSIFIER_PARAMETERS)
@@ -26,6 +28,7 @@ class FaultClassifierNode(StageNode):
         self.offer(TOPIC, DiagnosticMessage)
         self.listen([Input(RESIDUALS, DIAGNOSTICS, guarded(self._take))], self._advance, STAGE_QOS)
         self.on_change(self._retune)
+        self.create_service(Trigger, "~/clear", self._clear)
 
     def _take(self, message: Any, receive_ns: int) -> None:
         frame = frame_of(message, stamp_of(message, receive_ns))
@@ -36,6 +39,12 @@ class FaultClassifierNode(StageNode):
 
     def _retune(self, values: Mapping[str, object]) -> None:
         self.classifier.settings = ClassifierSettings.of(values)
+
+    def _clear(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        named = self.classifier.release()
+        response.success = True
+        response.message = f"{named} is cleared" if named else "no fault was named"
+        return response
 
     def _advance(self) -> None:
         """Nothing is due later: a frame is answered when it comes."""

@@ -17,14 +17,16 @@ TICK_PARAMETERS: tuple[ParameterSpec, ...] = (
     _S("gap", "a silence or jump of stamps that starts afresh", "float", 1.0, "s", 0.1, 60.0),
     _S("stale_after", "age at which an input counts as missing", "float", 0.5, "s", 0.01, 10.0),
 )
+HARDWARE_ID = _S("hardware_id", "of this robot, in every diagnostic status", "str", "tomr")
 MODEL_PARAMETERS: tuple[ParameterSpec, ...] = (
     *TICK_PARAMETERS,
+    HARDWARE_ID,
     _S("encoder_window", "span of the fit to the encoders", "float", 0.07, "s", 0.01, 1.0),
     _S(
         "command_timeout",
-        "a command this old counts as a stop; 0: it is held",
+        "a command this old counts as a stop; 0: it is held, and may come on a change only",
         "float",
-        0.0,
+        0.5,
         "s",
         0.0,
         60.0,
@@ -62,9 +64,10 @@ class ModelSettings:
     ticks: TickSettings = field(factory=TickSettings)
     stale: int = to_ns(0.5)
     encoder_window: int = to_ns(0.07)
-    command_timeout: int = 0
+    command_timeout: int = to_ns(0.5)
     use_imu: bool = False
     power_model: str = "physical"
+    hardware_id: str = "tomr"
     model_values: Mapping[str, object] = field(factory=dict)  # of the models' own parameters
 
     @classmethod
@@ -77,5 +80,6 @@ class ModelSettings:
             command_timeout=to_ns(cast(float, values["command_timeout"])),
             use_imu=bool(values["use_imu"]),
             power_model=str(values["power_model"]),
+            hardware_id=str(values["hardware_id"]),
             model_values={spec.name: values[spec.name] for spec in own_parameters()},
         )

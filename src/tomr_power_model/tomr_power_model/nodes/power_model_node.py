@@ -1,6 +1,7 @@
 """Node `power_model`: the predicted power of each motor."""
 
-from tomr_power_model.messages.outgoing import JointMessage, SupplyMessage
+from tomr_power_model.messages.outgoing import DiagnosticMessage, JointMessage, SupplyMessage
+from tomr_power_model.model.input_health import TOPIC as DIAGNOSTICS
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.settings import MODEL_PARAMETERS, ModelSettings
 from tomr_power_model.nodes.command_line import node_arguments
@@ -16,13 +17,15 @@ PARAMETERS = (*MODEL_PARAMETERS, CMD_VEL_TYPE)
 
 
 class PowerModelNode(StageNode):
-    """Publishes expected wheel motion and power at the decision rate, stamped by the data."""
+    """Publishes expected wheel motion and power at the decision rate, stamped by the data, and how
+    the commands come."""
 
     def __init__(self) -> None:
         super().__init__("power_model", PARAMETERS)
         self._predictor = PowerPredictor(self._robot, ModelSettings.of(self.values))
         for topic in prediction_topics(self._robot):
             self.offer(topic, JointMessage if topic == EXPECTED else SupplyMessage)
+        self.offer(DIAGNOSTICS, DiagnosticMessage)
         twist_type = TWIST_TYPES[str(self.values["cmd_vel_type"])]
         self.listen(model_inputs(self._robot, self._predictor, twist_type), self._advance)
 
@@ -30,6 +33,8 @@ class PowerModelNode(StageNode):
         for prediction in self._predictor.due():
             for message in prediction_messages(self._robot, prediction):
                 self.send(message)
+        for report in self._predictor.reports():
+            self.send(report)
 
 
 def main() -> int:

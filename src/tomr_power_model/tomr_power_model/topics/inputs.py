@@ -5,6 +5,7 @@ from typing import Any
 
 from attrs import frozen
 
+from tomr_power_model.drive.plausible import PowerLimits
 from tomr_power_model.drive.sources import (
     ENCODER_TOPIC,
     PowerReading,
@@ -77,8 +78,11 @@ def model_inputs(
     def imu(message: Any, receive_ns: int) -> Arrival:
         return predictor.imu(stamp_of(message, receive_ns), yaw_rate_of(message))
 
-    def power(reading: PowerReading) -> Arrival:
-        return predictor.measured(reading.wheel, reading.stamp_ns)
+    limits = PowerLimits.of(robot)
+
+    def power(reading: PowerReading) -> Arrival | str:
+        problem = limits.problem(reading)
+        return problem or predictor.measured(reading.wheel, reading.stamp_ns)
 
     inputs = [
         Input("cmd_vel", twist_type, guarded(command), (TWIST, TWIST_STAMPED)),
@@ -91,8 +95,8 @@ def model_inputs(
 
 def measured_inputs(
     robot: Robot,
-    encoders: Callable[[int, Triple, Triple], Arrival],
-    power: Callable[[PowerReading], Arrival],
+    encoders: Callable[[int, Triple, Triple], Arrival | str],
+    power: Callable[[PowerReading], Arrival | str],
     wheels: WheelFinder | None = None,
 ) -> tuple[Input, ...]:
     """Inputs of a stage that takes encoders and power; `wheels` may be shared with another one."""
@@ -107,31 +111,33 @@ def measured_inputs(
     return (Input(ENCODER_TOPIC, JOINT_STATE, guarded(take)), *inputs)
 
 
-def _power(source: PowerTopic, power: Callable[[PowerReading], Arrival]) -> Take:
-    def take(message: Any, receive_ns: int) -> Arrival | None:
-        arrival = None
+def _power(source: PowerTopic, power: Callable[[PowerReading], Arrival | str]) -> Take:
+    def take(message: Any, receive_ns: int) -> Arrival | str | None:
+        outcome: Arrival | str | None = None
         for reading in source.read(message, receive_ns):
-            arrival = power(reading)
-        return arrival
+            found = power(reading)
+            outcome = outcome if isinstance(outcome, str) else found
+        return outcome
 
     return take
 
 
 def _with_power(
-    encoders: Take, source: PowerTopic, power: Callable[[PowerReading], Arrival]
+    encoders: Take, source: PowerTopic, power: Callable[[PowerReading], Arrival | str]
 ) -> Take:
     also = _power(source, power)
 
     def take(message: Any, receive_ns: int) -> Arrival | str | None:
         arrival = encoders(message, receive_ns)
-        if arrival not in (Arrival.UNSTAMPED, Arrival.REPEATED):
-            also(message, receive_ns)
-        return arrival
+        if arrival in (Arrival.UNSTAMPED, Arrival.REPEATED):
+            return arrival
+        problem = also(message, receive_ns)
+        return problem if isinstance(problem, str) else arrival
 
     return take
 
 
-def _encoders(wheels: WheelFinder, take: Callable[[int, Triple, Triple], Arrival]) -> Take:
+def _encoders(wheels: WheelFinder, take: Callable[[int, Triple, Triple], Arrival | str]) -> Take:
     """Reads the wheels out of joint_states for a stage's `encoders`; tells of missing wheels."""
 
     def encoders(message: Any, receive_ns: int) -> Arrival | str:

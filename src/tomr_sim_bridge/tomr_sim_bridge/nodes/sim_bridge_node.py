@@ -28,6 +28,7 @@ from tomr_power_model.nodes.stage_node import (
 )
 from tomr_power_model.robot.parameters import ParameterSpec, Value
 from tomr_sim_bridge.faults import all_parameters, split_name
+from tomr_sim_bridge.plant.drivers import COMMAND_TIMEOUT
 from tomr_sim_bridge.plant.samples import Sample
 from tomr_sim_bridge.plant.simulation import Simulation
 
@@ -85,6 +86,14 @@ PARAMETERS = (
         minimum=0.0,
         maximum=10.0,
     ),
+    _S(
+        "command_timeout",
+        "a command this old counts as a stop; 0: it is held",
+        unit="s",
+        default=COMMAND_TIMEOUT,
+        minimum=0.0,
+        maximum=60.0,
+    ),
     _S("stamp_jitter", "of the sampling times", unit="s", default=0.0, minimum=0.0, maximum=1.0),
 )
 FAULT_PARAMETERS = {name: attrs.evolve(spec, name=name) for name, spec in all_parameters().items()}
@@ -105,6 +114,7 @@ class SimBridge(Node):
             floor_friction=_number(values, "floor_friction") or None,
             payload=_number(values, "payload"),
             stamp_jitter=_number(values, "stamp_jitter"),
+            command_timeout=_number(values, "command_timeout"),
         )
         self._factor = _number(values, "real_time_factor")
         self._slowed_ns = 0

@@ -79,6 +79,7 @@ class Simulation:
         floor_friction: float | None = None,
         payload: float = 0.0,
         stamp_jitter: float = 0.0,
+        command_timeout: float = 0.0,
         further_effects: Sequence[PlantEffect] = (),
     ) -> None:
         """Build the plant at rest.
@@ -90,6 +91,7 @@ class Simulation:
             floor_friction: traction coefficient, None for that of the description.
             payload: mass on top of the description [kg].
             stamp_jitter: standard deviation of the sampling times [s].
+            command_timeout: a command this old counts as a stop [s]; 0: it is held.
             further_effects: physics that no description can name, on top of those in it.
 
         Raises:
@@ -110,7 +112,7 @@ class Simulation:
         random = np.random.default_rng(seed)
         phase = random.uniform(0.0, 2.0 * math.pi, WHEELS)
         self.engine = Engine(robot, design, self._grid.timestep, phase)
-        self._drivers = WheelDrivers(robot, self._grid.control_period)
+        self._drivers = WheelDrivers(robot, self._grid.control_period, command_timeout)
         self._start_ns = start_ns
         self._count = 0
         self._prepare_state()
@@ -167,7 +169,7 @@ class Simulation:
         return self._start_ns + round(count * self._grid.stretch * NANOSECONDS)
 
     def command(self, v_x: float, v_y: float, omega_z: float, stamp_ns: int | None = None) -> None:
-        """Command a body twist [m/s, rad/s], held until the next; in force from its stamp on."""
+        """Command a body twist [m/s, rad/s], until the next or its timeout, from its stamp on."""
         stamp = self.stamp_ns if stamp_ns is None else stamp_ns
         self._drivers.command(stamp, np.array([v_x, v_y, omega_z]))
 
