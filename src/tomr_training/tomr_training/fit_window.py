@@ -41,11 +41,11 @@ class WindowRecipe:
     hidden: tuple[int, int] = (128, 64)
     learning_rate: float = 6e-3
     batch: int = 1024
-    epochs: int = 6
+    epochs: int = 5
     seed: int = 1
     # Shares of the ticks that are kept: windows overlap, and most healthy ones teach nothing new.
-    healthy: float = 0.25
-    faulty: float = 0.6
+    healthy: float = 0.2
+    faulty: float = 0.35
     blinded: float = 0.1  # share of the examples that lack a sensor
 
 

@@ -54,9 +54,11 @@ _CLIP = 24.0  # no window says more than so much against anything
 _ENDING = 1e-4  # likelihood that a fault ends within a tick ...
 _SLIP_ENDING = 5e-3  # ... and that a slippery place is left
 _PUSH = 1e-3  # that somebody pushes, and ...
-_PUSH_ENDING = 0.2  # ... that it is over: a push of 4 s is as unlikely as a load
+_PUSH_ENDING = 0.15  # ... that it is over: a push of 6 s is as unlikely as a load
 _OTHER = 1e-6  # and that one fault becomes another
 _STRANGE = 1e-2  # of a fault of no known kind, over that of a known one
+_SLIPPERY = 1e5  # of slip, over that of other faults: it may be over soon
+_SLOW = 1e-4  # of what a description that is off looks like, all the time
 _LEAST = 1e-30
 
 
@@ -98,6 +100,9 @@ def _transitions(onset: float) -> Array:
     moves[:, NORMAL] = _ENDING
     moves[SLIP, NORMAL] = _SLIP_ENDING
     moves[[NORMAL, EXTERNAL]] = onset
+    moves[[NORMAL, EXTERNAL], SLIP] *= _SLIPPERY
+    for kind in (DRAGS, WEAKS, METERS):
+        moves[[NORMAL, EXTERNAL], kind] *= _SLOW
     moves[:, OTHER] *= _STRANGE
     moves[NORMAL, EXTERNAL] = _PUSH
     moves[EXTERNAL, NORMAL] = _PUSH_ENDING

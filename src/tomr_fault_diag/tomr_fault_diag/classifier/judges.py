@@ -66,6 +66,7 @@ _GROUPS: tuple[list[int], ...] = (
     [LOADED],
     [OTHER],
 )
+_SLIP_MARGIN = 4.0  # that slip need be less striking: a short one shows in few windows
 _HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
 _OF_A_WHEEL = (*_HIDDEN, METERS)
 
@@ -164,7 +165,7 @@ class WindowJudge:
             likelihoods[faults] = np.maximum(likelihoods[faults], likelihoods[NORMAL])
         likelihoods = of_states(likelihoods)
         shares = self._belief.update(likelihoods)
-        self._recent.append(likelihoods - likelihoods[NORMAL])
+        self._recent.append(_ratios(likelihoods))
         group = max(_GROUPS, key=lambda group: float(shares[group].sum()))
         best = self._kept(shares, group)
         striking = any(window[group].max() > self.settings.striking for window in self._recent)
@@ -182,6 +183,16 @@ class WindowJudge:
             best = self._best
         self._best = best
         return best
+
+
+def _ratios(likelihoods: Array) -> Array:
+    """How much a window says for each state, over what a healthy robot explains of it."""
+    ratios = likelihoods - max(likelihoods[NORMAL], likelihoods[EXTERNAL])
+    # Traction that fails is a force as well: a window alone hardly tells it from a push.
+    for state in (SLIP, LOADED):
+        ratios[state] = likelihoods[state] - likelihoods[NORMAL]
+    ratios[SLIP] += _SLIP_MARGIN
+    return np.asarray(ratios)
 
 
 def _stands(window: Array, wheel: int) -> bool:
