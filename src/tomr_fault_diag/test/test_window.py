@@ -260,6 +260,16 @@ def test_states_beyond_the_papers_and_what_it_would_call_them(
     assert (None if state.paper is None else STATES[state.paper].name) == paper
 
 
+def test_what_windows_say_only_slightly_never_adds_up_to_a_drag() -> None:
+    network = Saying()
+    judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]
+    for over, state in ((0.8, STATES[NORMAL]), (4.0, DRAGGING[0])):
+        network.likelihoods[DRAGS.start] = over
+        for tick in range(400):
+            opinion = judge.judge(frame(tick), 50 * MS, Unseen())
+        assert opinion.leading is state
+
+
 def test_a_wheel_that_stands_while_it_drags_is_stuck() -> None:
     network = Saying()
     judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]

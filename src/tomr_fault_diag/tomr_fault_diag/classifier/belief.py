@@ -90,7 +90,7 @@ def of_states(likelihoods: Array) -> Array:
     faults = found[_FAULTS]
     most = faults.max()
     any_fault = most + np.log(np.mean(np.exp(faults - most)))
-    found[OTHER] = np.logaddexp(found[OTHER], any_fault)
+    found[OTHER] = np.logaddexp(found[OTHER], any_fault) - np.log(2.0)
     return found
 
 

@@ -67,6 +67,10 @@ _GROUPS: tuple[list[int], ...] = (
     [OTHER],
 )
 _SLIP_MARGIN = 4.0  # that slip need be less striking: a short one shows in few windows
+# A description that is off looks like these: what a window says only slightly is not counted, for
+# it would say it again and again.
+_CREEPING = (DRAGS, WEAKS, METERS)
+_SLIGHT = 1.0
 _HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
 _OF_A_WHEEL = (*_HIDDEN, METERS)
 
@@ -163,6 +167,10 @@ class WindowJudge:
         for idle in unseen.wheels:  # what an idle wheel hides it cannot refute either
             faults = [kind.start + idle for kind in _HIDDEN]
             likelihoods[faults] = np.maximum(likelihoods[faults], likelihoods[NORMAL])
+        for kind in _CREEPING:
+            over = likelihoods[kind] - likelihoods[NORMAL]
+            plain = np.sign(over) * np.maximum(np.abs(over) - _SLIGHT, 0.0)
+            likelihoods[kind] = likelihoods[NORMAL] + plain
         likelihoods = of_states(likelihoods)
         shares = self._belief.update(likelihoods)
         self._recent.append(_ratios(likelihoods))
