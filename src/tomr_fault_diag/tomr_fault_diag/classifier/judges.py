@@ -176,7 +176,7 @@ class WindowJudge:
         self._recent.append(_ratios(likelihoods))
         group = max(_GROUPS, key=lambda group: float(shares[group].sum()))
         best = self._kept(shares, group)
-        striking = any(window[group].max() > self.settings.striking for window in self._recent)
+        striking = any(window[best] > self.settings.striking for window in self._recent)
         state = STATE_OF[best]
         wheel = best - CONTROLS.start if state is STATES[CONTROL] else state.wheel
         if state in DRAGGING and _stands(self._window, best - DRAGS.start):
@@ -194,11 +194,13 @@ class WindowJudge:
 
 
 def _ratios(likelihoods: Array) -> Array:
-    """How much a window says for each state, over what a healthy robot explains of it."""
-    ratios = likelihoods - max(likelihoods[NORMAL], likelihoods[EXTERNAL])
-    # Traction that fails is a force as well: a window alone hardly tells it from a push.
-    for state in (SLIP, LOADED):
-        ratios[state] = likelihoods[state] - likelihoods[NORMAL]
+    """How much a window says for each state, over what a healthy robot explains of it.
+
+    Of what a description that is off looks like, a push explains the rest.
+    """
+    ratios = likelihoods - likelihoods[NORMAL]
+    for kind in _CREEPING:
+        ratios[kind] -= max(likelihoods[EXTERNAL] - likelihoods[NORMAL], 0.0)
     ratios[SLIP] += _SLIP_MARGIN
     return np.asarray(ratios)
 
