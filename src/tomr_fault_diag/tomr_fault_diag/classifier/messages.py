@@ -3,6 +3,7 @@
 from tomr_fault_diag.classifier.advice import check_first
 from tomr_fault_diag.classifier.stage import Diagnosis
 from tomr_fault_diag.classifier.states import (
+    NAMED,
     NORMAL,
     NOT_ENOUGH,
     NOT_OBSERVABLE,
@@ -33,7 +34,7 @@ def diagnosis_message(
     values += [("since", f"{seconds}.{rest:09d}")]
     values.append(("check_first", check_first(diagnosis.state)))
     values.append(("not_observable", ", ".join(diagnosis.unseen.words)))
-    for state, share in zip(STATES, diagnosis.probabilities, strict=False):
+    for state, share in zip(NAMED, diagnosis.probabilities, strict=False):
         values.append((f"p {state.name}", f"{share:.4f}"))
     values.append(("commissioned", commissioned))
     evidence = evidence_of(robot, diagnosis)
@@ -56,7 +57,7 @@ def evidence_of(robot: Robot, diagnosis: Diagnosis) -> list[str]:
 
 def six_state(state: State) -> str:
     """Which of the paper's six states it is; what is none of them is unknown."""
-    return state.name if state in STATES else UNKNOWN.name
+    return UNKNOWN.name if state.paper is None else STATES[state.paper].name
 
 
 def _headline(robot: Robot, diagnosis: Diagnosis) -> str:

@@ -42,7 +42,7 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
         "",
     ),
     HARDWARE_ID,
-    _S("evidence_weight", "of window: what one window counts", "float", 0.4, "", 0.01, 1.0),
+    _S("evidence_weight", "of window: what one window counts", "float", 0.5, "", 0.01, 1.0),
     _S(
         "caution",
         "of window: decades of evidence needed before a fault is named",
@@ -84,7 +84,7 @@ class ClassifierSettings:
 
     classifier: str = "window"
     weights: str = ""
-    evidence_weight: float = 0.4
+    evidence_weight: float = 0.5
     caution: float = 11.0
     striking: float = 9.0
     filter_time: int = to_ns(0.15)

@@ -1,6 +1,5 @@
 """The classifier stage: residual frames in, diagnoses out at 1 Hz and at once on a change."""
 
-import numpy as np
 from attrs import evolve, field, frozen
 
 from tomr_fault_diag.classifier.judges import Judge, Opinion
@@ -13,6 +12,7 @@ from tomr_fault_diag.classifier.states import (
     NOT_ENOUGH,
     NOT_OBSERVABLE,
     POWER_SENSOR,
+    PUSHED,
     STALE,
     STATES,
     UNKNOWN,
@@ -30,7 +30,7 @@ class Diagnosis:
     stamp_ns: int
     state: State
     since_ns: int
-    probabilities: tuple[float, ...]  # of STATES, given all so far; empty where nothing is known
+    probabilities: tuple[float, ...]  # of NAMED, given all so far; empty where nothing is known
     frame: ResidualFrame
     changed: bool
     wheel: int | None = None  # 0..2 that the state concerns, where it is known
@@ -39,7 +39,8 @@ class Diagnosis:
 
 
 # Whatever comes next may follow at once.
-_QUIET = (None, WAITING, STALE, NOT_ENOUGH, NOT_OBSERVABLE, STATES[NORMAL], *POWER_SENSOR)
+_WELL = (STATES[NORMAL], PUSHED)
+_QUIET = (None, WAITING, STALE, NOT_ENOUGH, NOT_OBSERVABLE, *_WELL, *POWER_SENSOR)
 
 
 class FaultClassifier:
@@ -153,20 +154,19 @@ class FaultClassifier:
 
     def _weigh(self, opinion: Opinion, misfit: Misfit, stamp: int) -> None:
         """Name what the judge is sure of, or what it does not know."""
-        leading = STATES[int(np.argmax(opinion.probabilities))]
-        if leading is STATES[NORMAL] and misfit.unexplained:
+        leading = opinion.leading
+        if leading in _WELL and misfit.unexplained:
             leading = UNKNOWN
-        if leading != self._candidate:
-            self._candidate, self._candidate_since, self._sure_since = leading, stamp, None
+        candidate = STATES[NORMAL] if leading in _WELL else leading
+        if candidate != self._candidate:
+            self._candidate, self._candidate_since, self._sure_since = candidate, stamp, None
         held = self._is_held(opinion.sure, stamp)
         is_blind = opinion.wheel in [wheel for wheel, _ in self._unseen.blind]
-        if leading is UNKNOWN:
+        if leading is UNKNOWN and misfit.unexplained:
             if self._state in _QUIET:
                 self._enter(UNKNOWN, stamp, None)
-        elif leading is STATES[NORMAL] or (
-            (misfit.ignores_commands or is_blind) and self._state in _QUIET
-        ):
-            self._settle(stamp)
+        elif leading in _WELL or ((misfit.ignores_commands or is_blind) and self._state in _QUIET):
+            self._settle(stamp, leading)
         elif held and not is_blind and (leading != self._state or opinion.wheel != self._wheel):
             self._enter(leading, self._candidate_since, opinion.wheel)
         elif self._state is None:
@@ -193,9 +193,11 @@ class FaultClassifier:
         else:
             self._enter(STALE, frame.stamp_ns, None)
 
-    def _settle(self, stamp: int) -> None:
+    def _settle(self, stamp: int, leading: State) -> None:
         """Nothing is wrong, any more or still; what that is called depends on the motion."""
         quiet = NOT_OBSERVABLE if self._unseen.everything else STATES[NORMAL]
+        if leading is PUSHED:
+            quiet = PUSHED
         ailing = [wheel for wheel, reason in self._unseen.blind if reason]
         if ailing:
             quiet = POWER_SENSOR[ailing[0]]
