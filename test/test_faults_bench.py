@@ -154,7 +154,7 @@ def test_two_seconds_after_a_bump_are_left_out() -> None:
 
 def test_states_are_scored_by_their_names_and_first_stamps() -> None:
     names = [
-        scored_name(state.name) for state in (*STATES, NOT_OBSERVABLE, STALE, DISOBEYS, WAITING)
+        scored_name(state) for state in (*STATES, NOT_OBSERVABLE, STALE, DISOBEYS, WAITING)
     ]
     assert names == [
         *("normal", "slip", "control_system"),

@@ -153,7 +153,8 @@ def test_a_loop_jumps_back_and_ends_cleanly_on_a_signal(
     assert received[per_round : 2 * per_round] == received[:per_round]
     assert received[:per_round] == recorded(bag, "joint_states")[per_round:]
     jumps = [after - before for before, after in pairwise(listener.clock) if after < before]
-    assert len(jumps) in (1, 2)
+    assert jumps  # the clock may be rounds ahead of what else was received
+    assert set(jumps) == {jumps[0]}
     assert listener.clock[0] == START_NS + 1_000_000_000
     replay.signal(number, group=True)
     replay.signal(number, group=True)

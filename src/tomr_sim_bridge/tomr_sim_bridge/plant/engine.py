@@ -48,7 +48,6 @@ class Engine:
         angles = wheel_angles(robot)
         self._arms = robot.robot_radius * np.column_stack([np.cos(angles), np.sin(angles)])
         names = [f"wheel_{wheel}" for wheel in range(WHEELS)]
-        self._body = self.model.body("base_link").id
         self._angles = np.array([self.model.joint(name).qposadr[0] for name in names])
         self._speeds = np.array([self.model.joint(name).dofadr[0] for name in names])
         rollers = [
@@ -156,7 +155,6 @@ class Engine:
         self.model.dof_solimp[self._speeds, :2] = impedance
         self.model.dof_damping[self._speeds] = loads.viscous
         self.data.qfrc_applied[self._speeds] = loads.torque
-        self.data.xfrc_applied[self._body, [0, 1, 5]] = loads.push
         torque = loads.roller_force * self._roller_radius
         self.model.dof_frictionloss[self._roller_speeds] = torque[:, None]
 

@@ -197,10 +197,10 @@ class Simulation:
         contact = engine.contacts(self._yaw)
         actions = self._actions(contact)
         engine.set_friction(actions.friction)
-        engine.set_push(actions.push)
         bus = self._bus_voltage(actions.undervoltage)
         angle, speed = engine.angle, engine.speed
         loads = self._loads(angle, speed, actions)
+        engine.set_push(actions.push + loads.push)
         current, motor_power = self._run(bus, actions)
         turned = engine.angle - angle
         power = self._settle_power(current, motor_power, loads, turned)

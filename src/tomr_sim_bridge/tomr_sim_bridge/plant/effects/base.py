@@ -25,7 +25,7 @@ class WheelLoads:
     viscous: Vector  # N m s/rad, to be filled
     torque: Vector  # N m, to be filled: added to the axle
     roller_force: Vector  # N, to be filled: against the sliding along the axle
-    # N, N, N m, to be filled: force in the world and moment on the body, at its mass centre
+    # N, N, N m, to be filled: force in the world and moment on the body, as `Engine.set_push`
     push: Vector = field(factory=lambda: np.zeros(3))
 
 
