@@ -17,7 +17,7 @@ from tomr_fault_diag.classifier.judges import Judge, Opinion, make_judge
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
-from tomr_fault_diag.classifier.states import FAULTLESS, NORMAL
+from tomr_fault_diag.classifier.states import FAULTLESS, NAMED
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_power_model.model.ticks import NANOSECONDS
 
@@ -50,7 +50,7 @@ class _Witness:
 
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         careful, hasty = (judge.judge(frame, elapsed_ns, unseen) for judge in self._judges)
-        named = hasty.sure and int(np.argmax(hasty.probabilities)) != NORMAL
+        named = hasty.sure and hasty.leading.name not in FAULTLESS
         self.decades = _decades(careful.probabilities) if named else 0.0
         return careful
 
@@ -67,8 +67,8 @@ def evidence_in(frames: Iterable[ResidualFrame], settings: ClassifierSettings) -
 
 
 def _decades(shares: Array) -> float:
-    faults = np.delete(shares, NORMAL)
-    odds = max(float(faults.max()), _LEAST) / max(float(shares[NORMAL]), _LEAST)
+    well = np.array([state.name in FAULTLESS for state in NAMED[: len(shares)]])
+    odds = max(float(shares[~well].max()), _LEAST) / max(float(shares[well].sum()), _LEAST)
     return float(np.log10(odds)) + MOST_CAUTION
 
 
