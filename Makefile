@@ -37,7 +37,7 @@ MANIFESTS := $(wildcard $(addprefix src/*/,package.xml setup.py setup.cfg resour
 LINKED := $(sort $(MANIFESTS) $(wildcard src/*/launch/*.launch.py \
     $(addprefix src/*/tomr_*/,robots/*.yaml missions/*.yaml weights/*)))
 
-.PHONY: help setup demo test lint format bench figures train bags clean FORCE
+.PHONY: help setup demo test attack audit lint format bench docs figures train bags clean FORCE
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -58,6 +58,14 @@ test: lint ## run every check and test
 	$(BIN)/pytest -n $(WORKERS) -m "not serial" $(ARGS)
 	$(BIN)/pytest -m serial $(ARGS) || [ $$? -eq 5 ] # 5: none was selected
 
+attack: setup ## feed all commands with 20,000 hostile inputs (hours; resumed where it was)
+	$(BIN)/python bench/attack.py --tries 20000 --out attack $(ARGS)
+
+audit: setup ## look for known vulnerabilities in the installed packages (needs the Internet)
+	@[ -x .venv/audit/bin/pip-audit ] || { $(BIN)/python -m venv .venv/audit && \
+	    .venv/audit/bin/pip install --disable-pip-version-check --quiet pip-audit==2.10.1; }
+	.venv/audit/bin/pip-audit --path "$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" $(ARGS)
+
 lint: setup ## ruff, mypy and import-linter only
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
@@ -73,6 +81,9 @@ bench: setup ## measure CPU, latency and offline speed, as ratios (not a test)
 
 figures: .venv/training ## draw the figures of docs/experiments.md anew (installs torch)
 	$(BIN)/python bench/experiments.py all --out docs/figures
+
+docs: setup ## write the table of keys in docs/keys.md anew
+	$(BIN)/python -m tomr_fault_diag.diagnosis.key_table > docs/keys.md
 
 train: .venv/training ## train the classifier anew, in five minutes (installs torch)
 	$(BIN)/tomr_train --out src/tomr_fault_diag/tomr_fault_diag/weights/window.npz $(ARGS)

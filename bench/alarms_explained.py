@@ -27,10 +27,9 @@ from rich.table import Table
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.states import FAULTLESS
-from tomr_fault_diag.cli.diagnose import STAGE_NODES
 from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
-from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
+from tomr_fault_diag.diagnosis.settings import STAGE_NODES, DiagnosisSettings
 from tomr_fault_diag.diagnosis.summary import Summariser
 from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.errors import InputError

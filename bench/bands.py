@@ -19,13 +19,14 @@ from attrs import asdict, evolve
 from numpy.typing import NDArray
 from stages import as_arrays, pipeline_of, steps_of
 
+from tomr_fault_diag.classifier.states import NORMAL
 from tomr_fault_diag.residuals.calibrated import fit_bands
 from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
 from tomr_power_model.cli import run_main
 from tomr_power_model.robot import shipped_robot
 from tomr_training.drives import random_drive
 from tomr_training.labels import spread
-from tomr_training.planar.generate import NORMAL, simulate
+from tomr_training.planar.generate import simulate
 
 Array = NDArray[np.float64]
 _FIRST_SEED = 30_000_000

@@ -36,21 +36,22 @@ from typing import TypeVar
 
 import numpy as np
 from attrs import evolve, frozen
-from diagnosis_report import Codes, Onset, Outcome, report
+from diagnosis_report import NAMES, Codes, Onset, Outcome, report
 from stages import as_arrays
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
-from tomr_fault_diag.classifier.states import NORMAL, SLIP, STATES
+from tomr_fault_diag.classifier.states import FAULTLESS, NORMAL, SLIP, State
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
 from tomr_power_model.cli import run_main
 from tomr_power_model.robot import shipped_robot
 from tomr_training.drives import Drive, random_drive, severity_of, wheel_of
 from tomr_training.labels import LASTING, SLIPPING, Flags, GroundTruth, Noise, deviates, lasting
-from tomr_training.planar.generate import STATE_OF, class_of
+from tomr_training.planar.faults import class_of
+from tomr_training.planar.generate import BEYOND, PAPER_OF
 from tomr_training.planar.residuals import Compared
 from tomr_training.simulated_drive import LabelledDrive, healthy_twin, simulated_drive
 
@@ -108,15 +109,22 @@ def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[Resid
 
 
 def named_by(kind: Kind, frames: Sequence[ResidualFrame]) -> Codes:
-    """State that stands at each tick (n,); whatever names no fault is normal."""
+    """State that stands at each tick (n,), as the paper calls it; what names no fault is normal."""
     classifier = FaultClassifier(make_judge(kind.settings))
     state, named = NORMAL, []
     for frame in frames:
         diagnosis = classifier.classify(frame)
         if diagnosis is not None:
-            state = STATES.index(diagnosis.state) if diagnosis.state in STATES else NORMAL
+            state = _in_paper(diagnosis.state)
         named.append(state)
     return np.array(named)
+
+
+def _in_paper(state: State) -> int:
+    """Which of the six a state belongs to, the one after them if to none."""
+    if state.name in FAULTLESS:
+        return NORMAL
+    return BEYOND if state.paper is None else state.paper
 
 
 def observable(drive: Drive, labelled: LabelledDrive, twin: GroundTruth) -> Flags:
@@ -130,7 +138,7 @@ def observable(drive: Drive, labelled: LabelledDrive, twin: GroundTruth) -> Flag
 
 def true_state(drive: Drive) -> int:
     """State that the fault of a drive is to be named."""
-    return int(STATE_OF[class_of(drive.mission.faults[0])])
+    return int(PAPER_OF[class_of(drive.mission.faults[0])])
 
 
 def score_faulty(drive: Drive, labelled: LabelledDrive, twin: GroundTruth, named: Codes) -> Outcome:
@@ -176,7 +184,7 @@ def score_healthy(labelled: LabelledDrive, named: Codes) -> Outcome:
             excused += 1
         else:
             alarms.append(int(named[tick]))
-    nothing = np.zeros((len(STATES), len(STATES)), dtype=np.int64)
+    nothing = np.zeros((len(NAMES), len(NAMES)), dtype=np.int64)
     return Outcome(
         counts(NORMAL, named),
         nothing,
@@ -199,9 +207,9 @@ def episodes(flags: Flags) -> list[tuple[int, int]]:
 
 
 def counts(true: int, named: Codes) -> Codes:
-    """(6, 6) with the row of one true state filled."""
-    table = np.zeros((len(STATES), len(STATES)), dtype=np.int64)
-    table[true] = np.bincount(named, minlength=len(STATES))
+    """(7, 7) with the row of one true state filled."""
+    table = np.zeros((len(NAMES), len(NAMES)), dtype=np.int64)
+    table[true] = np.bincount(named, minlength=len(NAMES))
     return table
 
 

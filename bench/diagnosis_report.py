@@ -6,11 +6,14 @@ from collections.abc import Sequence
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from tomr_fault_diag.classifier.states import STATES
+from tomr_fault_diag.diagnosis.score import poisson_interval
 
 Codes = NDArray[np.int64]
+
+# What a tick may be called: one of the paper's six, or a fault that is none of these.
+NAMES = (*(state.name for state in STATES), "beyond these")
 
 
 @frozen
@@ -26,9 +29,9 @@ class Onset:
 class Outcome:
     """One drive as one classifier saw it; counts of ticks, rows true, columns named."""
 
-    decisions: Codes  # (6, 6): healthy ticks and observable faults
-    idle: Codes  # (6, 6): the observable ones of them with the faulty wheel idle
-    unseen: Codes  # (6, 6): faults in force that are not observable
+    decisions: Codes  # (7, 7): healthy ticks and observable faults
+    idle: Codes  # (7, 7): the observable ones of them with the faulty wheel idle
+    unseen: Codes  # (7, 7): faults in force that are not observable
     by_severity: dict[str, tuple[int, int]]  # right, all
     onsets: tuple[Onset, ...] = ()
     alarms: tuple[int, ...] = ()  # faults named that were not there, while healthy
@@ -55,7 +58,7 @@ def report(sick: Sequence[Outcome], well: Sequence[Outcome]) -> dict[str, object
             "fault_showed": sum(bool(outcome.onsets) for outcome in sick),
             "healthy": len(well),
         },
-        "states": [state.name for state in STATES],
+        "states": list(NAMES),
         "confusion_rows_true": confusion.tolist(),
         "recall": _shares(np.diag(confusion), confusion.sum(axis=1)),
         "precision": _shares(np.diag(confusion), confusion.sum(axis=0)),
@@ -77,7 +80,8 @@ def report(sick: Sequence[Outcome], well: Sequence[Outcome]) -> dict[str, object
 
 
 def _sum(tables: Sequence[Codes]) -> Codes:
-    return np.asarray(np.sum(tables, axis=0)) if tables else np.zeros((6, 6), dtype=np.int64)
+    empty = np.zeros((len(NAMES), len(NAMES)), dtype=np.int64)
+    return np.asarray(np.sum(tables, axis=0)) if tables else empty
 
 
 def _shares(part: Codes, whole: Codes) -> list[float | None]:
@@ -137,16 +141,10 @@ def _by_state(onsets: Sequence[Onset]) -> dict[str, dict[str, float | int | None
     }
 
 
-def poisson_interval(count: int) -> tuple[float, float]:
-    """Exact 95 % interval of the mean of which a count is one sample."""
-    low = float(chi2.ppf(0.025, 2 * count)) / 2.0 if count else 0.0
-    return low, float(chi2.ppf(0.975, 2 * count + 2)) / 2.0
-
-
 def _alarms(outcomes: Sequence[Outcome]) -> dict[str, object]:
     """Faults named in healthy driving, per hour with the exact interval of a Poisson count."""
     hours = sum(outcome.healthy_seconds for outcome in outcomes) / 3600.0
-    kinds = Counter(STATES[state].name for outcome in outcomes for state in outcome.alarms)
+    kinds = Counter(NAMES[state] for outcome in outcomes for state in outcome.alarms)
     count = sum(kinds.values())
     low, high = poisson_interval(count)
     return {

@@ -14,7 +14,7 @@ from rclpy.qos import QoSProfile
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
-from tomr_power_model.messages.types import BATTERY, DIAGNOSTICS, JOINT_STATE, TWIST_STAMPED
+from tomr_power_model.messages.types import BATTERY, DIAGNOSTICS, JOINT_STATE
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.nodes.stage_node import SENSOR_QOS, STAGE_QOS, message_class, run_node
 from tomr_power_model.robot import shipped_robot
@@ -26,7 +26,7 @@ Heard = tuple[str, str, QoSProfile]  # topic, type, QoS
 
 def _power_model() -> list[Heard]:
     robot = shipped_robot("reference")
-    inputs = model_inputs(robot, PowerPredictor(robot), TWIST_STAMPED)
+    inputs = model_inputs(robot, PowerPredictor(robot))
     return [(item.topic, item.type_name, SENSOR_QOS) for item in inputs]
 
 

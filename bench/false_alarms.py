@@ -16,13 +16,13 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
-from diagnosis_report import poisson_interval
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.classifier.states import FAULTLESS
+from tomr_fault_diag.diagnosis.score import poisson_interval
 from tomr_fault_diag.residuals.frame import SPEEDS, Residual, ResidualFrame, Unit
 from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.cli import run_main

@@ -32,6 +32,7 @@ from tqdm import tqdm
 from tomr_power_model.calibration.fitted import fitted_text
 from tomr_power_model.cli import run_main
 from tomr_power_model.drive.read import read_drive
+from tomr_power_model.files import make_folder, write_text
 from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.robot import Robot, load_robot, read_description
 from tomr_reality_gap.alignment.channels import channels_of
@@ -41,7 +42,7 @@ from tomr_reality_gap.explanation import Comparison, Explanation
 from tomr_reality_gap.mismatch.compare import comparison
 from tomr_reality_gap.progress import progress_bar
 from tomr_reality_gap.report.json import report_fields
-from tomr_reality_gap.report.write import make_folder, report_files, write_text, write_texts
+from tomr_reality_gap.report.write import report_files, write_report
 from tomr_reality_gap.request import Request
 from tomr_sim_bridge.cli.import_robotino import import_robotino
 from tomr_sim_bridge.importers.dataset import choose, default_dataset, open_dataset
@@ -182,7 +183,7 @@ def explained(
         found = explain(Request(robot, bags.fitted(surface), holdout=held), progress)
     seconds, busy = monotonic() - begun[0], process_time() - begun[1]
     make_folder(out)
-    write_texts(out, report_files(found, robot.name))
+    write_report(out, report_files(found, robot.name))
     rest = iter(item for item in found.comparisons if item.held_out)
     scores = {
         f"{surface}, fitted": figures_of([one for one in found.comparisons if not one.held_out]),

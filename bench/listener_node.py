@@ -1,4 +1,4 @@
-"""`listener_node.py FILE`: note when each message of /diagnostics arrives, until SIGTERM.
+"""`listener_node.py FILE`: note when each diagnosis arrives on /diagnostics, until SIGTERM.
 
 Writes to FILE one line per message: arrival on the monotonic clock [ns], stamp [ns].
 """
@@ -11,10 +11,12 @@ from struct import Struct
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
+from tomr_fault_diag.classifier.messages import NAME
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.nodes.stage_node import STAGE_QOS, run_node
 
 _STAMP = Struct("<iI")
+_NAME = NAME.encode()
 _HEAD = 4  # of CDR, before the first field
 
 
@@ -24,6 +26,8 @@ def main(path: Path) -> int:
 
     def note(data: bytes) -> None:
         now = time.monotonic_ns()
+        if _NAME not in data:  # the other stages say there how their inputs do
+            return
         seconds, nanoseconds = _STAMP.unpack_from(data, _HEAD)
         arrivals.append((now, seconds * NANOSECONDS + nanoseconds))
 

@@ -1,4 +1,4 @@
-"""What the three nodes cost and how soon they answer, played to in real time."""
+"""What the diagnosis costs and how soon it answers, played to in real time."""
 
 import os
 import subprocess
@@ -12,7 +12,7 @@ from pathlib import Path
 from attrs import frozen
 from drive import ROBOT, Drive, Raw
 from feeder_node import feeder
-from processes import command_path, cpu_seconds, running
+from processes import command_path, cpu_seconds, resident_mb, running
 
 from tomr_fault_diag.classifier.messages import TOPIC as DIAGNOSTICS
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
@@ -22,18 +22,23 @@ from tomr_power_model.robot import shipped_robot
 from tomr_power_model.topics.predictions import prediction_topics
 
 NODES = ("power_model", "power_residuals", "fault_classifier")
+ONE = ("tomr_diagnosis",)
+# What is measured: our nodes, and their baseline with callbacks that do nothing.
+SUITES = {"three nodes": NODES, "one process": ONE, "empty nodes": NODES}
 _BENCH = Path(__file__).resolve().parent
 _LEAD_NS = NANOSECONDS // 5  # between "all connected" and the first message
 
 Command = Sequence[str | Path]
 
 
-def suite_commands(robot_file: Path, parameters: Mapping[str, object]) -> dict[str, Command]:
-    """The three nodes."""
+def suite_commands(
+    robot_file: Path, parameters: Mapping[str, object], nodes: Sequence[str] = NODES
+) -> dict[str, Command]:
+    """Nodes of the suite."""
     ros: list[str | Path] = ["--ros-args", "--params-file", robot_file, "--log-level", "error"]
     for name, value in parameters.items():
         ros += ["-p", f"{name}:={value}"]
-    return {name: [command_path(name), *ros] for name in NODES}
+    return {name: [command_path(name), *ros] for name in nodes}
 
 
 def empty_commands() -> dict[str, Command]:
@@ -41,11 +46,13 @@ def empty_commands() -> dict[str, Command]:
     return {name: [sys.executable, _BENCH / "empty_node.py", name] for name in NODES}
 
 
-def _listeners(extra: Mapping[str, int]) -> dict[str, int]:
+def _listeners(extra: Mapping[str, int], nodes: Sequence[str] = NODES) -> dict[str, int]:
     """How many subscribers each topic has once all are connected."""
     robot = shipped_robot(ROBOT)
     supplies = [f"/{wheel}/power" for wheel in robot.wheel_topics]
     twice = ["/joint_states", *supplies, "/battery_state"]
+    if nodes == ONE:
+        return {**dict.fromkeys([*twice, "/cmd_vel"], 1), **extra}
     single = ["/cmd_vel", *prediction_topics(robot), RESIDUALS]
     return {**dict.fromkeys(twice, 2), **dict.fromkeys(single, 1), **extra}
 
@@ -62,12 +69,21 @@ def _timed(drive: Drive, with_answers: bool) -> list[tuple[int, Raw]]:
     return timed
 
 
-def measure_cpu(drive: Drive, warmup_s: float, *, empty: bool) -> dict[str, float]:
-    """CPU seconds of each node per second of robot, once warm.
+@frozen
+class Cost:
+    """Of one node: CPU seconds per second of robot, once warm, and memory [MB]."""
 
-    `empty`: of the baseline instead, to which the feeder publishes the nodes' recorded
-    predictions and residuals too, each right after the message that brought it about.
+    cpu: float
+    memory: float
+
+
+def measure_cost(drive: Drive, warmup_s: float, suite: str) -> dict[str, Cost]:
+    """Cost of each node of one of SUITES.
+
+    To empty nodes the feeder publishes the nodes' recorded predictions and residuals too, each
+    right after the message that brought it about.
     """
+    names, empty = SUITES[suite], suite == "empty nodes"
     timed = _timed(drive, with_answers=empty)
     warm = next(i for i, (offset, _) in enumerate(timed) if offset >= warmup_s * NANOSECONDS)
     robot_file = files("tomr_power_model").joinpath("robots").joinpath(f"{ROBOT}.yaml")
@@ -76,15 +92,16 @@ def measure_cpu(drive: Drive, warmup_s: float, *, empty: bool) -> dict[str, floa
         as_file(robot_file) as robot_path,
         feeder([message for _, message in timed]) as source,
     ):
-        commands = empty_commands() if empty else suite_commands(robot_path, {})
+        commands = empty_commands() if empty else suite_commands(robot_path, {}, names)
         with running(commands, Path(folder)) as nodes:
-            source.wait_for(_listeners({}), lambda: _all_run(nodes))
+            source.wait_for(_listeners({}, names), lambda: _all_run(nodes))
             start = time.monotonic_ns() + _LEAD_NS
             source.play(timed[:warm], start)
             before, since = _cpu(nodes), time.monotonic()
             source.play(timed[warm:], start)
             used, seconds = _cpu(nodes), time.monotonic() - since
-    return {name: (used[name] - before[name]) / seconds for name in NODES}
+            memory = {name: resident_mb(process.pid) for name, process in nodes.items()}
+    return {name: Cost((used[name] - before[name]) / seconds, memory[name]) for name in names}
 
 
 def _all_run(processes: Mapping[str, subprocess.Popen[bytes]]) -> bool:
@@ -115,8 +132,9 @@ PROMPT: dict[str, object] = {
 }
 
 
-def measure_latency(drive: Drive, warmup_s: float) -> Latencies:
-    """Play a drive prepared with PROMPT and time the answers of the nodes."""
+def measure_latency(drive: Drive, warmup_s: float, suite: str) -> Latencies:
+    """Play a drive prepared with PROMPT and time the answers of one of SUITES."""
+    names = SUITES[suite]
     timed = _timed(drive, with_answers=False)
     robot_file = files("tomr_power_model").joinpath("robots").joinpath(f"{ROBOT}.yaml")
     with (
@@ -127,8 +145,10 @@ def measure_latency(drive: Drive, warmup_s: float) -> Latencies:
         noted = Path(folder, "arrivals")
         program = _BENCH / "listener_node.py"
         listener: dict[str, Command] = {"listener": [sys.executable, program, noted]}
-        with running(suite_commands(robot_path, PROMPT) | listener, Path(folder)) as processes:
-            source.wait_for(_listeners({DIAGNOSTICS: 1}), lambda: _all_run(processes))
+        with running(
+            suite_commands(robot_path, PROMPT, names) | listener, Path(folder)
+        ) as processes:
+            source.wait_for(_listeners({DIAGNOSTICS: 1}, names), lambda: _all_run(processes))
             handed = source.play(timed, time.monotonic_ns() + _LEAD_NS)
             time.sleep(0.5)  # the last answers
         arrived = dict(_pairs(noted))

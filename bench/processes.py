@@ -57,3 +57,9 @@ def cpu_seconds(pid: int) -> float:
     # Fields 14 and 15 of proc(5), counted after the name, which may hold spaces.
     fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / _TICKS_PER_SECOND
+
+
+def resident_mb(pid: int) -> float:
+    """Memory that a process holds, shared libraries included [MB]."""
+    pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20

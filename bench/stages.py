@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tomr_fault_diag.cli.diagnose import STAGE_NODES
 from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline, Step
-from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
+from tomr_fault_diag.diagnosis.settings import STAGE_NODES, DiagnosisSettings
 from tomr_fault_diag.residuals.frame import RESIDUALS, ResidualFrame
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import load_robot, read_node_sections

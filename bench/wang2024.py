@@ -31,7 +31,8 @@ from tomr_power_model.cli import run_main
 from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.robot import Robot, load_robot
-from tomr_power_model.wang2024 import Coefficients, Samples, fit_wang2024
+from tomr_power_model.wang2024 import Coefficients
+from tomr_power_model.wang2024.fit import Samples, fit_wang2024
 from tomr_training.drives import every_value
 
 Array = NDArray[np.float64]

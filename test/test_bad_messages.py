@@ -308,7 +308,7 @@ def _disturb(bench: Bench, name: str, case: Case) -> None:
         assert case.stale or not frame.stale, (name, frame)
     for _, state in bench.states[said:]:
         # A stage that starts afresh waits for its next command.
-        lost = state.startswith(("stale", "waiting"))
+        lost = state.startswith(("stale", "waiting", "not enough data"))
         assert _quiet(state) or (case.stale and lost), (name, state)
     if case.node:
         bench.processes[case.node].wait_for_output(case.words)

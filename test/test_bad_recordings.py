@@ -85,7 +85,8 @@ def _unclosed_sqlite(drive: list[Raw], folder: Path) -> Path:
             writer.write_raw(m.topic, m.type_name, m.data, m.stamp_ns)
         left = folder / "killed"
         left.mkdir()
-        for file in (folder / "recorder").iterdir():
+        (making,) = folder.glob(".recorder.*.part/recorder")
+        for file in making.iterdir():
             shutil.copy(file, left / file.name)
     return left
 

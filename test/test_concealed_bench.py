@@ -231,12 +231,12 @@ def test_effects_outside_the_vocabulary_act_on_their_wheel_only(name: str) -> No
     hidden: Hidden = hidden_of(Concealed(name, "one_wheel"), nominal, random)
     present = np.isin(np.arange(3), hidden.wheels).astype(float)
     effect = OUTSIDE[name].effect(robot, present, hidden.values)
-    touched = np.zeros(3)
+    touched, elsewhere = np.zeros(3), 0.0
     for step in range(2000):
         alike = np.full(3, 0.005 * step)
         zeros = np.zeros(3)
         loads = WheelLoads(
-            speed=np.ones(3), angle=alike, transmitted=zeros, normal=zeros,
+            speed=np.full(3, 20.0), angle=alike, transmitted=zeros, normal=zeros,
             contact=np.column_stack([alike, alike]), dry=np.zeros(3), viscous=np.zeros(3),
             torque=np.zeros(3), roller_force=np.zeros(3),
         )  # fmt: skip
@@ -244,7 +244,10 @@ def test_effects_outside_the_vocabulary_act_on_their_wheel_only(name: str) -> No
         effect.resist(loads)
         effect.bill(drivers)
         touched += np.abs(loads.dry) + np.abs(loads.torque) + loads.viscous + drivers.power
-    assert np.array_equal(touched > 0, present > 0)
+        elsewhere += float(np.abs(loads.push).sum()) + drivers.other
+    of_wheels = name not in ("x.tether", "x.wind", "x.gust", "x.consumer")
+    assert np.array_equal(touched > 0, present > 0 if of_wheels else np.zeros(3, dtype=bool))
+    assert (elsewhere > 0.0) is not of_wheels
 
 
 def test_the_right_name_at_the_right_place_is_exact() -> None:

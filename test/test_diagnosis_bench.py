@@ -10,7 +10,7 @@ from attrs import evolve
 sys.path.append(str(Path(__file__).resolve().parent.parent / "bench"))
 
 from diagnosis import episodes, score_faulty, score_healthy, true_state
-from diagnosis_report import poisson_interval, report
+from diagnosis_report import report
 
 from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP
 from tomr_power_model.robot import shipped_robot
@@ -100,8 +100,3 @@ def test_shows_a_second_apart_are_onsets_of_their_own() -> None:
 )
 def test_what_a_fault_is_to_be_named(kind: str, state: int) -> None:
     assert true_state(drive_with(evolve(LOST, fault_id=kind))) == state
-
-
-def test_the_interval_of_a_count_is_exact() -> None:
-    assert poisson_interval(0) == pytest.approx((0.0, 3.689), abs=1e-3)
-    assert poisson_interval(7) == pytest.approx((2.814, 14.423), abs=1e-3)

@@ -1,4 +1,5 @@
-"""One recording through the three nodes over DDS and through `tomr_diagnose`: the same messages."""
+"""One recording through the three nodes over DDS, through the one node that holds all three stages,
+and through `tomr_diagnose`: the same messages."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,6 +13,8 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from tomr_fault_diag.classifier.messages import NAME
+from tomr_fault_diag.classifier.messages import TOPIC as DIAGNOSTICS
 from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
@@ -28,7 +31,7 @@ RATE = 2.0  # times real time
 # A busy machine may hold up one process for longer than a robot would be waited for.
 PATIENCE = 5.0  # s
 
-Key = tuple[str, int]
+Key = tuple[str, int, str]
 
 
 def _types() -> dict[str, str]:
@@ -36,7 +39,13 @@ def _types() -> dict[str, str]:
         topic: TYPES[JointMessage if topic == EXPECTED else SupplyMessage]
         for topic in prediction_topics(shipped_robot("reference"))
     }
-    return {**topics, **dict.fromkeys(("residuals", "/diagnostics"), TYPES[DiagnosticMessage])}
+    return {**topics, **dict.fromkeys(("residuals", DIAGNOSTICS), TYPES[DiagnosticMessage])}
+
+
+def _key(topic: str, stamp_ns: int, message: Any) -> Key:
+    """Several nodes publish on /diagnostics: their statuses have other names."""
+    statuses = getattr(message, "status", None)
+    return topic, stamp_ns, statuses[0].name if statuses else ""
 
 
 def _offline() -> dict[Key, Any]:
@@ -50,7 +59,8 @@ def _offline() -> dict[Key, Any]:
             for message in pipeline.messages(step):
                 name = TYPES[type(message)]
                 data = bytes(store.serialize_cdr(to_bag(message.plain), name))
-                found[message.topic, message.stamp_ns] = store.deserialize_cdr(data, name)
+                read = store.deserialize_cdr(data, name)
+                found[_key(message.topic, message.stamp_ns, read)] = read
     return found
 
 
@@ -79,8 +89,16 @@ def _plain(value: Any) -> Any:
     return value
 
 
+@pytest.mark.parametrize(
+    ("commands", "readers"),
+    [(("power_model", "power_residuals", "fault_classifier"), 2), (("tomr_diagnosis",), 1)],
+    ids=["three nodes", "one process"],
+)
 def test_nodes_and_offline_tool_publish_the_same(
-    spawn: Callable[..., Any], wait_until: Callable[..., Any]
+    commands: tuple[str, ...],
+    readers: int,  # of what the stages hand on
+    spawn: Callable[..., Any],
+    wait_until: Callable[..., Any],
 ) -> None:
     if not BAG.exists():
         pytest.fail(f"{BAG} is missing: make bags")
@@ -92,20 +110,24 @@ def test_nodes_and_offline_tool_publish_the_same(
             def keep(data: bytes, topic: str = topic, name: str = name) -> None:
                 message = store.deserialize_cdr(data, name)
                 stamp = message.header.stamp
-                online[topic, stamp.sec * 1_000_000_000 + stamp.nanosec] = message
+                stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
+                online[_key(topic, stamp_ns, message)] = message
 
             node.create_subscription(message_class(name), topic, keep, STAGE_QOS, raw=True)
         parameters = ["--ros-args", "--params-file", str(ROBOT), "-p", f"patience:={PATIENCE}"]
-        for command in ("power_model", "power_residuals", "fault_classifier"):
+        for command in commands:
             spawn([command, *parameters])
 
         def connected() -> bool:
             executor.spin_once(0.01)
-            published = all(node.count_publishers(topic) == 1 for topic in types)
-            heard = all(node.count_subscribers(t) == 2 for t in types if t != "/diagnostics")
+            published = all(
+                node.count_publishers(topic) == (len(commands) if topic == DIAGNOSTICS else 1)
+                for topic in types
+            )
+            heard = all(node.count_subscribers(t) == readers for t in types if t != DIAGNOSTICS)
             return published and heard
 
-        wait_until(connected, "three nodes that found each other")
+        wait_until(connected, "nodes that found each other")
         replay = spawn(["bag_replay", "--ros-args", "-p", f"bag:={BAG}", "-p", f"rate:={RATE}"])
         while replay.popen.poll() is None:
             executor.spin_once(0.05)
@@ -120,5 +142,9 @@ def test_nodes_and_offline_tool_publish_the_same(
     assert set(online) == set(offline)
     different = [key for key, message in online.items() if _plain(message) != _plain(offline[key])]
     assert not different, (_plain(online[different[0]]), _plain(offline[different[0]]))
-    states = {m.status[0].message for (topic, _), m in online.items() if topic == "/diagnostics"}
-    assert {"normal", "motor system fault 3 (wheel_3_joint)"} <= states
+    said = {(key[2], message.status[0].message) for key, message in online.items() if key[2]}
+    assert {(NAME, "normal"), (NAME, "motor system fault 3 (wheel_3_joint)")} <= said
+    assert {
+        ("inputs: cmd_vel", "as it should be"),
+        ("inputs: joint_states", "as it should be"),
+    } <= said

@@ -28,6 +28,7 @@ LIBRARIES = {
     "attrs": ("python3-attrs", "attrs"),
     "hypothesis": ("python3-hypothesis", "hypothesis"),
     "jinja2": ("python3-jinja2", "Jinja2"),
+    "lz4": ("python3-lz4", "lz4"),
     "matplotlib": ("python3-matplotlib", "matplotlib"),
     "mujoco": ("python3-mujoco-pip", "mujoco"),
     "numba": ("python3-numba", "numba"),
@@ -37,6 +38,7 @@ LIBRARIES = {
     "rosbags": ("python3-rosbags-pip", "rosbags"),
     "scipy": ("python3-scipy", "scipy"),
     "tqdm": ("python3-tqdm", "tqdm"),
+    "websockets": ("python3-websockets", "websockets"),
     "yaml": ("python3-yaml", "PyYAML"),
 }
 # What no package.xml can name: requirements-train.txt.
@@ -126,7 +128,7 @@ def test_install_has_what_ros2_looks_for(package: Path) -> None:
     share = ROOT / "install" / package.name / "share"
     assert (share / "ament_index/resource_index/packages" / package.name).exists()
     expected = {"package.xml"}
-    for folder in ("launch/*.launch.py", "*/robots/*.yaml", "*/missions/*.yaml"):
+    for folder in ("launch/*.launch.py", "config/*", "*/robots/*.yaml", "*/missions/*.yaml"):
         expected |= {f"{file.parent.name}/{file.name}" for file in package.glob(folder)}
     installed = {
         str(file.relative_to(share / package.name))
@@ -198,7 +200,7 @@ def test_imports_are_declared(package: Path) -> None:
                 assert requirement in pinned, f"{file} imports {name}: not in requirements.txt"
 
 
-ROS_FREE = ("fault_diag", "odometry", "power_model", "reality_gap", "sim_bridge")
+ROS_FREE = ("fault_diag", "odometry", "power_model", "reality_gap", "sim_bridge", "view")
 
 
 @each_package(*(f"tomr_{name}" for name in ROS_FREE))
@@ -208,6 +210,19 @@ def test_only_nodes_import_rclpy(package: Path) -> None:
         inside = file.relative_to(package / package.name).parts
         if inside[0] not in allowed and not file.name.endswith("_node.py"):
             assert not [name for name in imports(file) if name.split(".")[0] == "rclpy"], file
+
+
+@pytest.mark.parametrize(
+    "node", ["power_model", "power_residuals", "fault_classifier", "diagnosis"]
+)
+def test_nodes_import_nothing_large(node: str) -> None:
+    """Each would add seconds and tens of megabytes to a node on a small computer."""
+    package = "tomr_power_model" if node == "power_model" else "tomr_fault_diag"
+    program = f"import {package}.nodes.{node}_node, sys; print(*sys.modules)"
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert not {"scipy", "numba", "matplotlib", "rosbags", "torch"} & set(run.stdout.split())
 
 
 def test_launch_files_start_commands_that_exist() -> None:
@@ -220,7 +235,14 @@ def test_launch_files_start_commands_that_exist() -> None:
                 named = [given.get("package"), given.get("executable")]
                 if all(isinstance(value, ast.Constant) for value in named):
                     started.add(tuple(value.value for value in named))
-    nodes = {"power_model", "power_residuals", "fault_classifier", "sim_bridge", "slip_odometry"}
+    nodes = {
+        "power_model",
+        "power_residuals",
+        "fault_classifier",
+        "tomr_diagnosis",
+        "sim_bridge",
+        "slip_odometry",
+    }
     assert {command for _, command in started} == nodes
     assert started <= known
 
@@ -233,7 +255,7 @@ def test_launch_files_name_files_that_are_installed() -> None:
                 case ast.List([ast.Call(ast.Name("FindPackageShare"), [package]), *rest]):
                     name, *parts = (ast.literal_eval(part) for part in (package, *rest))
                     named.add(ROOT.joinpath("install", name, "share", name, *parts))
-    assert {file.name for file in named} == {"diagnosis.launch.py", "reference.yaml"}
+    assert {file.name for file in named} == {"diagnosis.launch.py"}
     assert all(file.is_file() for file in named)
 
 

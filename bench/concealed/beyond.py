@@ -1,34 +1,16 @@
 """Physics that no effect of the vocabulary describes; truth calls each of them `unknown`."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
-from attrs import frozen
-from numpy.typing import NDArray
 
+from concealed.nameless import USUAL, Beyond, Outside, Vector
 from concealed.recipes import Recipe
+from concealed.surroundings import SURROUNDINGS
 from tomr_power_model.robot import WHEELS, Robot
-from tomr_sim_bridge.plant.effects import DriverPower, PlantEffect, WheelLoads
-
-Vector = NDArray[np.float64]
-
-
-class Beyond(PlantEffect):
-    """One such effect, at the wheels where `present` is 1; `given` holds its parameters."""
-
-    units: ClassVar[Mapping[str, str]]
-    shape_in_words: ClassVar[str]
-
-    def __init__(self, robot: Robot, present: Vector, given: Mapping[str, float]) -> None:
-        super().__init__(robot)
-        self._present = present
-        self._given = dict(given)
-        self._elapsed = 0.0
-
-    def bill(self, drivers: DriverPower) -> None:
-        self._elapsed += drivers.duration
+from tomr_sim_bridge.plant.effects import DriverPower, WheelLoads
 
 
 class TwoHarmonics(Beyond):
@@ -137,21 +119,6 @@ class Overload(Beyond):
         drivers.power += self._present * self._given["coefficient"] * excess**2
 
 
-@frozen
-class Outside:
-    """An effect outside the vocabulary with its recipe."""
-
-    effect: Callable[[Robot, Vector, Mapping[str, float]], Beyond]
-    recipe: Recipe
-    units: Mapping[str, str]
-    shape: str
-
-    @classmethod
-    def of(cls, kind: type[Beyond], recipe: Recipe) -> "Outside":
-        return cls(kind, recipe, kind.units, kind.shape_in_words)
-
-
-_ONE = (1.0, 0.5, 0.25)
 OUTSIDE: Mapping[str, Outside] = {
     "x.two_harmonics": Outside.of(
         TwoHarmonics,
@@ -160,15 +127,15 @@ OUTSIDE: Mapping[str, Outside] = {
                 "torque": 1.5 * s * u.torque,
                 "order": float(random.integers(2, 6)),
             },
-            _ONE,
+            USUAL,
         ),
     ),
     "x.chipped_tooth": Outside.of(
-        ChippedTooth, Recipe(lambda s, u, _: {"torque": 4.0 * s * u.torque}, _ONE)
+        ChippedTooth, Recipe(lambda s, u, _: {"torque": 4.0 * s * u.torque}, USUAL)
     ),
     "x.running_in": Outside.of(
         RunningIn,
-        Recipe(lambda s, u, _: {"torque": 2.0 * s * u.torque, "time_constant": 20.0}, _ONE),
+        Recipe(lambda s, u, _: {"torque": 2.0 * s * u.torque, "time_constant": 20.0}, USUAL),
     ),
     "x.striped_floor": Outside.of(
         StripedFloor,
@@ -177,11 +144,11 @@ OUTSIDE: Mapping[str, Outside] = {
                 "torque": 1.5 * s * u.torque,
                 "width": float(random.uniform(0.5, 0.9)),
             },
-            _ONE,
+            USUAL,
         ),
     ),
     "x.cubic": Outside.of(
-        Cubic, Recipe(lambda s, u, _: {"coefficient": s * u.torque / u.speed**3}, _ONE)
+        Cubic, Recipe(lambda s, u, _: {"coefficient": s * u.torque / u.speed**3}, USUAL)
     ),
     "x.intermittent": Outside.of(
         Intermittent,
@@ -190,11 +157,11 @@ OUTSIDE: Mapping[str, Outside] = {
                 "torque": 1.5 * s * u.torque,
                 "seed": float(random.integers(1, 10_000)),
             },
-            _ONE,
+            USUAL,
         ),
     ),
     "x.sticky_start": Outside.of(
-        StickyStart, Recipe(lambda s, u, _: {"torque": 4.0 * s * u.torque}, _ONE)
+        StickyStart, Recipe(lambda s, u, _: {"torque": 4.0 * s * u.torque}, USUAL)
     ),
     "x.overload": Outside.of(
         Overload,
@@ -203,7 +170,8 @@ OUTSIDE: Mapping[str, Outside] = {
                 "coefficient": 0.1 * s * u.power / u.current**2,
                 "current": 3.0 * u.current,
             },
-            _ONE,
+            USUAL,
         ),
     ),
+    **SURROUNDINGS,
 }

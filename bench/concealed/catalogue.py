@@ -138,6 +138,13 @@ _PLAIN: Mapping[str, Mapping[str, tuple[Concealed, ...]]] = {
         "intermittent": (_C("x.intermittent", ONE),),
         "sticky start": (_C("x.sticky_start"),),
         "overload": (_C("x.overload"),),
+        "tether": (_C("x.tether", BODY),),
+        "wind": (_C("x.wind", BODY),),
+        "gust": (_C("x.gust", BODY),),
+        "sticky place": (_C("x.sticky_place"),),
+        "consumer": (_C("x.consumer", SUPPLY),),
+        "fast driver": (_C("x.fast_driver", ONE),),
+        "after stand": (_C("x.after_stand"),),
     },
     "sensor": {
         "scale imitates a motor": (_C("sensor.power_scale", ALL, 0.1),),

@@ -16,12 +16,15 @@ _EPILOG = """\
 examples:
   faults_practice.py explain
   faults_practice.py diagnose --robot build/faults_practice/explained/robot_explained.yaml
+  faults_practice.py commission
+  faults_practice.py diagnose --robot build/faults_practice/commissioned/commissioned.yaml
   faults_practice.py power --robot build/faults_practice/explained/robot_explained.yaml
 
 exit codes: 0 done, 2 bad input, or the recordings are absent"""
 
 _FITTING = {
     "explain": "run tomr_gap explain on the healthy drives: cost, findings beside the truth, error",
+    "commission": "run tomr_commission on the healthy drives: cost, verdict, floors",
     "calibrate": "run tomr_calibrate on the same: cost, values over the truth, or why it refused",
 }
 _SCORING = {
@@ -49,6 +52,8 @@ def _parser() -> argparse.ArgumentParser:
                 help="results go here (default %(default)s)",
             )
         if name in _FITTING:
+            if name == "commission":
+                continue  # it holds out a drive by itself
             command.add_argument(
                 "--fit", type=int, default=3, metavar="N", help="drives to fit (default 3)"
             )
@@ -68,7 +73,7 @@ def main(arguments: Sequence[str] | None) -> int:
     options = _parser().parse_args(arguments)
     # What follows takes seconds to import: --help does without.
     from faults.diagnose import diagnose
-    from faults.explain import calibrate, explain
+    from faults.explain import calibrate, commission, explain
     from faults.power import power
     from faults.recordings import Recordings
 
@@ -77,6 +82,8 @@ def main(arguments: Sequence[str] | None) -> int:
     if options.command == "explain":
         more = [] if options.tolerance is None else ["--tolerance", options.tolerance]
         explain(recordings, options.out / "explained", options.fit, more, console)
+    elif options.command == "commission":
+        commission(recordings, options.out / "commissioned", console)
     elif options.command == "calibrate":
         calibrate(recordings, options.out / "calibrated", options.fit, console)
     else:

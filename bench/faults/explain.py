@@ -1,4 +1,4 @@
-"""`tomr_gap explain` and `tomr_calibrate` on healthy drives: cost, findings beside the truth."""
+"""What fits, explains and commissions, on healthy drives: cost, findings beside the truth."""
 
 import json
 import subprocess
@@ -79,6 +79,17 @@ def calibrate(recordings: Recordings, out: Path, count: int, console: Console) -
         return
     console.print((out / "calibrate.log").read_text(encoding="utf-8"))
     print_ratios(written, recordings.real(), console)
+
+
+def commission(recordings: Recordings, out: Path, console: Console) -> None:
+    """Run `tomr_commission` on all healthy drives; print its cost and what it says."""
+    out.mkdir(parents=True, exist_ok=True)
+    healthy = [drive.bag for drive in recordings.drives("healthy")]
+    command: list[str | Path] = [_tool("tomr_commission"), *healthy]
+    command += ["--robot", recordings.description, "--out", out]
+    run = measured(command, out / "commission.log")
+    console.print(run.cost)
+    console.print((out / "commission.log").read_text(encoding="utf-8"))
 
 
 def _split(recordings: Recordings, count: int) -> tuple[list[Path], Path]:

@@ -12,7 +12,14 @@ from stages import as_arrays, pipeline_of, steps_of
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.stage import Diagnosis
-from tomr_fault_diag.classifier.states import DISOBEYS, NOT_OBSERVABLE, WAITING
+from tomr_fault_diag.classifier.states import (
+    NOT_ENOUGH,
+    NOT_OBSERVABLE,
+    STALE,
+    STATES,
+    WAITING,
+    State,
+)
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, ResidualFrame
 from tomr_power_model.model.ticks import NANOSECONDS
 
@@ -20,11 +27,10 @@ Array = NDArray[np.float64]
 Change = tuple[float, str, int | None]  # stamp [s], state, wheel 1..3
 
 JOBS = 2
-# The score knows no state of a robot that does not follow: none of its faults is known.
+# The score knows the paper's six: what is none of them is unknown.
 _SCORED = {
     NOT_OBSERVABLE.name: "not_observable",
-    DISOBEYS.name: "unknown",
-    WAITING.name: "stale",
+    **dict.fromkeys((WAITING.name, STALE.name, NOT_ENOUGH.name), "stale"),
 }
 
 
@@ -66,16 +72,17 @@ def changes_of(diagnoses: Iterable[Diagnosis]) -> tuple[Change, ...]:
     """Changes of the published state as the score wants them, by the stamp that said it first."""
     changes: list[Change] = []
     for diagnosis in diagnoses:
-        state = scored_name(diagnosis.state.name)
+        state = scored_name(diagnosis.state)
         wheel = None if diagnosis.wheel is None else diagnosis.wheel + 1
         if not changes or changes[-1][1:] != (state, wheel):
             changes.append((diagnosis.stamp_ns / NANOSECONDS, state, wheel))
     return tuple(changes)
 
 
-def scored_name(state: str) -> str:
+def scored_name(state: State) -> str:
     """A state of the suite as the score calls it: `motor system fault 2` is motor_system_2."""
-    return _SCORED.get(state, state.replace(" fault", "").replace(" ", "_"))
+    paper = "unknown" if state.paper is None else STATES[state.paper].name
+    return _SCORED.get(state.name, paper.replace(" fault", "").replace(" ", "_"))
 
 
 def play_all(

@@ -7,7 +7,8 @@ from attrs import fields
 from wang2024 import samples_of
 
 from tomr_power_model.robot import Robot
-from tomr_power_model.wang2024 import Coefficients, fit_wang2024
+from tomr_power_model.wang2024 import Coefficients
+from tomr_power_model.wang2024.fit import fit_wang2024
 
 
 def fitted(robot: Robot, bags: Sequence[Path]) -> Coefficients:

@@ -20,8 +20,9 @@ from tomr_power_model.drive.read import read_drive
 from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import Robot, load_robot
-from tomr_power_model.wang2024 import Samples as PaperSamples
-from tomr_power_model.wang2024 import Wang2024Model, fit_wang2024
+from tomr_power_model.wang2024 import Wang2024Model
+from tomr_power_model.wang2024.fit import Samples as PaperSamples
+from tomr_power_model.wang2024.fit import fit_wang2024
 from tomr_sim_bridge.cli.import_robotino import import_robotino
 from tomr_sim_bridge.importers.dataset import default_dataset
 

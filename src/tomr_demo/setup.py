@@ -8,7 +8,7 @@ NAME = "tomr_demo"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="A simulated robot drives, fails and is diagnosed while you watch.",
     maintainer="TOMR maintainers",
     maintainer_email="maintainers@tomr.dev",
@@ -24,5 +24,5 @@ setup(
     install_requires=["setuptools"],
     extras_require={"test": ["pytest"]},
     zip_safe=False,
-    entry_points={"console_scripts": [f"tomr_demo = {NAME}.main:main"]},
+    entry_points={"console_scripts": [f"tomr_demo = {NAME}.entry:tomr_demo"]},
 )

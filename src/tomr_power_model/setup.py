@@ -8,7 +8,7 @@ NAME = "tomr_power_model"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="Electrical power of a three-wheeled omni robot, predicted from its motion.",
     maintainer="TOMR maintainers",
     maintainer_email="maintainers@tomr.dev",
@@ -26,8 +26,8 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            f"power_model = {NAME}.nodes.power_model_node:main",
-            f"tomr_calibrate = {NAME}.calibrate_cli:main",
+            f"power_model = {NAME}.entry:power_model",
+            f"tomr_calibrate = {NAME}.entry:tomr_calibrate",
         ],
     },
 )

@@ -6,7 +6,7 @@ NAME = "tomr_reality_gap"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="What a robot's simulation leaves out, found in recordings of the real one.",
     maintainer="TOMR maintainers",
     maintainer_email="maintainers@tomr.dev",
@@ -21,5 +21,5 @@ setup(
     install_requires=["setuptools"],
     extras_require={"fleet": ["distributed"], "test": ["pytest"]},
     zip_safe=False,
-    entry_points={"console_scripts": [f"tomr_gap = {NAME}.cli:main"]},
+    entry_points={"console_scripts": [f"tomr_gap = {NAME}.entry:tomr_gap"]},
 )

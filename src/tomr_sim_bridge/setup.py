@@ -8,7 +8,7 @@ NAME = "tomr_sim_bridge"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="A simulated three-wheeled omni robot with faults to try, and a bag player.",
     maintainer="TOMR maintainers",
     maintainer_email="maintainers@tomr.dev",
@@ -27,10 +27,10 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            f"sim_bridge = {NAME}.nodes.sim_bridge_node:main",
-            f"bag_replay = {NAME}.nodes.bag_replay_node:main",
-            f"tomr_simulate = {NAME}.cli.simulate:main",
-            f"tomr_import_robotino = {NAME}.cli.import_robotino:main",
+            f"sim_bridge = {NAME}.entry:sim_bridge",
+            f"bag_replay = {NAME}.entry:bag_replay",
+            f"tomr_simulate = {NAME}.entry:tomr_simulate",
+            f"tomr_import_robotino = {NAME}.entry:tomr_import_robotino",
         ],
     },
 )

@@ -6,7 +6,7 @@ NAME = "tomr_training"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="Simulated drives by the thousand, and classifiers of faults trained on them.",
     maintainer="TOMR maintainers",
     maintainer_email="maintainers@tomr.dev",
@@ -21,5 +21,5 @@ setup(
     install_requires=["setuptools"],
     extras_require={"test": ["pytest"]},
     zip_safe=False,
-    entry_points={"console_scripts": [f"tomr_train = {NAME}.train:main"]},
+    entry_points={"console_scripts": [f"tomr_train = {NAME}.entry:tomr_train"]},
 )

@@ -4,7 +4,7 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
 from launch.conditions import IfCondition
 from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, PythonExpression
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
@@ -13,8 +13,16 @@ from launch_ros.substitutions import FindPackageShare
 def generate_launch_description() -> LaunchDescription:
     """Start the simulator, which also gives the time, and the nodes of the diagnosis."""
     robot = LaunchConfiguration("robot")
+    # A file, or the name of a robot that is shipped.
+    robot_file = PythonExpression(
+        [
+            *("'", robot, "' if '", robot, "'.endswith(('.yaml', '.yml')) else "),
+            *("'", FindPackageShare("tomr_power_model"), "/robots/", robot, ".yaml'"),
+        ]
+    )
     namespace = LaunchConfiguration("namespace")
     factor = ParameterValue(LaunchConfiguration("real_time_factor"), value_type=float)
+    clock = ParameterValue(LaunchConfiguration("publish_clock"), value_type=bool)
     diagnosis = PathJoinSubstitution(
         [FindPackageShare("tomr_fault_diag"), "launch", "diagnosis.launch.py"]
     )
@@ -22,10 +30,8 @@ def generate_launch_description() -> LaunchDescription:
         [
             DeclareLaunchArgument(
                 "robot",
-                default_value=PathJoinSubstitution(
-                    [FindPackageShare("tomr_power_model"), "robots", "reference.yaml"]
-                ),
-                description="robot.yaml: the robot to simulate",
+                default_value="reference",
+                description="robot.yaml of the robot to simulate, or a shipped one by name",
             ),
             DeclareLaunchArgument(
                 "namespace", default_value="", description="namespace of the robot's topics"
@@ -38,11 +44,21 @@ def generate_launch_description() -> LaunchDescription:
                 default_value="1.0",
                 description="seconds of the robot per second",
             ),
+            DeclareLaunchArgument(
+                "publish_clock",
+                default_value="true",
+                description="false: time is that of the computer, as for one of several robots",
+            ),
+            DeclareLaunchArgument(
+                "composition",
+                default_value="false",
+                description="true: the diagnosis in one process",
+            ),
             Node(
                 package="tomr_sim_bridge",
                 executable="sim_bridge",
                 namespace=namespace,
-                parameters=[robot, {"real_time_factor": factor}],
+                parameters=[robot_file, {"real_time_factor": factor, "publish_clock": clock}],
                 output="screen",
             ),
             IncludeLaunchDescription(
@@ -50,7 +66,8 @@ def generate_launch_description() -> LaunchDescription:
                 launch_arguments={
                     "robot": robot,
                     "namespace": namespace,
-                    "use_sim_time": "true",
+                    "use_sim_time": LaunchConfiguration("publish_clock"),
+                    "composition": LaunchConfiguration("composition"),
                 }.items(),
                 condition=IfCondition(LaunchConfiguration("diagnosis")),
             ),

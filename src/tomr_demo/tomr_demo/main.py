@@ -30,10 +30,12 @@ from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK, run_main
 from tomr_power_model.errors import InputError
 from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import load_robot
+from tomr_view.cli import LOOPBACK, PORT
 
 # A command acts this long [s] after its stamp, as in the real Robotino, so that the time it takes
 # on its way between busy processes plays no part.
 COMMAND_DELAY = 0.15
+PAGE = f"http://{LOOPBACK}:{PORT}/"
 
 _EPILOG = """\
 Four processes talk over DDS on this machine only: sim_bridge (the robot, in MuJoCo, in real time),
@@ -46,6 +48,7 @@ start, and no fault after that.
 examples:
   tomr_demo                                  the whole demo, about 50 s
   tomr_demo --quick --out try                shorter acts
+  tomr_demo --view                           in a browser too, with buttons for faults
   tomr_demo --figure demo_output/recording   draw the time line again
 
 To watch with other tools, give them the same ROS_DOMAIN_ID (here {domain}) and
@@ -80,6 +83,11 @@ def _parser() -> argparse.ArgumentParser:
         help="folder to leave recording, figure and result in (default: demo_output); one of an "
         "earlier demo is replaced, any other gets a number",
     )
+    parser.add_argument(
+        "--view",
+        action="store_true",
+        help=f"show it in a browser too, at {PAGE}, and drive on until Ctrl-C",
+    )
     parser.add_argument("--weights", type=Path, metavar="NPZ", help="of the classifier")
     parser.add_argument(
         "--figure",
@@ -102,7 +110,7 @@ def _demo(arguments: Sequence[str] | None) -> int:
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     output = make_output(options.out or Path("demo_output"))
     write_robot(output / ROBOT)
-    scene = _perform(output, options.weights, options.quick, console)
+    scene = _perform(output, options, console)
     write_result(output / RESULT, scene.board)
     console.print(act_table(scene, console.width))
     passed = scene.board.passed
@@ -119,21 +127,27 @@ def _demo(arguments: Sequence[str] | None) -> int:
     return EXIT_OK if passed else EXIT_MISMATCH
 
 
-def _perform(output: Path, weights: Path | None, quick: bool, console: Console) -> Scene:
+def _perform(output: Path, options: argparse.Namespace, console: Console) -> Scene:
     """Run the processes and the play; returns its last scene."""
     # Takes a second to import, which neither --help nor --figure needs.
     from tomr_demo.play import Play
 
-    acts = shortened(ACTS) if quick else ACTS
+    acts = shortened(ACTS) if options.quick else ACTS
     topics = all_topics(load_robot(output / ROBOT))
     with signals_noted() as signals, Children(output / LOGS) as children:
-        start_nodes(children, output / ROBOT, weights)
+        start_nodes(children, output / ROBOT, options.weights)
+        if options.view:
+            start_page(children, output / ROBOT)
+            console.print(f"watch at {PAGE}")
         with _ros(), view_on(console) as view:
             play = Play(topics, children, view, signals)
             try:
                 play.wait_until_ready()
                 with RecordingWriter(output / RECORDING) as recording:
                     play.perform(acts, recording)
+                if options.view:
+                    console.print(f"driving on for {PAGE}; Ctrl-C ends")
+                    play.drive_on()
             finally:
                 play.close()
     return play.scene()
@@ -163,9 +177,15 @@ def start_nodes(children: Children, robot: Path, weights: Path | None = None) ->
     more = {"fault_classifier": ["-p", f"weights:={weights.resolve()}"]} if weights else {}
     for name in PROCESSES:
         # sim_bridge makes the time that the others follow.
-        time = [] if name == "sim_bridge" else ["-p", "use_sim_time:=true"]
+        time = ["-p", f"{'publish_clock' if name == 'sim_bridge' else 'use_sim_time'}:=true"]
         given: list[str | Path] = ["--ros-args", "--params-file", robot, *time, *more.get(name, [])]
         children.start(name, [*command_of(name, PROCESSES), *given])
+
+
+def start_page(children: Children, robot: Path) -> None:
+    """Start the web server of the page."""
+    program = command_of("tomr_view", {"tomr_view": "tomr_view.cli"})
+    children.start("tomr_view", [*program, "--robot", robot])
 
 
 def _draw(recording: Path, figure: Path) -> None:

@@ -12,6 +12,7 @@ from tomr_fault_diag.classifier.states import (
     CONTROL,
     MOTOR,
     NORMAL,
+    NOT_ENOUGH,
     NOT_OBSERVABLE,
     SLIP,
     STALE,
@@ -28,6 +29,7 @@ DIAGNOSTICS = "/diagnostics"
 TRUTH = "/ground_truth/faults"
 HEALTHY = "healthy"
 NORMAL_STATE = STATES[NORMAL].name
+_UNDECIDED = (NOT_OBSERVABLE.name, NOT_ENOUGH.name)
 _NO_FAULTS = (NORMAL_STATE, WAITING.name, STALE.name)
 
 
@@ -57,9 +59,8 @@ def named_in(message: Any, stamp_ns: int) -> Named | None:
     for status in message.status:
         values = {item.key: str(item.value) for item in status.values}
         if "state" in values:
-            # At rest nothing can be wrong that anybody could see: as good as normal here.
-            quiet = values["state"] == NOT_OBSERVABLE.name
-            state = NORMAL_STATE if quiet else values["state"]
+            # Where nothing can be seen nothing is said to be wrong: as good as normal here.
+            state = NORMAL_STATE if values["state"] in _UNDECIDED else values["state"]
             share = values.get(f"p {state}")
             evidence = tuple(text for key, text in values.items() if key.startswith("evidence "))
             return Named(

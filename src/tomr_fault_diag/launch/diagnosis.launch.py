@@ -2,24 +2,31 @@
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.conditions import IfCondition, UnlessCondition
+from launch.substitutions import LaunchConfiguration, PythonExpression
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-REFERENCE_ROBOT = PathJoinSubstitution(
-    [FindPackageShare("tomr_power_model"), "robots", "reference.yaml"]
+ROBOT = LaunchConfiguration("robot")
+# A file, or the name of a robot that is shipped.
+ROBOT_FILE = PythonExpression(
+    [
+        *("'", ROBOT, "' if '", ROBOT, "'.endswith(('.yaml', '.yml')) else "),
+        *("'", FindPackageShare("tomr_power_model"), "/robots/", ROBOT, ".yaml'"),
+    ]
 )
 ARGUMENTS = (
     DeclareLaunchArgument(
         "robot",
-        default_value=REFERENCE_ROBOT,
-        description="robot.yaml: geometry, masses, motors and friction of the robot",
+        default_value="reference",
+        description="robot.yaml: geometry, masses, motors and friction of the robot; or a shipped "
+        "one by name: reference, robotino_v2, robotino_v2_gray",
     ),
     DeclareLaunchArgument(
         "settings",
         # A file is needed either way: by default the robot's once more, which changes nothing.
-        default_value=LaunchConfiguration("robot"),
+        default_value=ROBOT_FILE,
         description="parameter file with settings of the nodes, such as cmd_vel_type",
     ),
     DeclareLaunchArgument(
@@ -31,7 +38,14 @@ ARGUMENTS = (
         "namespace", default_value="", description="namespace of the robot's topics"
     ),
     DeclareLaunchArgument(
-        "hardware_id", default_value="tomr", description="name of the robot in /diagnostics"
+        "hardware_id",
+        default_value="",
+        description="name of the robot in /diagnostics; empty: its namespace, else tomr",
+    ),
+    DeclareLaunchArgument(
+        "composition",
+        default_value="false",
+        description="true: the three stages in one process, at half the cost",
     ),
     DeclareLaunchArgument(
         "decision_rate", default_value="20.0", description="decisions per second [Hz]"
@@ -44,27 +58,34 @@ def argument(name: str, kind: type) -> dict[str, ParameterValue]:
     return {name: ParameterValue(LaunchConfiguration(name), value_type=kind)}
 
 
-def stage(*parameters: dict[str, ParameterValue], package: str, executable: str) -> Node:
+def stage(
+    *parameters: dict[str, ParameterValue], package: str, executable: str, composed: bool = False
+) -> Node:
     """One node of the diagnosis, with the parameters it has besides those of all."""
-    files = [LaunchConfiguration("robot"), LaunchConfiguration("settings")]
+    files = [ROBOT_FILE, LaunchConfiguration("settings")]
+    condition = IfCondition if composed else UnlessCondition
     return Node(
         package=package,
         executable=executable,
         namespace=LaunchConfiguration("namespace"),
         parameters=[*files, argument("use_sim_time", bool), *parameters],
+        condition=condition(LaunchConfiguration("composition")),
         output="screen",
     )
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Start the three nodes of the diagnosis."""
+    """Start the three nodes of the diagnosis, or the one that holds them."""
     rate = argument("decision_rate", float)
-    hardware_id = argument("hardware_id", str)
+    name = argument("hardware_id", str)
     return LaunchDescription(
         [
             *ARGUMENTS,
-            stage(rate, package="tomr_power_model", executable="power_model"),
-            stage(rate, hardware_id, package="tomr_fault_diag", executable="power_residuals"),
-            stage(hardware_id, package="tomr_fault_diag", executable="fault_classifier"),
+            stage(rate, name, package="tomr_power_model", executable="power_model"),
+            stage(rate, name, package="tomr_fault_diag", executable="power_residuals"),
+            stage(name, package="tomr_fault_diag", executable="fault_classifier"),
+            stage(
+                rate, name, package="tomr_fault_diag", executable="tomr_diagnosis", composed=True
+            ),
         ]
     )

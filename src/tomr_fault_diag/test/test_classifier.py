@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from tomr_fault_diag.classifier.commissioned import commissioned_words, stamp_of
 from tomr_fault_diag.classifier.judges import JUDGES, make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.network import Network
@@ -153,11 +154,25 @@ def test_a_robot_that_has_not_been_told_anything_waits() -> None:
     assert waiting.state.level is Level.OK
     robot = shipped_robot("reference")
     status = diagnosis_message(robot, waiting, "").statuses[0]
-    assert status.message == "waiting: no command has come yet"
+    assert status.message == "waiting: no fresh command"
     # Without any power there is more amiss than that.
     lost = Residual(nan, nan, nan, missing="no fresh wheel_1/power")
     (stale,) = _classify([ResidualFrame(BASE + 50 * MS, (unknown, lost, *(unknown,) * 8))])
     assert stale.state is STALE
+
+
+def test_the_message_says_when_the_robot_was_commissioned() -> None:
+    robot, found = shipped_robot("reference"), _run((HEALTHY, 40))[-1]
+    plain = ClassifierSettings()
+    with_these = evolve(plain, commissioned=stamp_of("2026-03-01", plain))
+    with_others = evolve(with_these, classifier="wang2024")
+    for settings, said in (
+        (plain, "no: run tomr_commission"),
+        (with_these, "2026-03-01"),
+        (with_others, "no: with another classifier on 2026-03-01, run tomr_commission again"),
+    ):
+        status = diagnosis_message(robot, found, "", commissioned_words(settings)).statuses[0]
+        assert dict(status.values)["commissioned"] == said
 
 
 def test_a_clock_that_goes_back_starts_afresh() -> None:

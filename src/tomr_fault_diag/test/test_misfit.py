@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from tomr_fault_diag.classifier.judges import Opinion
 from tomr_fault_diag.classifier.misfit import MisfitWatch
@@ -26,16 +27,15 @@ Three = tuple[float, float, float]
 TURNING: Three = (3.0, -8.0, 5.0)
 
 
-def frame(at_ms: int, expected: Three, measured: Three, total: float = 0.0) -> ResidualFrame:
-    """Expected and measured wheel speeds [rad/s]; residual of the total power in bands of 2 W."""
+def frame(at_ms: int, expected: Three, measured: Three, power: float = 0.0) -> ResidualFrame:
+    """Expected and measured wheel speeds [rad/s]; residual of motor 1's power in bands of 2 W."""
     quiet = (Residual(0.0, 1.0, 2.0),) * 3
+    motors = (Residual(2.0 * power, 2.0, 20.0), *quiet[1:])
     speeds = tuple(
         Residual((is_ - want) * (-1.0 if want < 0.0 else 1.0), 0.2, want, "rad/s")
         for want, is_ in zip(expected, measured, strict=True)
     )
-    return ResidualFrame(
-        BASE + at_ms * MS, (Residual(2.0 * total, 2.0, 20.0), *quiet, *speeds, *quiet)
-    )
+    return ResidualFrame(BASE + at_ms * MS, (Residual(0.0, 2.0, 20.0), *motors, *speeds, *quiet))
 
 
 class Sure:
@@ -49,6 +49,9 @@ class Sure:
 
     def clear(self) -> None:
         self.cleared += 1
+
+    def interrupt(self) -> None:
+        pass
 
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         return Opinion(np.eye(6)[self.state], sure=True)
@@ -103,20 +106,35 @@ def test_what_may_be_something_else(expected: Three, measured: Three) -> None:
 
 def test_what_a_healthy_robot_could_not_show_is_unknown() -> None:
     normal = [frame(t, TURNING, TURNING) for t in range(50, 1000, 50)]
-    far = [frame(t, TURNING, TURNING, total=-4.0) for t in range(1000, 3000, 50)]
-    near = [frame(t, TURNING, TURNING, total=2.0) for t in range(3000, 5000, 50)]
+    far = [frame(t, TURNING, TURNING, power=-4.0) for t in range(1000, 3000, 50)]
+    near = [frame(t, TURNING, TURNING, power=2.0) for t in range(3000, 5000, 50)]
     changes = named(normal + far + near)
     assert changes == [(50, "normal"), (2000, "unknown"), (4000, "normal")]
 
 
+def test_more_that_the_computer_draws_is_not_unknown() -> None:
+    """Unless the motors' own power is not known: then it may be theirs."""
+
+    def watched(motor: Residual) -> bool:
+        watch = MisfitWatch()
+        for t in range(50, 2000, 50):
+            item = frame(t, TURNING, TURNING)
+            rest = item.residuals[2:]
+            seen = watch.take(evolve(item, residuals=(Residual(9.0, 2.0, 20.0), motor, *rest)))
+        return seen.unexplained
+
+    assert not watched(Residual(0.0, 2.0, 20.0))
+    assert watched(Residual(NAN, NAN, NAN))
+
+
 def test_a_named_fault_is_not_called_unknown() -> None:
-    far = [frame(t, TURNING, TURNING, total=9.0) for t in range(50, 3000, 50)]
+    far = [frame(t, TURNING, TURNING, power=9.0) for t in range(50, 3000, 50)]
     assert named(far, CONTROL) == [(50, "control system fault")]
 
 
 def test_a_short_stray_is_not_unknown() -> None:
     frames = [
-        frame(t, TURNING, TURNING, total=9.0 if t % 1000 < 900 else 0.0)
+        frame(t, TURNING, TURNING, power=9.0 if t % 1000 < 900 else 0.0)
         for t in range(50, 5000, 50)
     ]
     assert [state for _, state in named(frames)] == ["normal"]
@@ -141,15 +159,15 @@ def test_a_fault_that_is_fading_stays_named_and_is_not_called_unknown() -> None:
     classifier, states = FaultClassifier(judge), []
     for t in range(50, 4000, 50):
         judge.state = CONTROL if t < 2000 else NORMAL
-        diagnosis = classifier.classify(frame(t, TURNING, TURNING, total=9.0))
+        diagnosis = classifier.classify(frame(t, TURNING, TURNING, power=9.0))
         if diagnosis is not None and diagnosis.changed:
             states.append(diagnosis.state.name)
     assert states == ["control system fault"]
 
 
 def test_after_a_clock_goes_back_time_counts_anew() -> None:
-    far = [frame(t, TURNING, TURNING, total=9.0) for t in range(50, 1000, 50)]
-    back = [frame(t - 50_000, TURNING, TURNING, total=9.0) for t in range(1000, 2500, 50)]
+    far = [frame(t, TURNING, TURNING, power=9.0) for t in range(50, 1000, 50)]
+    back = [frame(t - 50_000, TURNING, TURNING, power=9.0) for t in range(1000, 2500, 50)]
     changes = named(far + back)
     # The robot is normal anew, and a second later it is not: not when the old time is reached.
     assert changes[-1] == (2000 - 50_000, "unknown")
@@ -157,7 +175,7 @@ def test_after_a_clock_goes_back_time_counts_anew() -> None:
 
 @pytest.mark.parametrize("measured", [(0.0, 0.0, 0.0), TURNING])
 def test_a_silence_does_not_count(measured: Three) -> None:
-    frames = [frame(t, TURNING, measured, total=9.0) for t in (50, 5000, 5050, 5100)]
+    frames = [frame(t, TURNING, measured, power=9.0) for t in (50, 5000, 5050, 5100)]
     assert [state for _, state in named(frames)] == ["normal"]
 
 

@@ -1,6 +1,7 @@
 """The residual stage: codes, bands, staleness, and the ways in which power may be published."""
 
 import math
+from collections.abc import Callable
 from types import SimpleNamespace as Message
 from typing import Any
 
@@ -123,24 +124,115 @@ def test_a_missing_input_makes_only_its_residuals_stale(lost: str, places: set[i
     assert all(lost in frame.residuals[index].missing for index in places)
 
 
-def test_an_input_that_falls_silent_goes_stale_after_its_time() -> None:
-    def silent(stamp: int) -> Any:
-        return _battery(stamp if stamp < BASE + 100 * MS else BASE + 90 * MS, 24.0, -10.0 / 24.0)
-
+def _disturbed(
+    topic: str, change: Callable[[int, Any], Any | None], steps: int = 150
+) -> dict[int, ResidualFrame]:
+    """Frames by time [ms]; `change` gets time and message of a topic, None: it is lost."""
     robot = _robot()
     stage = ResidualStage(robot)
     takers = {item.topic: item.take for item in residual_inputs(robot, stage)}
-    known: list[tuple[int, bool]] = []
-    for step in range(120):
+    found = {}
+    for step in range(steps):
         stamp = BASE + step * 10 * MS
         if step % 5 == 0:
             stage.prediction(_prediction(stamp))
-        for topic, make in {**ALL, "wheel_3/power": silent}.items():
-            takers[topic](make(stamp), stamp)
+        for name, make in ALL.items():
+            message = make(stamp)
+            message = change(step * 10, message) if name == topic else message
+            if message is not None:
+                takers[name](message, stamp)
         for frame in stage.due():
-            known.append(((frame.stamp_ns - BASE) // MS, frame.residuals[MOTORS[2]].stale))
-    assert all(stale == (at >= 590) for at, stale in known)
-    assert known[-1][1]
+            found[(frame.stamp_ns - BASE) // MS] = frame
+    return found
+
+
+def test_an_input_that_falls_silent_is_a_gap_and_then_missing() -> None:
+    frames = _disturbed("wheel_3/power", lambda t, message: message if t < 400 else None)
+    said = {at: frame.residuals[MOTORS[2]].missing for at, frame in frames.items()}
+    assert {said[t] for t in range(50, 500, 50)} == {""}  # 0.1 s is no gap
+    assert {said[t] for t in range(500, 900, 50)} == {"a gap in wheel_3/power"}
+    assert {said[t] for t in range(900, 1400, 50)} == {"no fresh wheel_3/power"}
+
+
+@pytest.mark.parametrize(("topic", "place"), [("wheel_2/power", 2), ("joint_states", 5)])
+def test_a_gap_ends_a_moment_after_the_stream_goes_on(topic: str, place: int) -> None:
+    frames = _disturbed(topic, lambda t, message: message if t <= 500 or t > 700 else None)
+    unknown = [at for at, frame in frames.items() if frame.residuals[place].stale]
+    end = {"wheel_2/power": 710 + 50, "joint_states": 710 + 250}[topic]
+    start = {"wheel_2/power": 650, "joint_states": 600}[topic]
+    assert unknown == list(range(start, end, 50))
+
+
+def test_stamps_that_go_back_leave_a_gap() -> None:
+    """A clock put back by 0.2 s: what comes till it catches up is ignored, then comes the gap."""
+
+    def back(at: int, message: Any) -> Any:
+        stamp = BASE + (at - 200 * (at > 500)) * MS
+        message.header = bag_header(stamp)
+        return message
+
+    frames = _disturbed("wheel_2/power", back, 160)
+    said = {at: frame.residuals[MOTORS[1]].missing for at, frame in frames.items()}
+    assert said[500] == ""
+    assert "a gap in wheel_2/power" in {said[t] for t in range(550, 850, 50)}
+    late = _disturbed("wheel_2/power", lambda t, m: back(750, m) if t == 700 else m)
+    assert not any(frame.residuals[MOTORS[1]].stale for frame in late.values())
+
+
+def test_what_no_supply_can_deliver_is_no_sample() -> None:
+    def absurd(at: int, message: Any) -> Any:
+        if at == 600:
+            message.voltage = 1e30
+        return message
+
+    for frame in _disturbed("wheel_2/power", absurd).values():
+        assert frame.codes == (0,) * 10
+        assert not frame.residuals[MOTORS[1]].stale
+
+
+@pytest.mark.parametrize(
+    ("topic", "bad"),
+    [
+        ("wheel_2/power", lambda t: _battery(t, 24.0, NAN)),
+        ("wheel_2/power", lambda t: _battery(t, 1e30, 1.0)),
+        ("battery_state", lambda t: _battery(t, NAN, -1.0)),
+        ("joint_states", lambda t: Message(header=_joints(t).header, name=None)),
+    ],
+)
+def test_an_input_that_sends_what_cannot_be_used_says_so(
+    topic: str, bad: Callable[[int], Any]
+) -> None:
+    robot = _robot()
+    stage = ResidualStage(robot)
+    takers = {item.topic: item.take for item in residual_inputs(robot, stage)}
+    said: dict[str, str] = {}
+    for step in range(150):
+        stamp = BASE + step * 10 * MS
+        if step % 5 == 0:
+            stage.prediction(_prediction(stamp))
+        for name, make in ALL.items():
+            is_bad = name == topic and step > 50
+            takers[name](bad(stamp) if is_bad else make(stamp), stamp)
+        stage.due()
+        for report in stage.reports():
+            said.update({status.name: status.message for status in report.statuses})
+    assert said.pop(f"inputs: {topic}") == "sends what cannot be used"
+    assert set(said.values()) == {"as it should be"}
+
+
+def test_an_angle_that_no_wheel_reaches_is_no_sample_unless_it_stays() -> None:
+    def leaps(at: int, message: Any, until: int) -> Any:
+        if 600 <= at < until:
+            message.position = message.position + 40.0
+        return message
+
+    once = _disturbed("joint_states", lambda t, m: leaps(t, m, 620))
+    assert {frame.codes for frame in once.values()} == {(0,) * 10}
+    assert not any(once[t].residuals[SPEEDS[0]].stale for t in range(100, 1400, 50))
+    anew = _disturbed("joint_states", lambda t, m: leaps(t, m, 10_000))
+    assert {frame.codes for frame in anew.values()} == {(0,) * 10}
+    unknown = [t for t, frame in anew.items() if frame.residuals[SPEEDS[0]].stale and t > 50]
+    assert unknown == list(range(650, 870, 50))
 
 
 def test_without_predictions_everything_is_stale_and_says_so() -> None:

@@ -2,17 +2,24 @@
 
 from collections.abc import Iterator
 from importlib.resources import files
+from pathlib import Path
 
 import pytest
 import rclpy
 from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
 
+from tomr_fault_diag.nodes.diagnosis_node import DiagnosisNode
 from tomr_fault_diag.nodes.fault_classifier_node import FaultClassifierNode
 from tomr_fault_diag.nodes.power_residuals_node import PowerResidualsNode
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.nodes.stage_node import StageNode
 
-KINDS = {"residuals": PowerResidualsNode, "classifier": FaultClassifierNode}
+KINDS = {
+    "residuals": PowerResidualsNode,
+    "classifier": FaultClassifierNode,
+    "diagnosis": DiagnosisNode,
+}
 
 
 @pytest.fixture
@@ -45,3 +52,40 @@ def test_times_of_the_classifier_hold_at_once(node: FaultClassifierNode) -> None
     (result,) = node.set_parameters([Parameter("recovery_time", value=2.5)])
     assert result.successful
     assert node.classifier.settings.recovery_time == to_ns(2.5)
+
+
+@pytest.mark.parametrize("node", ["diagnosis"], indirect=True)
+def test_one_process_is_retuned_as_its_stages_are(node: DiagnosisNode) -> None:
+    new = [Parameter("band.power", value=3.5), Parameter("recovery_time", value=2.5)]
+    assert all(result.successful for result in node.set_parameters(new))
+    assert node.pipeline.settings.residuals.bands.power == 3.5
+    assert node.pipeline._residuals.settings.bands.power == 3.5
+    assert node.pipeline._classifier.settings.recovery_time == to_ns(2.5)
+
+
+@pytest.mark.parametrize("node", ["classifier", "diagnosis"], indirect=True)
+def test_a_fault_is_cleared_by_service(node: StageNode) -> None:
+    client = node.create_client(Trigger, "~/clear")
+    assert client.wait_for_service(10.0)
+    answer = client.call_async(Trigger.Request())
+    rclpy.spin_until_future_complete(node, answer, timeout_sec=10.0)
+    assert answer.result().success
+    assert answer.result().message == "no fault was named"
+
+
+def test_one_process_takes_the_sections_of_the_stages(tmp_path: Path) -> None:
+    reference = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml").read_text()
+    file = tmp_path / "robot.yaml"
+    file.write_text(
+        reference
+        + "power_residuals:\n  ros__parameters:\n    band.power: 2.2\n"
+        + "tomr_diagnosis:\n  ros__parameters:\n    recovery_time: 2.5\n"
+    )
+    rclpy.init(args=["--ros-args", "--params-file", str(file), "-p", "band.current:=0.3"])
+    node = DiagnosisNode([str(file)])
+    settings = node.pipeline.settings
+    node.destroy_node()
+    rclpy.shutdown()
+    assert settings.residuals.bands.power == 2.2
+    assert settings.residuals.bands.current == 0.3
+    assert settings.classifier.recovery_time == to_ns(2.5)

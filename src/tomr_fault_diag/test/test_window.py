@@ -9,7 +9,21 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_fault_diag.classifier.belief import CONTROLS, Belief, six_of
+from tomr_fault_diag.classifier.belief import (
+    CONTROLS,
+    DRAGS,
+    ENCODERS,
+    EXTERNAL,
+    HYPOTHESES,
+    LOADED,
+    METERS,
+    OTHER,
+    STATE_OF,
+    WEAKS,
+    Belief,
+    named_of,
+    of_states,
+)
 from tomr_fault_diag.classifier.features import (
     BLIND,
     CHANNELS,
@@ -19,12 +33,27 @@ from tomr_fault_diag.classifier.features import (
     channels,
     channels_of,
 )
-from tomr_fault_diag.classifier.judges import WindowJudge, make_judge
+from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
-from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, NOT_OBSERVABLE, STATES
+from tomr_fault_diag.classifier.states import (
+    CONTROL,
+    DEGRADED,
+    DRAGGING,
+    FAULTLESS,
+    MOTOR,
+    NAMED,
+    NORMAL,
+    NOT_OBSERVABLE,
+    POWER_SENSOR,
+    SLIP,
+    STATES,
+    STUCK,
+    UNKNOWN,
+    State,
+)
 from tomr_fault_diag.classifier.window_network import WindowNetwork
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_power_model.errors import InputError
@@ -76,40 +105,55 @@ LOST = {"speed": (0.1, -8.0, 0.1), "power": (4.0, 30.0, 4.0), "derived": (4.0, 3
 def test_channels_by_hand() -> None:
     seen = channels_of(frame(0, ALL, speed=(0.2, -0.4, NAN), power=(2.0, 0.0, -2.0)))
     one = np.arcsinh(3.0)
-    assert seen[0] == 0.0
-    np.testing.assert_allclose(seen[1:4], [one, 0.0, -one])
+    assert (seen[:2] == 0.0).all()
+    np.testing.assert_allclose(seen[2:5], [one, 0.0, -one])
     # What is measured: 4 W, 2 W and nothing, each against a band of 2 W.
-    np.testing.assert_allclose(seen[7:10], [np.arcsinh(6.0), one, 0.0])
+    np.testing.assert_allclose(seen[8:11], [np.arcsinh(6.0), one, 0.0])
     # "Slower than told" by 0.4 rad/s at -8 rad/s is +0.4 rad/s; an unknown one is as modelled.
-    np.testing.assert_allclose(seen[10:13], [one, np.arcsinh(6.0), 0.0])
-    np.testing.assert_allclose(seen[13:16], np.arcsinh([6.0, -16.0, 10.0]))
-    np.testing.assert_allclose(seen[16:19], np.arcsinh([6.4, -15.2, 10.0]))
+    np.testing.assert_allclose(seen[11:14], [one, np.arcsinh(6.0), 0.0])
+    np.testing.assert_allclose(seen[14:17], np.arcsinh([6.0, -16.0, 10.0]))
+    np.testing.assert_allclose(seen[17:20], np.arcsinh([6.4, -15.2, 10.0]))
+
+
+def test_the_battery_tells_whether_a_motor_really_draws_what_its_sensor_says() -> None:
+    """Wheel 1 seems to draw 4 W too much: the battery gives 1 W of it, or all, or is unknown."""
+    motor = frame(0, ALL, power=(4.0, 0.0, 0.0))
+
+    def balance(total: Residual) -> float:
+        return float(channels_of(evolve(motor, residuals=(total, *motor.residuals[1:])))[1])
+
+    # 3 W less than the motors say, against the least band of 2 W.
+    assert balance(Residual(1.0, 2.3, 18.0)) == pytest.approx(np.arcsinh(3.0 * -3.0 / 2.0))
+    assert balance(Residual(4.0, 2.3, 18.0)) == 0.0
+    assert balance(Residual(NAN, NAN, 18.0)) == 0.0
+    assert balance(Residual(1.0, 2.3, 18.0, "A")) == 0.0
 
 
 def test_unknown_power_looks_as_modelled_and_draws_nothing() -> None:
     seen = channels_of(frame(0, ALL, power=(NAN, 0.0, 0.0)))
-    assert seen[1] == seen[7] == 0.0
-    assert seen[8] > 0.0
+    assert seen[2] == seen[8] == 0.0
+    assert seen[9] > 0.0
 
 
 def test_each_wheel_sees_itself_first_and_turning_forwards() -> None:
     window = np.arange(WINDOW * CHANNELS, dtype=float).reshape(WINDOW, CHANNELS) + 1.0
-    window[:, 14] *= -1.0  # wheel 2 turns backwards
+    window[:, 15] *= -1.0  # wheel 2 turns backwards
     views = by_wheel(window).reshape(3, WINDOW, CHANNELS)
     np.testing.assert_array_equal(views[0], window)
-    np.testing.assert_array_equal(views[1, :, 1:4], window[:, [2, 3, 1]])
-    np.testing.assert_array_equal(views[1, :, 13:16], -window[:, [14, 15, 13]])
-    np.testing.assert_array_equal(views[2, :, 7:13], window[:, [9, 7, 8, 12, 10, 11]])
+    np.testing.assert_array_equal(views[1, :, 2:5], window[:, [3, 4, 2]])
+    np.testing.assert_array_equal(views[1, :, 14:17], -window[:, [15, 16, 14]])
+    np.testing.assert_array_equal(views[2, :, 8:14], window[:, [10, 8, 9, 13, 11, 12]])
 
 
 def test_another_numbering_of_the_wheels_names_the_other_wheel() -> None:
     network, random = WindowNetwork.load(), np.random.default_rng(0)
     window = random.normal(0.0, 1.0, (WINDOW, CHANNELS))
-    turned = window[:, [0, *(1 + 3 * g + (w + 1) % 3 for g in range(6) for w in range(3))]]
+    turned = window[:, [0, 1, *(2 + 3 * g + (w + 1) % 3 for g in range(6) for w in range(3))]]
     ahead, found = network.scores_of(window), network.scores_of(turned)
-    np.testing.assert_allclose(found[:2], ahead[:2])
-    np.testing.assert_allclose(found[2:5], ahead[[3, 4, 2]])
-    np.testing.assert_allclose(found[5:8], ahead[[6, 7, 5]])
+    common = [NORMAL, SLIP, EXTERNAL, OTHER]
+    np.testing.assert_allclose(found[common], ahead[common])
+    for kind in (CONTROLS, ENCODERS, DRAGS, WEAKS, METERS):
+        np.testing.assert_allclose(found[kind], np.roll(ahead[kind], -1))
 
 
 def test_inference_equals_the_training_framework() -> None:
@@ -121,35 +165,145 @@ def test_inference_equals_the_training_framework() -> None:
     np.testing.assert_allclose(found, np.array(shipped["scores"]), atol=0.01, rtol=1e-3)
 
 
+def _against_all_but(hypothesis: int, size: float) -> np.ndarray:
+    likelihoods = np.full(HYPOTHESES, -size)
+    likelihoods[hypothesis] = 0.0
+    return of_states(likelihoods)
+
+
 def test_belief_by_hand() -> None:
     """One window that says e^-10 of everything but slip, at half weight: odds of 10^-6 e^5."""
     belief = Belief(0.5, 6.0)
-    likelihoods = np.full(8, -10.0)
-    likelihoods[1] = 0.0
-    shares = belief.update(likelihoods)
-    odds = 1e-6 * np.exp(5.0) / (1.0 - 7e-6)
-    assert shares[1] / shares[0] == pytest.approx(odds, rel=1e-6)
-    assert six_of(shares).sum() == pytest.approx(1.0)
+    shares = belief.update(_against_all_but(SLIP, 10.0))
+    # Slip of 10^-1, seven faults of 10^-6, nine of 10^-10, one of 10^-8, and a push of 10^-3.
+    odds = 0.1 * np.exp(5.0) / (1.0 - 0.1 - 7e-6 - 9e-10 - 1e-8 - 1e-3)
+    assert shares[SLIP] / shares[NORMAL] == pytest.approx(odds, rel=1e-6)
+    assert named_of(shares).sum() == pytest.approx(1.0)
+    assert len(named_of(shares)) == len(NAMED)
+
+
+def test_probabilities_stand_beside_their_states() -> None:
+    for hypothesis, state in enumerate(STATE_OF):
+        shares = np.eye(len(STATE_OF))[hypothesis]
+        assert NAMED[int(named_of(shares).argmax())] is state
 
 
 def test_silence_leaves_a_belief_as_it_is() -> None:
     belief = Belief(0.4, 10.0)
     for _ in range(40):
-        belief.update(np.where(np.arange(8) == 6, 0.0, -20.0))
-    assert belief.shares[6] > 0.999
+        belief.update(_against_all_but(ENCODERS.start + 1, 20.0))
+    assert belief.shares[ENCODERS.start + 1] > 0.999
     for _ in range(200):  # ten seconds in which nothing can be told apart
-        belief.update(np.zeros(8))
-    assert belief.shares[6] > 0.97
+        belief.update(np.zeros(len(STATE_OF)))
+    assert belief.shares[ENCODERS.start + 1] > 0.97
+
+
+def test_a_force_is_a_push_first_and_a_load_when_it_lasts() -> None:
+    belief, likelihoods = Belief(0.4, 11.0), _against_all_but(EXTERNAL, 20.0)
+    lasted = next(k for k in range(200) if belief.update(likelihoods)[LOADED] > 0.99)
+    assert 90 < lasted < 150  # 5 to 7 s
+    belief.clear()
+    for _ in range(20):
+        assert belief.update(likelihoods)[LOADED] < 1e-3
+    assert belief.shares[EXTERNAL] > 0.99
+    for _ in range(10):
+        belief.update(_against_all_but(NORMAL, 20.0))
+    assert belief.shares[NORMAL] > 0.99
+
+
+def test_what_looks_like_another_fault_every_moment_is_none_that_is_known() -> None:
+    belief = Belief(0.4, 11.0)
+    for k in range(30):
+        belief.update(_against_all_but((CONTROLS, ENCODERS, DRAGS)[k // 3 % 3].start, 20.0))
+    assert belief.shares[OTHER] > 0.99
+    belief.clear()
+    for _ in range(30):
+        belief.update(_against_all_but(DRAGS.start, 20.0))
+    assert belief.shares[DRAGS.start] > 0.99
 
 
 class Saying:
     """A network that says the same of every window."""
 
     def __init__(self) -> None:
-        self.likelihoods = np.zeros(8)
+        self.likelihoods = np.zeros(HYPOTHESES)
 
     def log_likelihoods(self, window: np.ndarray) -> np.ndarray:
         return self.likelihoods.copy()
+
+
+def _said(network: Saying, judge: WindowJudge, hypothesis: int, item: ResidualFrame) -> Opinion:
+    network.likelihoods[:] = -30.0
+    network.likelihoods[hypothesis] = 0.0
+    return judge.judge(item, 50 * MS, Unseen())
+
+
+@pytest.mark.parametrize(
+    ("hypothesis", "state", "paper"),
+    [
+        (DRAGS.start + 2, DRAGGING[2], "motor system fault 3"),
+        (WEAKS.start, DEGRADED[0], "motor system fault 1"),
+        (METERS.start + 1, POWER_SENSOR[1], None),
+        (OTHER, UNKNOWN, None),
+    ],
+)
+def test_states_beyond_the_papers_and_what_it_would_call_them(
+    hypothesis: int, state: State, paper: str | None
+) -> None:
+    network = Saying()
+    judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]
+    for tick in range(20):
+        opinion = _said(network, judge, hypothesis, frame(tick))
+    assert opinion.sure
+    assert opinion.leading is state
+    assert opinion.wheel == state.wheel
+    assert (None if state.paper is None else STATES[state.paper].name) == paper
+
+
+def test_what_windows_say_only_slightly_never_adds_up_to_a_drag() -> None:
+    network = Saying()
+    judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]
+    for over, state in ((0.8, STATES[NORMAL]), (4.0, DRAGGING[0])):
+        network.likelihoods[DRAGS.start] = over
+        for tick in range(400):
+            opinion = judge.judge(frame(tick), 50 * MS, Unseen())
+        assert opinion.leading is state
+
+
+def test_a_wheel_that_stands_while_it_drags_is_stuck() -> None:
+    network = Saying()
+    judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]
+    for tick in range(20):
+        opinion = _said(network, judge, DRAGS.start, frame(tick, ALL, speed=(-3.0, 0.0, 0.0)))
+    assert opinion.leading is STUCK[0]
+    for tick in range(20, 40):
+        opinion = _said(network, judge, DRAGS.start, frame(tick, ALL, speed=(-1.0, 0.0, 0.0)))
+    assert opinion.leading is DRAGGING[0]
+
+
+def test_a_fault_that_is_surely_of_one_motor_is_named_though_its_cause_is_not() -> None:
+    network = Saying()
+    judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]
+    network.likelihoods[:] = -30.0
+    network.likelihoods[[DRAGS.start, WEAKS.start]] = 0.0
+    for tick in range(20):
+        opinion = judge.judge(frame(tick), 50 * MS, Unseen())
+    assert opinion.probabilities.max() < 0.6
+    assert opinion.sure
+    assert opinion.leading in (DRAGGING[0], DEGRADED[0])
+
+
+def test_a_push_is_said_and_accuses_nobody() -> None:
+    network, found = Saying(), []
+    classifier = FaultClassifier(WindowJudge(network, ClassifierSettings()))  # type: ignore[arg-type]
+    for tick in range(60):
+        network.likelihoods[:] = -30.0
+        network.likelihoods[EXTERNAL if 20 <= tick < 30 else NORMAL] = 0.0
+        diagnosis = classifier.classify(frame(tick))
+        if diagnosis is not None:
+            found.append(diagnosis)
+    assert _changes(found) == ["normal", "pushed", "normal"]
+    assert {diagnosis.state.level for diagnosis in found} == {Level.OK}
 
 
 @pytest.mark.parametrize(("idle", "state"), [((), 0), ((0,), 0), ((2,), CONTROL)])
@@ -204,7 +358,7 @@ def test_a_lost_signal_tells_its_wheel() -> None:
 def test_a_blip_is_no_fault() -> None:
     blip = [frame(40 + t, ALL, **LOST) for t in range(1)]
     found = run([frame(t) for t in range(40)] + blip + [frame(41 + t) for t in range(40)])
-    assert _changes(found) == ["normal"]
+    assert set(_changes(found)) <= {"normal", "pushed"}
 
 
 def test_what_a_motion_cannot_show() -> None:
@@ -228,13 +382,17 @@ def test_a_wheel_that_moves_without_being_told_is_not_idle() -> None:
 
 def test_robots_that_lack_a_sensor_look_as_modelled_there() -> None:
     window = np.ones((2, WINDOW, CHANNELS))
-    total, motors, encoders = (blind(window.copy()) for blind in BLIND)
-    assert (total[..., 0] == 0.0).all()
-    assert (total[..., 1:] == 1.0).all()
-    assert (motors[..., 1:10] == 0.0).all()
-    assert (motors[..., 10:] == 1.0).all()
-    assert (encoders[..., [4, 5, 6, 10, 11, 12]] == 0.0).all()
-    assert (encoders[..., [7, 8, 9]] == 1.0).all()
+    total, balance, _, second, _, motors, encoders = (blind(window.copy()) for blind in BLIND)
+    assert (total[..., :2] == 0.0).all()
+    assert (total[..., 2:] == 1.0).all()
+    assert (balance[..., 1] == 0.0).all()
+    assert balance.sum() == window.sum() - 2 * WINDOW
+    assert (motors[..., 1:11] == 0.0).all()
+    assert (motors[..., 11:] == 1.0).all()
+    assert (encoders[..., [5, 6, 7, 11, 12, 13]] == 0.0).all()
+    assert (encoders[..., [8, 9, 10]] == 1.0).all()
+    # Without wheel 2's: the balance, both residuals and what it draws.
+    assert np.flatnonzero(second[0, 0] == 0.0).tolist() == [1, 3, 6, 9]
     assert by_wheel(window).shape == (2, 3, INPUTS)
 
 
@@ -247,9 +405,10 @@ def test_what_is_named_does_not_hang_on_the_rate_of_decisions(hz: int) -> None:
         return evolve(found, stamp_ns=BASE + ms * MS)
 
     found = run([at(ms) for ms in range(period, 4000, period)])
-    changes = [((d.stamp_ns - BASE) // MS, d.state.name) for d in found if d.changed]
-    assert [state for _, state in changes] == ["normal", "motor system fault 2"]
-    assert changes[1][0] - start <= 300 + period
+    named = [d for d in found if d.changed and d.state.name not in FAULTLESS]
+    assert {d.state.paper for d in named} == {MOTOR + 1}
+    assert named[-1].state is STATES[MOTOR + 1]
+    assert (named[0].stamp_ns - BASE) // MS - start <= 300 + period
 
 
 def test_after_a_gap_one_tick_counts_once() -> None:

@@ -13,7 +13,6 @@ from tomr_odometry.estimator import Estimate, SlipOdometry
 from tomr_odometry.start import body_of
 from tomr_odometry.topics import estimate_messages, odometry_inputs
 from tomr_power_model.messages.bag import to_bag
-from tomr_power_model.messages.types import TWIST_STAMPED
 from tomr_power_model.robot import shipped_robot
 from tomr_sim_bridge.plant.samples import command_sample
 from tomr_sim_bridge.plant.simulation import Simulation
@@ -70,7 +69,7 @@ def _as_it_is(time: float, topic: str, message: Any) -> Any:
 
 def _play(drive: Recorded, change: Change = _as_it_is) -> Iterator[Estimate]:
     core = SlipOdometry(ROBOT)
-    inputs = {item.topic: item for item in odometry_inputs(ROBOT, core, TWIST_STAMPED)}
+    inputs = {item.topic: item for item in odometry_inputs(ROBOT, core)}
     for time, topic, message in drive.messages:
         if topic in inputs:
             changed = change(time, topic, message)

@@ -6,7 +6,6 @@ from typing import Any
 from tomr_odometry.estimator import Estimate, SlipOdometry
 from tomr_odometry.topics import odometry_inputs
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.types import TWIST_STAMPED
 from tomr_power_model.recordings import Recording, resolve_topic
 from tomr_power_model.robot import Robot
 from tomr_power_model.topics.inputs import Complaints, Input
@@ -43,7 +42,7 @@ def estimates(
     namespace: str | None = None,
 ) -> Iterator[Estimate]:
     """Play a recording; what is wrong with messages is counted in `complaints`."""
-    inputs = found_inputs(recording, odometry_inputs(robot, core, TWIST_STAMPED), namespace)
+    inputs = found_inputs(recording, odometry_inputs(robot, core), namespace)
     for topic, _, message, receive_ns in recording.messages(inputs):
         problem = _take(inputs[topic], message, receive_ns)
         if problem is not None:

@@ -55,7 +55,7 @@ def imu_of(message: Any) -> tuple[float, ...]:
     return tuple(value if math.isfinite(value) else math.nan for value in values)
 
 
-def odometry_inputs(robot: Robot, core: SlipOdometry, twist_type: str) -> tuple[Input, ...]:
+def odometry_inputs(robot: Robot, core: SlipOdometry) -> tuple[Input, ...]:
     """The inputs of a core."""
 
     def command(message: Any, receive_ns: int) -> Arrival:
@@ -64,7 +64,7 @@ def odometry_inputs(robot: Robot, core: SlipOdometry, twist_type: str) -> tuple[
     def imu(message: Any, receive_ns: int) -> Arrival:
         return core.imu(stamp_of(message, receive_ns), imu_of(message))
 
-    inputs = [Input("cmd_vel", twist_type, guarded(command), (TWIST, TWIST_STAMPED))]
+    inputs = [Input("cmd_vel", TWIST_STAMPED, guarded(command), (TWIST, TWIST_STAMPED))]
     wheels = WheelFinder(robot.wheel_names)
     inputs += measured_inputs(robot, core.encoders, core.power, wheels)
     if core.settings.use_imu:

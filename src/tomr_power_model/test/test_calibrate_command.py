@@ -16,6 +16,8 @@ from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import load_robot, read_description, shipped_robot
 
+# Of a recording: quoted in YAML, escaped in HTML, no formula in a picture.
+NAME = "<script>\x01 $a_ #: {\ntour"
 MakeDrive = Callable[..., Drive]
 WriteBag = Callable[..., Path]
 ROBOT = shipped_robot("reference")
@@ -60,7 +62,7 @@ def test_the_command_writes_a_robot_and_a_page(
 ) -> None:
     real = other_values(ROBOT)
     bags = [
-        str(write_bag(make_drive(real, seed, seconds=30.0), tmp_path / f"tour{seed}"))
+        str(write_bag(make_drive(real, seed, seconds=30.0), tmp_path / f"{NAME}{seed}"))
         for seed in (1, 2)
     ]
     out, page = tmp_path / "fitted.yaml", tmp_path / "report.html"

@@ -1,6 +1,7 @@
 """What is read out of messages, and what is refused with a reason."""
 
 import math
+import sys
 from typing import Any
 from unittest.mock import call, patch
 
@@ -30,7 +31,7 @@ from tomr_power_model.messages.plain import Level, Status, battery_state
 from tomr_power_model.messages.readings import SupplyReading
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.ticks import Arrival
-from tomr_power_model.nodes.stage_node import to_ros
+from tomr_power_model.nodes.stage_node import message_class, to_ros
 from tomr_power_model.robot import shipped_robot
 from tomr_power_model.topics.inputs import Complaints, measured_inputs, model_inputs
 
@@ -121,7 +122,7 @@ class TestInputsOfAStage:
 
     def _take(self, topic: str, message: Any) -> str | None:
         robot = shipped_robot("reference")
-        inputs = model_inputs(robot, PowerPredictor(robot), "geometry_msgs/msg/TwistStamped")
+        inputs = model_inputs(robot, PowerPredictor(robot))
         return next(item.take for item in inputs if item.topic == topic)(message, STAMP)
 
     def test_good_messages_get_no_complaint(self) -> None:
@@ -141,7 +142,7 @@ class TestInputsOfAStage:
     def test_stamps_of_power_reach_the_model(self) -> None:
         robot = shipped_robot("reference")
         predictor = PowerPredictor(robot)
-        inputs = model_inputs(robot, predictor, "geometry_msgs/msg/TwistStamped")
+        inputs = model_inputs(robot, predictor)
         message = to_bag(battery_state(STAMP, 24.0, -1.0))
         with patch.object(predictor, "measured", return_value=Arrival.REPEATED) as measured:
             for topic in ("wheel_3/power", "battery_state"):
@@ -216,3 +217,34 @@ def test_readings_round_as_the_message_does() -> None:
     reading = SupplyReading.rounded(24.1, 0.1)
     assert reading.voltage == float(np.float32(24.1)) != 24.1
     assert reading.power == pytest.approx(2.41, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["antigravity/msg/X", "os.path/msg/X", "../x/msg/X", "this/srv/X"])
+def test_a_type_s_name_does_not_import_what_is_no_message(name: str) -> None:
+    with pytest.raises((ImportError, ValueError)):
+        message_class(name)
+    assert not {"antigravity", "this"} & set(sys.modules)
+
+
+def test_what_no_sensor_measures_is_no_sample() -> None:
+    finder = WheelFinder(WHEELS)
+    wheels = finder.read(_joints(list(WHEELS), position=[1.0, 1e308, -1e10], velocity=[1.0] * 3))
+    assert wheels.position[0] == 1.0
+    assert math.isnan(wheels.position[1])
+    assert math.isnan(wheels.position[2])
+    for voltage, current in ((1e30, 1.0), (24.0, 1e30), (math.inf, 1.0)):
+        with pytest.raises(Unusable):
+            battery_of(
+                bag_message("sensor_msgs/msg/BatteryState", voltage=voltage, current=current)
+            )
+    assert math.isnan(
+        battery_of(bag_message("sensor_msgs/msg/BatteryState", voltage=math.nan, current=1.0))[0]
+    )
+
+
+def test_complaints_of_ever_other_kinds_do_not_fill_the_memory() -> None:
+    complaints = Complaints()
+    for number in range(5000):
+        complaints.note("joint_states", f"odd name\n{number}" + "x" * 5000)
+    assert len(complaints.counts) < 300
+    assert all(len(problem) < 2000 and "\n" not in problem for _, problem in complaints.counts)

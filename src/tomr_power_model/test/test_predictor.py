@@ -116,9 +116,27 @@ def test_the_delay_postpones_the_response() -> None:
 
 def test_a_command_is_held_or_times_out() -> None:
     events = [(t, kind) for t, kind in _events(3000) if kind == "encoders" or t < 500]
-    assert _run(events)[-1].speed[1] > 1.0
-    timed = ModelSettings(command_timeout=to_ns(0.5))
-    assert abs(_run(events, settings=timed)[-1].speed[1]) < 0.05
+    held = ModelSettings(command_timeout=0)
+    assert _run(events, settings=held)[-1].speed[1] > 1.0
+    stopped = {p.stamp_ns - BASE: p.speed[1] for p in _run(events, moving=False)}
+    assert abs(stopped[2900 * MS]) < 0.05
+    # Up to the timeout nobody knows whether commands ended or were lost; nor where wheels turn on.
+    assert all(math.isnan(stopped[t * MS]) for t in range(650, 1000, 50))
+    assert math.isnan(_run(events)[-1].speed[1])
+
+
+def test_a_pause_of_the_commands_leaves_a_doubt_for_as_long_again() -> None:
+    lost = range(1000, 1400)
+    events = [(t, kind) for t, kind in _events(3000) if kind == "encoders" or t not in lost]
+    unknown = [(p.stamp_ns - BASE) // MS for p in _run(events) if math.isnan(p.speed[1])]
+    # The last command came at 950 ms; three periods are usual, and 0.3 s more go to be sure.
+    assert unknown == list(range(1150, 1400 + 450 + 300, 50))
+
+
+def test_after_standing_without_commands_the_next_one_is_followed_at_once() -> None:
+    events = [(t, kind) for t, kind in _events(5000) if kind == "encoders" or not 500 <= t < 4000]
+    speeds = {p.stamp_ns - BASE: p.speed[1] for p in _run(events, moving=False)}
+    assert not any(math.isnan(speeds[t * MS]) for t in range(1600, 5000, 50))
 
 
 def test_a_restart_in_mid_run_takes_up_the_motion() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap_records import chunk, header, indexed, message
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -290,16 +291,27 @@ def test_an_exception_of_the_caller_is_not_taken_for_damage(tmp_path: Path) -> N
         read()
 
 
-def test_types_that_only_the_recording_knows(tmp_path: Path) -> None:
-    definitions = get_types_from_msg("float64 watts\n", "robot_msgs/msg/Load")
-    own = get_typestore(Stores.ROS2_JAZZY)
-    own.register(definitions)
-    load = own.types["robot_msgs/msg/Load"](watts=12.5)
+@pytest.mark.parametrize(
+    ("type_name", "definition", "words"),
+    [
+        ("robot_msgs/msg/Load", "float64 watts\n", "no standard message"),
+        ("std_msgs/msg/Float64", "float32 data\n", "otherwise than ROS 2 Jazzy"),
+        ("std_msgs/msg/Float64", "float64 data\nfloat64 more\n", "otherwise than ROS 2 Jazzy"),
+    ],
+)
+def test_types_that_are_not_the_standard_s(
+    tmp_path: Path, type_name: str, definition: str, words: str
+) -> None:
+    own = get_typestore(Stores.EMPTY)
+    own.register(get_types_from_msg(definition, type_name))
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connection = writer.add_connection("/load", "robot_msgs/msg/Load", typestore=own)
-        writer.write(connection, 7, own.serialize_cdr(load, "robot_msgs/msg/Load"))
+        connection = writer.add_connection("/load", type_name, typestore=own)
+        writer.write(connection, 7, bytes(24))
     with open_recording(tmp_path / "bag") as recording:
-        assert [message.watts for *_, message, _ in recording.messages()] == [12.5]
+        assert len(list(recording.raw_messages())) == 1
+        with pytest.raises(InputError) as failure:
+            recording.messages()
+    clear_line(failure, "/load", words)
 
 
 def topics_recording(path: Path, *topics: str) -> Path:
@@ -354,3 +366,35 @@ def test_a_recording_split_over_files_without_metadata(tmp_path: Path) -> None:
         shutil.copy(storage_file(tmp_path / f"part_{number}"), folder)
     with open_recording(folder) as recording:
         assert [stamp_ns for *_, stamp_ns in recording.messages()] == [1, 2, 5, 6]
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_of_two_recordings_to_one_place_the_first_that_is_complete_stays(
+    tmp_path: Path, storage: str
+) -> None:
+    path = tmp_path / "bag"
+    kind = "std_msgs/msg/Header"
+
+    def record_twice() -> None:
+        with RecordingWriter(path, storage) as late:
+            late.write("late", kind, bag_header(1), 1)
+            with RecordingWriter(path, storage) as early:
+                early.write("early", kind, bag_header(1), 1)
+            assert path.is_dir()
+            late.write("late", kind, bag_header(2), 2)
+
+    with pytest.raises(InputError, match="exists already"):
+        record_twice()
+    with open_recording(path) as recording:
+        assert list(recording.topics) == ["/early"]
+    assert [item.name for item in tmp_path.iterdir()] == ["bag"]
+
+
+def test_messages_whose_topics_are_lost(tmp_path: Path) -> None:
+    path = tmp_path / "lost.mcap"
+    head = header()
+    data = chunk("", message(bytes(8), 1), 39)
+    path.write_bytes(indexed(head, [(data, 39, 1, 1)], ""))
+    with pytest.raises(InputError) as failure, open_recording(path):
+        pass
+    clear_line(failure, str(path), "no topic that they belong to")

@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from tomr_power_model.errors import InputError
-from tomr_power_model.robot import load_robot, shipped_robots
+from tomr_power_model.robot import load_robot, read_node_sections, shipped_robots
 
 REFERENCE = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml").read_text()
 
@@ -29,6 +29,15 @@ def _write(tmp_path: Path, **changes: object) -> Path:
     return file
 
 
+def test_keys_for_all_nodes_may_stand_beside_the_robot(tmp_path: Path) -> None:
+    file = _write(tmp_path, cmd_vel_type="twist", hardware_id="r7", use_sim_time=True)
+    assert load_robot(file) == load_robot("reference")
+    settings = read_node_sections(file, ("power_model", "fault_classifier"))
+    assert settings["cmd_vel_type"] == "twist"
+    assert settings["hardware_id"] == "r7"
+    assert "use_sim_time" not in settings  # of ROS, not of a tool
+
+
 def test_shipped_robots_load() -> None:
     assert {"reference", "robotino_v2"} <= set(shipped_robots())
     for name in shipped_robots():
@@ -39,18 +48,25 @@ def test_shipped_robots_load() -> None:
     ("changes", "words"),
     [
         ({"robot__mass": None}, ["robot.mass", "missing", "kg"]),
-        ({"robot__mass": -3.0}, ["robot.mass", "-3", "above 0"]),
+        ({"robot__mass": -3.0}, ["robot.mass", "-3", "at least 0.01"]),
         ({"robot__mass": float("nan")}, ["robot.mass", "finite"]),
         ({"robot__mass": float("inf")}, ["robot.mass", "finite"]),
+        ({"robot__mass": 1e30}, ["robot.mass", "at most"]),
+        ({"robot__mass": 10**350}, ["robot.mass", "too large"]),
+        ({"physics__friction.coulomb": {"torque": 1e30}}, ["friction.coulomb.torque", "at most"]),
+        ({"physics__body.payload_mass": {"mass": -15.0}}, ["payload_mass", "leaves nothing"]),
+        ({"robot__wheel_names": ["a", "b", "{c}"]}, ["wheel_names", "letters"]),
+        ({"robot__wheel_names": ["a", "b", "c\nd"]}, ["wheel_names", "letters"]),
         ({"robot__mass": "heavy"}, ["robot.mass", "number"]),
         ({"robot__mas": 3.0}, ["robot.mas ", "did you mean robot.mass"]),
         ({"robot__mass_center": [0.0, 0.0]}, ["mass_center", "3 values"]),
         ({"robot__wheel_names": ["a", "a", "b"]}, ["wheel_names", "different"]),
-        ({"motor__resistance": 0.0}, ["motor.resistance", "above 0"]),
+        ({"motor__resistance": 0.0}, ["motor.resistance", "at least 0.0001"]),
         ({"physics__friction.coulom": {"torque": 0.1}}, ["friction.coulom", "unknown"]),
         ({"physics__friction.coulomb": {"torqe": 0.1}}, ["torqe", "torque"]),
         ({"physics__friction.stribeck": {"torque": 0.1}}, ["friction.stribeck.speed", "missing"]),
         ({"measurement__source": "guess"}, ["measurement.source", "one of"]),
+        ({"cmd_vel_type": "twst"}, ["cmd_vel_type", "one of auto, twist_stamped, twist"]),
         ({"controller__integrator": "sideways"}, ["controller.integrator", "backward, forward"]),
     ],
 )

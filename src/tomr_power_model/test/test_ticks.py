@@ -107,3 +107,10 @@ def test_the_ticks_do_not_depend_on_the_order_across_streams(order: list[int]) -
         clock.arrive(stream, BASE + taken[stream] * 20 * MS)
         ticks.extend(_ms(clock))
     assert ticks == [50, 100]
+
+
+def test_a_phase_shifts_the_grid() -> None:
+    clock = TickClock(TickSettings(phase=20 * MS))
+    for stamp in (10, 60, 95):
+        clock.arrive("a", BASE + stamp * MS)
+    assert _ms(clock) == [20, 70]

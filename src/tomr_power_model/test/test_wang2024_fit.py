@@ -19,7 +19,8 @@ from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.model.settings import MODEL_PARAMETERS, ModelSettings
 from tomr_power_model.robot import shipped_robot
 from tomr_power_model.robot.parameters import check_all
-from tomr_power_model.wang2024 import Coefficients, Samples, Wang2024Model, fit_wang2024
+from tomr_power_model.wang2024 import Coefficients, Wang2024Model
+from tomr_power_model.wang2024.fit import Samples, fit_wang2024
 from tomr_power_model.wang2024.state import Chassis, state_of
 
 BAG = Path(__file__).parents[3] / "bags" / "square"
@@ -182,6 +183,7 @@ class TestChoice:
         ("change", "words"),
         [
             ("wang2024: {k_1h: -1.0}", "wang2024.k_1h = -1: out of range"),
+            ("wang2024: {T: 1.0e+308}", "wang2024.T = 1e.308 deg C: out of range"),
             ("wang2024: {k_9: 1.0}", "wang2024.k_9 is unknown"),
             ("wang2024: {mu_i: [0.1]}", "needs 3 values"),
             ("other: {a: 1}", "no group wang2024"),
@@ -197,6 +199,8 @@ class TestChoice:
         ("coefficients", "words"),
         [
             (Coefficients(), "wang2024 has no coefficients"),
+            (FITTED.having(L=0.0), "wang2024.L = 0: give more than 0"),
+            (FITTED.having(t=0.0), "wang2024.t = 0: give more than 0"),
             (FITTED.having(L_R=0.125), "L_R = 0.125 m was fitted for another robot"),
             (FITTED.having(M=40.0), "M = 40 kg was fitted for another robot"),
         ],

@@ -22,8 +22,9 @@ from tomr_power_model.drive.cut import skips_of
 from tomr_power_model.drive.excitation import check_excitation
 from tomr_power_model.drive.quality import Finding, refuse, sensor_faults
 from tomr_power_model.drive.record import Drive
-from tomr_power_model.errors import InputError
+from tomr_power_model.errors import InputError, one_line
 from tomr_power_model.estimation.parameter import Values
+from tomr_power_model.files import write_together
 from tomr_power_model.robot import (
     Robot,
     load_robot,
@@ -158,14 +159,16 @@ def _calibrate(arguments: Sequence[str] | None) -> int:
             tick=tick,
         )
     _print(result, [note for item in drives for note in item.notes])
+    texts: dict[Path, str] = {}
     if options.out is not None:
-        _write(options.out, _fitted_text(options.robot, values, result))
+        texts[options.out] = _fitted_text(options.robot, values, result)
     if options.report is not None:
         # Pictures take a second to import: --help and a plain fit do without.
         from tomr_power_model.calibration.report import report_page
 
         with _bar("report", None, "picture") as tick:
-            _write(options.report, report_page(result, options.robot, tick))
+            texts[options.report] = report_page(result, options.robot, tick)
+    write_together(texts)
     return EXIT_OK
 
 
@@ -184,13 +187,6 @@ def _drives(options: argparse.Namespace, robot: Robot) -> tuple[Drive, ...]:
             tick()
     refuse(findings)
     return drives
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}): give another") from None
 
 
 def _fitted_text(source: str, values: Values, result: Result) -> str:
@@ -258,9 +254,9 @@ def _print(result: Result, notes: Sequence[str]) -> None:
     if not result.held_out:
         notes = [*notes, "no --holdout: the figures are those of the fitted drives"]
     for text in (*notes, *result.notes):
-        console.print(f"note: {text}", markup=False)
+        console.print(f"note: {one_line(text)}", markup=False)
     for text in result.warnings:
-        console.print(f"warning: {text}", markup=False, style="yellow")
+        console.print(f"warning: {one_line(text)}", markup=False, style="yellow")
 
 
 def _table(*headings: str) -> Table:

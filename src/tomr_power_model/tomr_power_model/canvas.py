@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from io import BytesIO
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -24,13 +25,15 @@ def sheet(
     rows: int, columns: int, height: float, heights: Sequence[float] | None = None
 ) -> Iterator[tuple[Figure, list[Axes]]]:
     """A figure of so many panels, each `height` inches high on the average."""
-    page = Figure(figsize=(10.0, height * rows + 0.4), dpi=110, layout="constrained")
-    panels = list(page.subplots(rows, columns, squeeze=False, height_ratios=heights).ravel())
-    for panel in panels:
-        panel.grid(alpha=0.25, lw=0.5)
-        panel.tick_params(labelsize=7)
-        panel.spines[["top", "right"]].set_visible(False)
-    yield page, panels
+    # Names of recordings and wheels are no formulae.
+    with rc_context({"text.parse_math": False}):
+        page = Figure(figsize=(10.0, height * rows + 0.4), dpi=110, layout="constrained")
+        panels = list(page.subplots(rows, columns, squeeze=False, height_ratios=heights).ravel())
+        for panel in panels:
+            panel.grid(alpha=0.25, lw=0.5)
+            panel.tick_params(labelsize=7)
+            panel.spines[["top", "right"]].set_visible(False)
+        yield page, panels
 
 
 def png(page: Figure) -> str:

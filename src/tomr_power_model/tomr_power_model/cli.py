@@ -1,29 +1,144 @@
-"""What all commands share: exit codes and the form of an error."""
+"""What all commands share: exit codes, the form of an error, and that loading can be interrupted.
 
+0 and 1 are answers, and nothing but an answer gives them. What a command was fed gives 2, a defect
+of the command itself 70 (sysexits.h: EX_SOFTWARE), results that could not be said 74 (EX_IOERR).
+"""
+
+import contextlib
+import errno
+import os
+import signal
 import sys
+import threading
+import traceback
+import warnings
 from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import NoReturn
 
-from tomr_power_model.errors import InputError
+from tomr_power_model.errors import InputError, one_line
 
 EXIT_OK = 0
 EXIT_MISMATCH = 1
 EXIT_BAD_INPUT = 2
+EXIT_DEFECT = 70
+EXIT_NO_OUTPUT = 74
 EXIT_INTERRUPTED = 130
+EXIT_PIPE_CLOSED = 141  # as a program that SIGPIPE ends
+EXIT_TERMINATED = 143
+
+DEBUG = "TOMR_DEBUG"  # environment: not empty, show where an error comes from
+
+_UNWRITTEN = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
+
+_signals: list[int] = []  # that asked this process to end
+
+Main = Callable[[Sequence[str] | None], int]
 
 
-def run_main(
-    main: Callable[[Sequence[str] | None], int], arguments: Sequence[str] | None = None
-) -> int:
-    """Run a command's body and turn bad input into one line on stderr and exit code 2."""
+def run_main(main: Main, arguments: Sequence[str] | None = None) -> int:
+    """Run a command's body; whatever happens, give one line on stderr and a code that says it."""
+    _prepare_streams()
+    _end_cleanly_on_signals()
     try:
-        return main(arguments)
+        with warnings.catch_warnings():
+            if not (os.environ.get(DEBUG) or sys.warnoptions):
+                # Of numpy and others, on what nobody can mend who runs a command.
+                warnings.simplefilter("ignore")
+            code = main(arguments)
+        sys.stdout.flush()
+        return code
     except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return EXIT_BAD_INPUT
+        return _fail(EXIT_BAD_INPUT, f"error: {error}")
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return EXIT_INTERRUPTED
+        return _interrupted()
     except BrokenPipeError:
-        # The reader of a pipe (`| head`) left: not an error of ours.
-        sys.stderr.close()
-        return EXIT_OK
+        # The reader of a pipe (`| head`) left before it had all.
+        _drop_output()
+        return EXIT_PIPE_CLOSED
+    except Exception as error:  # noqa: BLE001 the outermost place: 1 must not come of it
+        return _interrupted() if _signals else _fail(*_told(error))
+
+
+def run_module(name: str) -> int:
+    """Run `main` of a module; loading it is interrupted as cleanly as running it."""
+    return run_main(lambda _: int(import_module(name).main()))
+
+
+def _interrupted() -> int:
+    return _fail(EXIT_TERMINATED if signal.SIGTERM in _signals else EXIT_INTERRUPTED, "interrupted")
+
+
+def _told(error: Exception) -> tuple[int, str]:
+    """Exit code and line for what nobody expected."""
+    if isinstance(error, OSError) and error.filename is None and error.errno in _UNWRITTEN:
+        _drop_output()
+        return EXIT_NO_OUTPUT, f"error: the output cannot be written ({error.strerror})"
+    if isinstance(error, MemoryError):
+        return EXIT_BAD_INPUT, "error: the memory does not suffice: give less at a time"
+    if isinstance(error, OSError):
+        name = f"{error.filename}: " if error.filename else ""
+        return EXIT_BAD_INPUT, f"error: {name}{error.strerror or error}"
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    return EXIT_DEFECT, (
+        f"error: a defect of this program, {type(error).__name__}: {error} "
+        f"({os.path.basename(last.filename)}:{last.lineno}); please report it with the output of "
+        f"the same command under {DEBUG}=1"
+    )
+
+
+def _fail(code: int, line: str) -> int:
+    if os.environ.get(DEBUG):
+        traceback.print_exc()
+    with contextlib.suppress(OSError):
+        print(one_line(line), file=sys.stderr, flush=True)
+    if not _can_print():
+        _drop_output()
+    return code
+
+
+def _can_print() -> bool:
+    try:
+        sys.stdout.flush()
+    except OSError:
+        return False
+    return True
+
+
+def _drop_output() -> None:
+    """Send what is left to nowhere: the interpreter would fail over it while it ends."""
+    with contextlib.suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+
+
+def _prepare_streams() -> None:
+    """Give closed standard streams a place, and letters that a terminal lacks a form."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            # It takes the lowest number free, which would else be that of the next file opened.
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)  # a test's stream has none
+        if reconfigure is not None:
+            reconfigure(errors="backslashreplace")
+
+
+def _end_cleanly_on_signals() -> None:
+    """Let SIGINT and SIGTERM end a command as exceptions: temporary files go with it.
+
+    An extension module that loads while one is raised may make an error of its own of it: so they
+    are noted as well.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _leave)
+    if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, _leave)
+
+
+def _leave(number: int, _: object) -> NoReturn:
+    _signals.append(number)
+    raise KeyboardInterrupt

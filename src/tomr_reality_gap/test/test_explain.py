@@ -6,9 +6,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import load_robot
+from tomr_power_model.unmodelled import FAMILIES, LearntTerm
 from tomr_reality_gap import prepared
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.explain import explain
@@ -65,3 +67,22 @@ def test_what_the_users_simulation_resists_resists_in_every_recording(
     found = prepared._with(creeping, simulation, robot)  # type: ignore[arg-type]
     expected = 0.01 * np.tanh(simulation.run(robot).speed / 0.1)
     np.testing.assert_allclose(found.resisting, expected)
+
+
+def test_a_described_learnt_term_resists_and_tells_what_lies_beyond_its_table(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    """0.02 N m at wheel 1 up to 3 rad/s; the drive goes faster."""
+    knots = (np.array([0.0, 1.5, 3.0]),)
+    term = LearntTerm(FAMILIES["torque.speed"], (0,), knots, np.full((1, 3), 0.02))
+    robot = evolve(simulation.robot, unmodelled=(term,))
+    made = evolve(simulation, robot=robot)
+    found = prepared._as_described(made).resisting
+    speed = simulation.run(simulation.robot).speed
+    slow = np.abs(speed[:, 0]) < 3.0
+    assert found is not None
+    np.testing.assert_allclose(found[slow, 0], 0.02 * np.tanh(speed[slow, 0] / 0.1), atol=1e-9)
+    assert not found[:, 1:].any()
+    (note,) = prepared._beyond((made,))
+    assert note.startswith("made: ")
+    assert "lies beyond the table of learnt term 1" in note

@@ -15,6 +15,7 @@ from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot,
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import Robot, load_robot, read_description
+from tomr_power_model.unmodelled import FAMILIES, LearntTerm
 from tomr_reality_gap.described import described, for_users
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
@@ -24,7 +25,12 @@ WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
 MODELLED = [effect for effect in MODERATE if effect != "contact.slip"]
 
 
-def explained(folder: Path, effects: Mapping[str, Mapping[str, float]], wheels: int = 3) -> Robot:
+def explained(
+    folder: Path,
+    effects: Mapping[str, Mapping[str, float]],
+    wheels: int = 3,
+    unmodelled: object = None,
+) -> Robot:
     """The reference robot with effects at its first wheels, through robot_explained.yaml."""
     base = per_wheel(dict(read_description("reference")), WHEELS, "reference")
     values = dict(base.values)
@@ -36,7 +42,8 @@ def explained(folder: Path, effects: Mapping[str, Mapping[str, float]], wheels: 
             else:
                 values[f"physics.{effect}.{key}"] = number
     analysis = SimpleNamespace(
-        robot=SimpleNamespace(wheel_names=WHEELS),
+        robot=SimpleNamespace(wheel_names=WHEELS, unmodelled=()),
+        unmodelled=unmodelled,
         source="reference",
         dataset=SimpleNamespace(simulations=()),
     )
@@ -45,6 +52,31 @@ def explained(folder: Path, effects: Mapping[str, Mapping[str, float]], wheels: 
         described(analysis, Model(ParameterisedRobot(values, "made"), (), ())), encoding="utf-8"
     )
     return load_robot(path)
+
+
+def _draws(power: float, is_repeatable: bool) -> SimpleNamespace:
+    """A driver that draws so much more at any speed [W]."""
+    knots, values = (np.array([0.0, 50.0]),), np.full((1, 2), power)
+    term = LearntTerm(FAMILIES["driver.speed"], (1,), knots, values)
+    return SimpleNamespace(term=term, is_repeatable=is_repeatable)
+
+
+@pytest.mark.parametrize(("is_repeatable", "more"), [(True, 2.0), (False, 0.0)])
+def test_nodes_draw_what_was_learnt_if_another_drive_repeats_it(
+    tmp_path: Path, is_repeatable: bool, more: float
+) -> None:
+    twist = (0.2, 0.1, 0.3)
+    plain = predicted(explained(tmp_path, {}), twist, 2.0)
+    learnt = explained(tmp_path, {}, unmodelled=_draws(2.0, is_repeatable))
+    np.testing.assert_allclose(predicted(learnt, twist, 2.0) - plain, [0.0, more, 0.0], atol=1e-3)
+
+
+def test_a_long_table_is_read_again_as_it_was_written(tmp_path: Path) -> None:
+    line = np.linspace(-3.0, 3.0, 60)
+    values = np.random.default_rng(1).standard_normal((2, 3600))
+    term = LearntTerm(FAMILIES["force.place"], (), (line, line), values)
+    learnt = explained(tmp_path, {}, unmodelled=SimpleNamespace(term=term, is_repeatable=True))
+    np.testing.assert_allclose(learnt.unmodelled[0].values, values, rtol=1e-4)
 
 
 def predicted(robot: Robot, twist: tuple[float, float, float], until: float) -> np.ndarray:

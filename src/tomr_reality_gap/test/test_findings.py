@@ -6,14 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tomr_power_model.estimation.linear_gaussian import Gram
-from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, per_wheel
-from tomr_power_model.robot import read_description, shipped_robot
+from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot
+from tomr_reality_gap import verdict
 from tomr_reality_gap.analysis import detection_limits
 from tomr_reality_gap.findings import log_odds_of
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.refine import FittedModel
-from tomr_reality_gap.fit.unmodelled import Remainder, gains, still_needed
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 
 SAMPLES = 300
@@ -37,37 +35,35 @@ def test_rivals_stand_in_the_place_of_the_finding_whatever_else_was_kept() -> No
     assert log_odds_of(alone, ()) == []
 
 
-def test_each_finding_has_the_evidence_that_is_lost_without_it() -> None:
+def test_of_several_tries_of_a_rival_the_best_counts() -> None:
+    """b was tried from two shapes; the last ended in a worse place."""
+    group = [_fitted(100.0, "a"), _fitted(97.0, "b"), _fitted(20.0, "b")]
+    found = log_odds_of(group[0].model.hypotheses[0], group)
+    assert [(odd, other.effect) for odd, other in found] == [(-3.0, "b")]
+
+
+def test_each_finding_has_the_evidence_that_is_lost_without_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Half of the energy that nothing else explains; the other finding explains half of each."""
     random = np.random.default_rng(3)
     columns = random.standard_normal((SAMPLES, 3))  # one nuisance, two findings
     columns[:, 2] += columns[:, 1]
     residual = 0.1 * random.standard_normal(SAMPLES)
-    ones = np.ones(SAMPLES)
-    rest = Remainder(None, residual, columns, ones, Gram.of(columns, residual))  # type: ignore[arg-type]
-    jacobian = SimpleNamespace(own=(slice(1, 2), slice(2, 3)))
+    jacobian = SimpleNamespace(own=(slice(1, 2), slice(2, 3)), matrix=columns)
+    monkeypatch.setattr(verdict, "linearise", lambda *_: jacobian)
     changes = [4.0 * columns[:, 1], 2.0 * columns[:, 2]]
-    found = gains(rest, jacobian, changes)  # type: ignore[arg-type]
-    assert found == pytest.approx([0.25 * (change @ change) for change in changes], rel=0.1)
-
-
-@pytest.mark.parametrize(
-    ("gain", "variable", "wheel", "needed"),
-    [(31.0, "time [s]", 1, True), (29.0, "time [s]", 1, False),
-     (1e6, "wheel angle [rad]", 1, False), (1e6, "wheel angle [rad]", 2, True)],
-)  # fmt: skip
-def test_an_unnamed_effect_leaves_what_brings_evidence_beside_it(
-    gain: float, variable: str, wheel: int, needed: bool
-) -> None:
-    """A third of its own 100; but no sine where the angle of that wheel shows another curve."""
-    wheels = shipped_robot("reference").wheel_names
-    base = per_wheel(dict(read_description("reference")), wheels, "reference")
-    ripple = Hypothesis("drivetrain.torque_ripple", (wheels[1],), ())
-    model = Model(base, (), ()).joined(ripple)
-    effect = SimpleNamespace(
-        evidence=100.0, wheels=(wheel,), family=SimpleNamespace(variable=variable)
+    zero = np.zeros(SAMPLES)
+    analysis = SimpleNamespace(
+        dataset=SimpleNamespace(value=residual),
+        found=SimpleNamespace(
+            best=SimpleNamespace(model=None, value=zero),
+            noise=SimpleNamespace(weight=np.ones(SAMPLES)),
+        ),
+        simulated=(zero, zero, *(-change for change in changes)),
     )
-    assert still_needed(model, [gain], effect) == [needed]  # type: ignore[arg-type]
+    found = verdict.gains(analysis)  # type: ignore[arg-type]
+    assert found == pytest.approx([0.25 * (change @ change) for change in changes], rel=0.1)
 
 
 def test_the_smallest_that_would_have_been_seen_brings_just_its_cost() -> None:

@@ -8,6 +8,8 @@ from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, per_wheel
 from tomr_power_model.robot import Robot, read_description
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
+from tomr_reality_gap.findings import log_odds_of
+from tomr_reality_gap.fit.backward_elimination import backward_elimination
 from tomr_reality_gap.fit.basis_responses import basis_responses
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import (
@@ -35,15 +37,22 @@ def _base(robot: Robot) -> ParameterisedRobot:
 
 
 def searched(
-    made: RecordingSimulation, value: np.ndarray, tried: tuple[str, ...] = TRIED
+    made: RecordingSimulation,
+    value: np.ndarray,
+    tried: tuple[str, ...] = TRIED,
+    without: tuple[str, ...] = (),
 ) -> tuple[Dataset, Selection]:
-    """Record values with noise, and search with the description of the reference robot."""
+    """Record values with noise, and search with the description of the reference robot, but for
+    what is left out of it.
+    """
     random = np.random.default_rng(5)
     channels = tuple(
         evolve(c, value=value[part] + NOISE[c.kind] * random.standard_normal(len(c.time)))
         for c, part in zip(made.channels, rows_of(made.channels), strict=True)
     )
     base, wheels = _base(made.robot), made.robot.wheel_names
+    kept = {key: item for key, item in base.values.items() if not key.startswith(without)}
+    base = evolve(base, values=kept) if without else base
     run = made.run(base.robot)
     scales = scales_of(made.robot, run.speed, run.power, run.copper, duration=30.0)
     ratios = traction_ratios_of(made.robot, run.speed, made.timeline.period)
@@ -55,7 +64,8 @@ def searched(
     dataset = Dataset((evolve(made, channels=channels),))
     basis = basis_responses(dataset, base.robot, scales.torque)
     model = Model(base, parameters, (0.0,) * len(parameters))
-    return dataset, forward_selection(dataset, model, candidates, basis)
+    found = forward_selection(dataset, model, candidates, basis)
+    return dataset, backward_elimination(dataset, found, candidates)
 
 
 def _found(made: RecordingSimulation, real: Robot, tried: tuple[str, ...] = TRIED) -> Selection:
@@ -89,6 +99,40 @@ def test_deviations_within_the_tolerance_are_no_finding(
     )
     real = evolve(robot, mass=0.985 * robot.mass, motors=motors)
     assert not _found(simulation, real).best.model.hypotheses
+
+
+FRICTION = ("friction.coulomb", "friction.viscous", "electrical.iron_loss")
+
+
+def test_friction_left_out_altogether_is_friction_and_iron_loss_its_rival(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    """Iron loss brakes as Coulomb and viscous friction do together: no data tell them apart."""
+    robot = simulation.robot
+    value = simulation.predict([robot])[0]
+    left_out = tuple(f"physics.{name}" for name in FRICTION)
+    _, found = searched(simulation, value, FRICTION, left_out)
+    model = found.best.model
+    assert model.names == {"friction.coulomb at all_wheels", "friction.viscous at all_wheels"}
+    sizes = {item.effect: own[0] for item, own in zip(model.hypotheses, model.offsets, strict=True)}
+    assert sizes == pytest.approx({"friction.coulomb": 0.06, "friction.viscous": 0.004}, rel=0.1)
+    for hypothesis, group in zip(model.hypotheses, found.alternatives, strict=True):
+        odds = {other.name: odd for odd, other in log_odds_of(hypothesis, group)}
+        assert -5.0 < odds["electrical.iron_loss at all_wheels"] < 0.0
+
+
+def test_coulomb_friction_alone_is_not_taken_for_iron_loss(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    """Beside a viscous friction a tenth too large, which iron loss would explain as well."""
+    robot = simulation.robot
+    physics = {**robot.physics, "friction.viscous": ({"coefficient": 0.0044},) * 3}
+    value = simulation.predict([evolve(robot, physics=physics)])[0]
+    _, found = searched(simulation, value, FRICTION, ("physics.friction.coulomb",))
+    (hypothesis,) = found.best.model.hypotheses
+    assert hypothesis.name == "friction.coulomb at all_wheels"
+    odds = {other.name for _, other in log_odds_of(hypothesis, found.alternatives[0])}
+    assert "electrical.iron_loss at all_wheels" in odds
 
 
 def test_two_wrongs_that_hide_each_other_are_found_together(

@@ -5,16 +5,22 @@ import pytest
 from attrs import evolve
 
 from tomr_power_model.drive.record import Drive
+from tomr_power_model.effects.scales import Scales
 from tomr_power_model.estimation.noise import rows_of
-from tomr_power_model.robot import shipped_robot
+from tomr_power_model.estimation.parameter import ParameterisedRobot, per_wheel
+from tomr_power_model.robot import read_description, shipped_robot
 from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
-from tomr_reality_gap.fit.basis_responses import basis_responses
+from tomr_reality_gap.fit.dataset import Dataset
+from tomr_reality_gap.fit.forward_selection import Selection
 from tomr_reality_gap.fit.jacobian import linearise
+from tomr_reality_gap.fit.learnt import motion_in, with_terms
+from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
 from tomr_reality_gap.fit.simulator_discrepancy import discrepancy_torques
-from tomr_reality_gap.fit.unmodelled import Remainder, unmodelled_effects
-from tomr_reality_gap.mismatch.compare import simulated
+from tomr_reality_gap.fit.unmodelled import Remainder, shape_of, unmodelled_effect
+from tomr_reality_gap.hypotheses.catalogue import nuisances
+from tomr_reality_gap.hypotheses.scales import scales_of
 from tomr_reality_gap.mismatch.locate import located
 from tomr_reality_gap.mismatch.orders import ripple_orders
 from tomr_reality_gap.mismatch.probes import motion_of
@@ -62,6 +68,16 @@ def test_a_ripple_is_found_by_its_order_and_noise_has_none() -> None:
     assert ripple_orders(made, channels, [0.2 * noise], [speed]) == ()
 
 
+def _scales(made: RecordingSimulation) -> Scales:
+    run = made.run(made.robot)
+    return scales_of(made.robot, run.speed, run.power, run.copper, duration=30.0)
+
+
+def _rest(dataset: Dataset, found: Selection) -> Remainder:
+    jacobian = linearise(dataset, found.best.model, ())
+    return Remainder.of(dataset, jacobian.value, jacobian.matrix)
+
+
 def test_what_has_no_name_is_found_with_its_wheel_and_variable(
     simulation: RecordingSimulation,  # noqa: F811
 ) -> None:
@@ -72,26 +88,55 @@ def test_what_has_no_name_is_found_with_its_wheel_and_variable(
     moving = np.tanh(speed[:, 2] / 0.1)
     torque[0, :, 2] = 0.15 * np.exp(-(((np.abs(speed[:, 2]) - 4.0) / 1.5) ** 2)) * moving
     dataset, found = searched(simulation, next(simulation.respond(robot, torque)), ())
-    jacobian = linearise(dataset, found.best.model, ())
-    rest = Remainder.of(dataset, found.best.value, jacobian, found.noise)
-    basis = basis_responses(dataset, robot, 0.3)
-    first, *others = unmodelled_effects(rest, basis)
-    assert first.family.variable == "wheel speed [rad/s]"
-    assert first.wheels == (2,)
-    assert first.evidence > max(20.0, others[0].evidence + 100.0)
-    peak = first.shape.at[np.argmax(first.shape.value)]
-    assert peak == pytest.approx(4.0, abs=1.0)
+    effect = unmodelled_effect(_rest(dataset, found), robot, _scales(simulation))
+    assert effect is not None
+    assert effect.family.family_id in ("torque.speed", "torque.signed_speed")
+    assert effect.term.wheels == (2,)
+    assert effect.evidence > 60.0
+    assert effect.is_repeatable
+    assert effect.is_large
+    shape = shape_of(effect, robot)
+    assert abs(shape.at[np.argmax(np.abs(shape.value))]) == pytest.approx(4.0, abs=1.2)
     # A simulation of the user's that has the same is no other than reality in this.
     plain, resisting = simulation.predict([robot])[0], next(simulation.respond(robot, torque))
     for theirs, expected in ((resisting, True), (plain, False)):
         recorded = [as_recorded(simulation, theirs)]
         baseline = SimulatorBaseline.of(recorded, dataset, found.noise, robot)
         assert baseline is not None
-        assert baseline.shows(first, found.best.model, basis) is expected
+        assert baseline.shows(effect) is expected
     # It is laid on any drive beside what is named.
-    values, _ = simulated(simulation, robot, robot, first.torque)
-    left = [(item - resisting).std() for item in values]
-    assert left[1] < 0.5 * left[0]
+    termed = with_terms(simulation, robot, (effect.term,)).predict([robot])[0]
+    assert (termed - resisting).std() < 0.4 * (plain - resisting).std()
+
+
+def test_a_tether_is_told_with_its_anchor_and_a_gust_as_what_comes_and_goes(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    """8 N/m beyond 0.3 m from (0.2, 0.0); 3 N along x for four seconds in eight."""
+    robot = simulation.robot
+    motion = motion_in(simulation, robot)
+    away = np.hypot(motion.x - 0.2, motion.y)
+    pull = 8.0 * np.maximum(away - 0.3, 0.0) / away
+    tether = motion.resisting(-(pull * (motion.x - 0.2))[:, 0], -(pull * motion.y)[:, 0])
+    blows = 3.0 * (np.floor(motion.time[:, 0] / 4.0) % 2)
+    gust = motion.resisting(blows, 0.0 * blows)
+    found = []
+    for torque in (tether, gust):
+        value = next(simulation.respond(robot, torque[None]))
+        dataset = Dataset((as_recorded(simulation, value),))
+        base = ParameterisedRobot(dict(read_description("reference")), "reference")
+        parameters = nuisances(per_wheel(base.values, robot.wheel_names, "x"), robot.wheel_names, 0)
+        jacobian = linearise(dataset, Model(base, parameters, ()), ())
+        rest = Remainder.of(dataset, jacobian.value, jacobian.matrix)
+        found.append(unmodelled_effect(rest, robot, _scales(simulation)))
+    pulls, comes = found
+    assert pulls is not None
+    assert comes is not None
+    assert (pulls.family.family_id, pulls.is_repeatable) == ("force.place", True)
+    told = {name: item.value for name, item in pulls.laws[0].parameters.items()}
+    expected = {"stiffness": 8.0, "slack": 0.3, "x": 0.2, "y": 0.0}
+    assert told == pytest.approx(expected, abs=0.03)
+    assert (comes.family.family_id, comes.is_repeatable, comes.laws) == ("force.time", False, ())
 
 
 def test_what_the_users_simulation_resists_more_is_taken_off(

@@ -14,7 +14,6 @@ from tomr_reality_gap.rules import (
     is_rival,
     is_unmodelled,
     unexplained,
-    unmodelled_share,
 )
 
 COUNT = 3000
@@ -74,12 +73,10 @@ def test_slow_noise_is_a_match_and_much_more_is_none() -> None:
 
 
 def test_findings_share_what_they_explain_by_what_is_lost_without_them() -> None:
-    """Of 1100 units of energy 100 are noise; 1000 are explained, three parts to one."""
-    assert energy_shares(1100.0, 100.0, [700.0, 300.0], 100) == pytest.approx([0.75, 0.25])
-    assert energy_shares(1100.0, 600.0, [1100.0], 100) == pytest.approx([0.5])
-    assert energy_shares(100.0, 100.0, [], 100) == []
-    assert unmodelled_share(250.0, 1100.0, 600.0, 100) == pytest.approx(0.5)
-    assert unmodelled_share(9e9, 1100.0, 600.0, 100) == 1.0
+    """Three parts to one of what is not left: with that they add up to all."""
+    assert energy_shares([600.0, 200.0], 0.2) == pytest.approx([0.6, 0.2])
+    assert energy_shares([600.0, -1.0], 0.5) == pytest.approx([0.5, 0.0])
+    assert energy_shares([], 0.1) == []
 
 
 def test_what_is_left_counts_beyond_noise_and_a_part_of_the_spread() -> None:

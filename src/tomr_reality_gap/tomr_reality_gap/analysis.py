@@ -8,14 +8,18 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.estimation.linear_gaussian import Gram, solve
+from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot
 from tomr_power_model.robot import Robot
+from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.alignment.simulation import Run
 from tomr_reality_gap.fit.basis_responses import BasisResponses
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection, finding_cost
 from tomr_reality_gap.fit.simulator_baseline import Offsets, SimulatorBaseline
+from tomr_reality_gap.fit.unmodelled import Unmodelled
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
+from tomr_reality_gap.rules import Residuals
 
 Array = NDArray[np.float64]
 
@@ -26,7 +30,7 @@ _LISTED = 24  # detection limits that are reported
 class AnalysisResult:
     """All that a verdict rests on."""
 
-    dataset: Dataset
+    dataset: Dataset  # simulated with the unnamed term, if there is one
     found: Selection
     base: ParameterisedRobot
     robot: Robot  # as described
@@ -35,6 +39,8 @@ class AnalysisResult:
     basis: BasisResponses
     baseline: SimulatorBaseline | None = None
     shared: Offsets = ()  # what the user's simulation shows of each finding
+    plain: Dataset | None = None  # without the unnamed term; None: there is none
+    unmodelled: Unmodelled | None = None
 
     @cached_property
     def simulated(self) -> tuple[Array, ...]:
@@ -42,13 +48,29 @@ class AnalysisResult:
         model = self.found.best.model
         fewer = [model.without(number) for number in range(len(model.hypotheses))]
         robots = [item.described.robot for item in (model, *fewer)]
-        return tuple(self.dataset.predict([self.base.robot, *robots]))
+        described = (self.plain or self.dataset).predict([self.base.robot])
+        return (*described, *self.dataset.predict(robots))
 
     @cached_property
     def runs(self) -> tuple[Run, ...]:
         """Motion of the best model in each recording."""
         robot = self.found.best.model.described.robot
         return tuple(item.run(robot) for item in self.dataset.simulations)
+
+
+def residuals_of(dataset: Dataset, before: Array, after: Array) -> list[Residuals]:
+    """Of what is drawn and of speeds, channel by channel, from simulated values, (n,) each."""
+    return [
+        Residuals(
+            channel.value - before[part],
+            channel.value - after[part],
+            float(np.std(channel.value)),
+            channel.quantum,
+            channel.kind in DRAWN_KINDS,
+        )
+        for channel, part in zip(dataset.channels, rows_of(dataset.channels), strict=True)
+        if channel.kind in (*DRAWN_KINDS, "speed")
+    ]
 
 
 def detection_limits(analysis: AnalysisResult) -> tuple[tuple[str, str, str], ...]:

@@ -116,9 +116,10 @@ def _explain(options: argparse.Namespace) -> int:
     if options.suggest is not None and not options.suggest.parent.is_dir():
         raise InputError(f"{options.suggest}: no folder {options.suggest.parent}: make it first")
     # Pictures take a second to import: --help and `check` do without.
+    from tomr_power_model.files import make_folder
     from tomr_reality_gap.report.html import picture_count
     from tomr_reality_gap.report.terminal import print_explanation
-    from tomr_reality_gap.report.write import make_folder, report_files, write_text, write_texts
+    from tomr_reality_gap.report.write import report_files, write_report
 
     make_folder(options.out)
     with progress_bar(options.quiet) as progress:
@@ -126,9 +127,8 @@ def _explain(options: argparse.Namespace) -> int:
         texts = report_files(
             explanation, Path(inputs.robot).name, _ticks(progress, picture_count(explanation))
         )
-    write_texts(options.out, texts)
-    if options.suggest is not None and explanation.suggested:
-        write_text(options.suggest, explanation.suggested)
+    suggested = explanation.suggested if options.suggest is not None else None
+    write_report(options.out, texts, {options.suggest: suggested} if suggested else None)
     if not options.quiet:
         print_explanation(explanation)
         for name in texts:

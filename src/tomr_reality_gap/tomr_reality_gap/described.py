@@ -3,6 +3,7 @@
 from attrs import evolve
 
 from tomr_power_model.calibration.fitted import fitted_text
+from tomr_power_model.unmodelled.described import parameters_of
 from tomr_reality_gap.analysis import AnalysisResult
 from tomr_reality_gap.fit.model import Model
 
@@ -22,6 +23,10 @@ def described(analysis: AnalysisResult, model: Model) -> str:
     """Text of robot_explained.yaml: what all wheels share is written once."""
     values = dict(model.described.values)
     wheels = analysis.robot.wheel_names
+    effect = analysis.unmodelled
+    if effect is not None and effect.is_repeatable:
+        name = f"term_{len(analysis.robot.unmodelled) + 1}"
+        values.update(parameters_of(name, effect.term, wheels))
     for key in [key for key in values if f".{wheels[0]}." in key]:
         keys = [key.replace(wheels[0], wheel) for wheel in wheels]
         numbers = {values.get(item) for item in keys}

@@ -1,31 +1,41 @@
 """From recordings to an explanation: align, compare, name, model, show."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
+from tomr_power_model.effects.scales import Scales
 from tomr_power_model.estimation.noise import rows_of
+from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.response import controller_alternatives
 from tomr_reality_gap.alignment.simulation import Run
-from tomr_reality_gap.analysis import AnalysisResult
+from tomr_reality_gap.analysis import AnalysisResult, residuals_of
 from tomr_reality_gap.explanation import Explanation
 from tomr_reality_gap.fit.backward_elimination import backward_elimination
 from tomr_reality_gap.fit.basis_responses import basis_responses
 from tomr_reality_gap.fit.consistency import check_same_robot
 from tomr_reality_gap.fit.dataset import Dataset
-from tomr_reality_gap.fit.forward_selection import forward_selection
+from tomr_reality_gap.fit.forward_selection import Selection, finding_cost, forward_selection
+from tomr_reality_gap.fit.jacobian import linearise
+from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
+from tomr_reality_gap.fit.unmodelled import Remainder, Unmodelled, refitted, unmodelled_effect
 from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
 from tomr_reality_gap.mismatch.orders import ripple_orders
 from tomr_reality_gap.prepared import Prepared, prepared
 from tomr_reality_gap.progress import Progress
 from tomr_reality_gap.request import Request
+from tomr_reality_gap.rules import is_doubted, is_unmodelled, unexplained
 from tomr_reality_gap.verdict import explanation_of
 
 Array = NDArray[np.float64]
+
+_MUCH = 0.3  # of the mismatch left by names: even a little of noise's size is looked into
+_LEAST = 0.05
+_LITTLE = 0.15  # of the noise: what is left of what is drawn is not looked into
 
 
 def explain(request: Request, progress: Progress = lambda stage, part: None) -> Explanation:
@@ -57,10 +67,21 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
     tick = _Counter(progress, 3 * len(candidates) * len(ready.real))
     basis = basis_responses(dataset, base.robot, ready.scales.torque, orders)
     start = Model(base, parameters, (0.0,) * len(parameters))
-    found = forward_selection(dataset, start, candidates, basis, tick=tick)
+
+    def named(data: Dataset) -> Selection:
+        found = forward_selection(data, start, candidates, basis, tick=tick)
+        return backward_elimination(data, found, candidates, tick)
+
+    found = named(dataset)
     check_same_robot(dataset, found.rounds[-1])
-    found = backward_elimination(dataset, found, tick)
+    effect, plain = _unmodelled(dataset, found, ready), None
+    if effect is not None:
+        plain = dataset
+        dataset, found, effect = _beside(plain, found, effect, named, ready.scales)
     baseline = SimulatorBaseline.of(ready.simulations, dataset, found.noise, base.robot)
+    if effect is not None and baseline is not None and baseline.shows(effect):
+        effect, dataset, plain = None, plain or dataset, None
+        found = named(dataset)
     found, shared = beyond_baseline(dataset, found, baseline, tick)
     return AnalysisResult(
         dataset,
@@ -72,7 +93,86 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
         basis,
         baseline,
         shared,
+        plain,
+        effect,
     )
+
+
+def _beside(
+    plain: Dataset,
+    found: Selection,
+    effect: Unmodelled,
+    named: Callable[[Dataset], Selection],
+    scales: Scales,
+) -> tuple[Dataset, Selection, Unmodelled]:
+    """Names sought once more, beside an unnamed term, and the term fitted anew beside them.
+
+    Names that only stood in for what no name has have bent it. What depends on nothing that names
+    depend on is sought without any of them, and comes first if fewer names then leave less.
+    """
+    if found.best.model.hypotheses:
+        bare = found.without.model
+        rest = _remainder(plain, bare)
+        alone = unmodelled_effect(rest, bare.described.robot, scales)
+        if alone is not None and alone.family.is_strange:
+            effect = alone
+        first = _refitted(plain, bare, effect)
+        tried = _settled(plain, first, named)
+        names = [len(item.best.model.hypotheses) for item in (found, tried[1])]
+        sigma = tried[1].noise.sigma
+        left = [_left(data, item, sigma) for data, item in ((plain, found), tried[:2])]
+        if names[1] < names[0] and left[1] < left[0]:
+            return tried
+    return _settled(plain, effect, named, found.best.model)
+
+
+def _settled(
+    plain: Dataset,
+    effect: Unmodelled,
+    named: Callable[[Dataset], Selection],
+    model: Model | None = None,
+) -> tuple[Dataset, Selection, Unmodelled]:
+    """Recordings with a term, the names beside it, and the term as fitted beside these."""
+    robot = plain.simulations[0].robot if model is None else model.described.robot
+    found = named(_with_term(plain, robot, effect))
+    effect = _refitted(plain, found.best.model, effect)
+    return _with_term(plain, found.best.model.described.robot, effect), found, effect
+
+
+def _refitted(plain: Dataset, model: Model, effect: Unmodelled) -> Unmodelled:
+    return refitted(_remainder(plain, model), effect, model.described.robot)
+
+
+def _left(dataset: Dataset, found: Selection, sigma: Array) -> float:
+    """Sum of squares that a selection leaves, in units of a noise."""
+    value = dataset.predict([found.best.model.described.robot])[0]
+    return float((((dataset.value - value) / sigma) ** 2).sum())
+
+
+def _remainder(dataset: Dataset, model: Model) -> Remainder:
+    jacobian = linearise(dataset, model, ())
+    return Remainder.of(dataset, jacobian.value, np.asarray(jacobian.matrix, dtype=np.float64))
+
+
+def _unmodelled(dataset: Dataset, found: Selection, ready: Prepared) -> Unmodelled | None:
+    """What no name explains, if that is much, and a term predicts it."""
+    robot = found.best.model.described.robot
+    described, explained = dataset.predict([ready.base.robot, robot])
+    share, size = unexplained(residuals_of(dataset, described, explained))
+    if size < (_LEAST if share > _MUCH and found.best.model.hypotheses else _LITTLE):
+        return None
+    gross = is_doubted(share, size, bool(found.best.model.hypotheses))
+    rest = _remainder(dataset, found.best.model)
+    effect = unmodelled_effect(rest, robot, ready.scales, is_sure=gross)
+    cost = finding_cost(len(dataset.value))
+    named = found.best.evidence - found.without.evidence
+    if effect is None or gross:
+        return effect
+    return effect if effect.is_large and is_unmodelled(effect.evidence, named, cost) else None
+
+
+def _with_term(dataset: Dataset, robot: Robot, effect: Unmodelled) -> Dataset:
+    return Dataset(tuple(with_terms(item, robot, (effect.term,)) for item in dataset.simulations))
 
 
 class _Counter:

@@ -7,6 +7,7 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.unmodelled import LearntTerm
 from tomr_reality_gap.alignment.channels import Channel
 
 Array = NDArray[np.float64]
@@ -66,6 +67,28 @@ class Shape:
     value: Array  # N m, (k,)
     low: Array
     high: Array
+    unit: str = "N m"  # of the value
+
+
+@frozen
+class FittedLaw:
+    """A short law that explains about as much as a learnt table."""
+
+    name: str
+    words: str  # with the parameters by name
+    parameters: Mapping[str, Estimate]
+    share: float  # of what the table explains
+
+
+@frozen
+class Learnt:
+    """A term without a name, as it was learnt."""
+
+    term: LearntTerm
+    sigma: Array  # standard deviations of its values, like them
+    share: float  # of what the named findings leave that it predicts where it was not fitted
+    is_repeatable: bool  # whether another drive would show it again
+    laws: tuple[FittedLaw, ...] = ()  # simplest first
 
 
 @frozen
@@ -80,6 +103,7 @@ class Finding:
     confidence: float
     evidence: float  # log Bayes factor against leaving it out, all else fitted anew
     shape: Shape | None = None  # of `unknown`
+    learnt: Learnt | None = None  # of `unknown`
 
 
 @frozen

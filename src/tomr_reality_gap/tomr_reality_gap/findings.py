@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from tomr_power_model.calibration.priors import drive_for
 from tomr_power_model.estimation.parameter import bounds_of, neutral_of
 from tomr_reality_gap.analysis import AnalysisResult
-from tomr_reality_gap.explanation import Estimate, Finding, Rival
+from tomr_reality_gap.explanation import Estimate, Finding, Learnt, Rival
 from tomr_reality_gap.fit.refine import FittedModel
-from tomr_reality_gap.fit.unmodelled import Unmodelled, names
+from tomr_reality_gap.fit.unmodelled import Unmodelled, shape_of, wheels_of
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 from tomr_reality_gap.mismatch.locate import located
 from tomr_reality_gap.rules import (
@@ -20,7 +20,6 @@ from tomr_reality_gap.rules import (
     energy_shares,
     estimate_of,
     is_rival,
-    unmodelled_share,
 )
 
 Array = NDArray[np.float64]
@@ -34,35 +33,39 @@ class Findings:
     gained: Sequence[float]  # log evidence that each of the model's hypotheses brings
     variables: Mapping[str, Array]  # at all samples, by name
 
-    def named(self, needed: Sequence[bool], doubted: bool) -> list[Finding]:
-        """Those hypotheses that are needed."""
-        analysis, best = self.analysis, self.analysis.found.best
-        without = [self._energy(value) for value in analysis.simulated[2:]]
-        before = self._energy(analysis.found.without.value)
-        samples = len(analysis.dataset.value)
-        shares = energy_shares(before, best.chi2, without, samples)
-        return [
+    def all(self, left: float, doubted: bool) -> list[Finding]:
+        """The findings; their shares and what is left of the mismatch (`left`) add up to one."""
+        analysis, best, effect = self.analysis, self.analysis.found.best, self.analysis.unmodelled
+        after = self._energy(analysis.simulated[1])
+        lost = [self._energy(value) - after for value in analysis.simulated[2:]]
+        if effect is not None:
+            weight = analysis.found.noise.weight
+            residual = analysis.dataset.value - analysis.simulated[1]
+            lacking = (residual + effect.change) * weight
+            lost.append(float(lacking @ lacking) - after)
+        shares = energy_shares(lost, left)
+        found = [
             self._named(number, shares[number], DOUBTED if doubted else 1.0)
-            for number, wanted in enumerate(needed)
-            if wanted
+            for number in range(len(best.model.hypotheses))
         ]
+        return [*found, self._unmodelled(effect, shares[-1])] if effect is not None else found
 
-    def unmodelled(self, effect: Unmodelled) -> Finding:
+    def _unmodelled(self, effect: Unmodelled, share: float) -> Finding:
         """An effect without a name."""
-        analysis, found = self.analysis, self.analysis.found
-        change = effect.columns @ (np.concatenate(effect.weights) / analysis.basis.size)
-        before, samples = self._energy(found.without.value), len(analysis.dataset.value)
-        share = unmodelled_share(effect.evidence, before, found.best.chi2, samples)
-        weight, channels = found.noise.weight, analysis.dataset.channels
+        analysis, weight = self.analysis, self.analysis.found.noise.weight
+        channels = analysis.dataset.channels
         return Finding(
             effect="unknown",
-            where=names(effect.wheels, analysis.robot),
+            where=wheels_of(effect.term, analysis.robot),
             parameters={},
-            located=located(channels, change / weight, weight, share, variables=self.variables),
+            located=located(channels, effect.change, weight, share, variables=self.variables),
             rivals=(),
             confidence=0.9,
             evidence=effect.evidence,
-            shape=effect.shape,
+            shape=shape_of(effect, analysis.robot),
+            learnt=Learnt(
+                effect.learnt, effect.sigma, effect.share, effect.is_repeatable, effect.laws
+            ),
         )
 
     def _energy(self, value: Array) -> float:
@@ -123,14 +126,17 @@ class Findings:
 def log_odds_of(found: Hypothesis, group: Sequence[FittedModel]) -> list[tuple[float, Hypothesis]]:
     """Others in the place of a finding with their log odds; the first has the finding itself.
 
-    The group may be of more findings than were kept in the end.
+    The group may be of more findings than were kept in the end. Of several tries of one rival the
+    best counts.
     """
-    odds = {}
+    odds: dict[str, tuple[float, Hypothesis]] = {}
     for item in group[1:]:
         place = [known.name for known in group[0].model.hypotheses].index(found.name)
         other = item.model.hypotheses[place]
         if other.name != found.name:
-            odds[other.name] = (item.evidence - group[0].evidence, other)
+            odd = item.evidence - group[0].evidence
+            if other.name not in odds or odd > odds[other.name][0]:
+                odds[other.name] = (odd, other)
     return list(odds.values())
 
 

@@ -1,6 +1,6 @@
 """From files to what can be compared: recordings read, checked, aligned, and simulated."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,7 @@ from tomr_power_model.recordings import open_recording, resolve_topic
 from tomr_power_model.robot import Robot, read_description, robot_from_parameters
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS, channels_of
 from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
+from tomr_reality_gap.fit.learnt import motion_in, with_terms
 from tomr_reality_gap.fit.simulator_discrepancy import DiscrepancyTorques, discrepancy_torques
 from tomr_reality_gap.hypotheses.scales import scales_of, traction_ratios_of
 from tomr_reality_gap.mismatch.probes import motion_of
@@ -30,6 +31,7 @@ from tomr_reality_gap.request import Request
 Array = NDArray[np.float64]
 
 INTEGRATOR = "controller.integrator"
+_MOSTLY_INSIDE = 0.02  # of a drive beyond a table
 
 
 @frozen
@@ -73,12 +75,12 @@ def prepared(request: Request) -> Prepared:
     return Prepared(
         base=base,
         robot=robot,
-        real=tuple(_with(discrepancy, item, base.robot) for item in recordings),
-        held=tuple(_with(discrepancy, item, base.robot) for item in held_out),
+        real=tuple(_as_described(_with(discrepancy, item, base.robot)) for item in recordings),
+        held=tuple(_as_described(_with(discrepancy, item, base.robot)) for item in held_out),
         simulations=tuple(_with(discrepancy, item, base.robot) for item in simulations),
         runs=runs,
         scales=scales,
-        notes=(*notes, *_sim_notes(simulations, discrepancy)),
+        notes=(*notes, *_sim_notes(simulations, discrepancy), *_beyond((*recordings, *held_out))),
     )
 
 
@@ -133,6 +135,24 @@ def _with(
         return simulation
     motion = motion_of(simulation, robot, simulation.run(robot))
     return evolve(simulation, resisting=discrepancy.torque(motion))
+
+
+def _as_described(simulation: RecordingSimulation) -> RecordingSimulation:
+    """The recording, simulated with the learnt terms of the description."""
+    robot = simulation.robot
+    return with_terms(simulation, robot, robot.unmodelled)
+
+
+def _beyond(simulations: Sequence[RecordingSimulation]) -> Iterator[str]:
+    """Drives that go beyond what the description's learnt terms know."""
+    for item in simulations:
+        for number, term in enumerate(item.robot.unmodelled, start=1):
+            share = term.outside(motion_in(item, item.robot))
+            if share > _MOSTLY_INSIDE:
+                yield (
+                    f"{item.recorded.name}: {share:.0%} of it lies beyond the table of learnt term "
+                    f"{number} ({term.family.words}), which fades there"
+                )
 
 
 def integrator_of(simulation: RecordingSimulation) -> str:

@@ -78,25 +78,15 @@ def is_doubted(share: float, size: float, has_findings: bool) -> bool:
     return share > _MUCH and size > (1.0 if has_findings else _GROSS)
 
 
-def energy_shares(
-    before: float, after: float, without: Sequence[float], samples: int
-) -> list[float]:
-    """Part of the mismatch's energy that each finding explains, by leaving it out.
+def energy_shares(lost: Sequence[float], left: float) -> list[float]:
+    """Part of the mismatch that each finding explains, by leaving it out.
 
     Args:
-        before: sum of squared whitened residuals without any finding.
-        after: with all of them.
-        without: without each of them.
-        samples: that white noise alone would leave.
+        lost: sum of squared whitened residuals that leaving out each of them adds.
+        left: part of the mismatch that none explains (`unexplained`).
     """
-    energies = [item - after for item in without]
-    explained = _share(before - after, before - min(after, float(samples)))
-    return [explained * energy / max(sum(energies), 1e-9) for energy in energies]
-
-
-def unmodelled_share(evidence: float, before: float, after: float, samples: int) -> float:
-    """The same of an effect without a name: twice its log evidence is the energy it explains."""
-    return _share(2.0 * evidence, before - min(after, float(samples)))
+    energies = [max(item, 0.0) for item in lost]
+    return [(1.0 - left) * energy / max(sum(energies), 1e-9) for energy in energies]
 
 
 def _share(part: float, whole: float) -> float:

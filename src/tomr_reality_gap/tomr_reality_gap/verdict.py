@@ -6,27 +6,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomr_power_model.effects import EFFECTS
+from tomr_power_model.estimation.linear_gaussian import Gram, solve
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.statistics import autocorrelation
-from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
-from tomr_reality_gap.analysis import AnalysisResult, detection_limits
+from tomr_reality_gap.analysis import AnalysisResult, detection_limits, residuals_of
 from tomr_reality_gap.described import described, for_users
-from tomr_reality_gap.explanation import Comparison, Explanation, Finding
+from tomr_reality_gap.explanation import Comparison, Explanation, Finding, Learnt
 from tomr_reality_gap.findings import Findings
-from tomr_reality_gap.fit.forward_selection import finding_cost
 from tomr_reality_gap.fit.jacobian import linearise
-from tomr_reality_gap.fit.model import Model
-from tomr_reality_gap.fit.unmodelled import (
-    Remainder,
-    Unmodelled,
-    gains,
-    still_needed,
-    unmodelled_effects,
-)
-from tomr_reality_gap.mismatch.compare import comparison, score_of, simulated
+from tomr_reality_gap.fit.laws import words_of
+from tomr_reality_gap.fit.learnt import with_terms
+from tomr_reality_gap.fit.unmodelled import Unmodelled
+from tomr_reality_gap.mismatch.compare import comparison, score_of
 from tomr_reality_gap.mismatch.locate import maps_of, variables_at
-from tomr_reality_gap.rules import Residuals, is_doubted, is_unmodelled, unexplained
+from tomr_reality_gap.rules import is_doubted, unexplained
 from tomr_reality_gap.suggest import suggested
 
 Array = NDArray[np.float64]
@@ -36,78 +30,86 @@ def explanation_of(
     analysis: AnalysisResult, held: Sequence[RecordingSimulation], notes: tuple[str, ...]
 ) -> Explanation:
     """The whole explanation."""
-    dataset, found = analysis.dataset, analysis.found
-    jacobian = linearise(dataset, found.best.model, ())
-    rest = Remainder.of(dataset, found.best.value, jacobian, found.noise)
-    left = unmodelled_effects(rest, analysis.basis)
-    effect = left[0] if _is_there(analysis, left) else None
-    after = analysis.simulated[1]
-    gained = gains(rest, jacobian, [after - item for item in analysis.simulated[2:]], effect)
-    needed = [True] * len(gained)
-    if effect is not None:
-        needed = still_needed(found.best.model, gained, effect)
-    model = found.best.model.kept(needed)
-    if effect is not None and not all(needed):
-        after = dataset.predict([model.described.robot])[0]
-        fewer = Remainder.of(dataset, after, jacobian, found.noise, needed)
-        (effect,) = unmodelled_effects(fewer, analysis.basis, {effect.family.variable})
-    doubted = is_doubted(*unexplained(_residuals(analysis, after)), bool(model.hypotheses))
-    if doubted and effect is None and left:
-        effect = left[0]  # even if no family of torques explains much of it
-    comparisons = _comparisons(analysis, model, effect, after, held)
+    dataset, found, effect = analysis.dataset, analysis.found, analysis.unmodelled
+    before, after = analysis.simulated[0], analysis.simulated[1]
+    left, size = unexplained(residuals_of(dataset, before, after))
+    model = found.best.model
+    doubted = is_doubted(left, size, bool(model.hypotheses))
+    comparisons = _comparisons(analysis, held)
     variables = _variables(analysis)
-    maker = Findings(analysis, gained, variables)
-    findings = maker.named(needed, doubted)
-    findings += [maker.unmodelled(effect)] if effect is not None else []
-    fitted = [item for item in comparisons if not item.held_out]
-    explained = np.concatenate([values for item in fitted for values in item.after])
-    before, left_over = dataset.value - analysis.simulated[0], dataset.value - explained
+    maker = Findings(analysis, gains(analysis), variables)
+    findings = maker.all(left, doubted)
     return Explanation(
         verdict="mismatch" if findings else "match",
         sentence=_sentence(findings),
         findings=tuple(findings),
-        unexplained_share=unexplained(_residuals(analysis, explained))[0] if findings else 0.0,
+        unexplained_share=left if findings else 0.0,
         comparisons=comparisons,
-        maps=maps_of(dataset.channels, before, left_over, found.noise.sigma, variables=variables),
+        maps=maps_of(
+            dataset.channels,
+            dataset.value - before,
+            dataset.value - after,
+            found.noise.sigma,
+            variables=variables,
+        ),
         alignment=_alignment(analysis),
         detection_limits=detection_limits(analysis) if not findings else (),
         whiteness=_whiteness(analysis),
         score=score_of([item for item in comparisons if item.held_out]),
-        explained=described(analysis, for_users(analysis, model)) if model.hypotheses else "",
+        explained=described(analysis, for_users(analysis, model)) if findings else "",
         suggested=suggested(findings),
-        notes=notes,
+        notes=(*notes, *_event_notes(effect)),
     )
 
 
-def _is_there(analysis: AnalysisResult, left: Sequence[Unmodelled]) -> bool:
-    """Whether an effect without a name is there, and not in the user's simulation as well."""
-    found, cost = analysis.found, finding_cost(len(analysis.dataset.value))
-    named = found.best.evidence - found.without.evidence
-    if not left or not is_unmodelled(left[0].evidence, named, cost):
-        return False
-    baseline = analysis.baseline
-    return baseline is None or not baseline.shows(left[0], found.best.model, analysis.basis)
+def _event_notes(effect: Unmodelled | None) -> tuple[str, ...]:
+    """What no other drive repeats is told, and not predicted."""
+    if effect is None or effect.is_repeatable:
+        return ()
+    return (
+        f"{effect.family.words} comes and goes: other drives are predicted without it; its course "
+        "is an estimate for this one",
+    )
+
+
+def gains(analysis: AnalysisResult) -> list[float]:
+    """Log evidence that each named finding brings, all else fitted anew without it."""
+    dataset, found = analysis.dataset, analysis.found
+    jacobian = linearise(dataset, found.best.model, ())
+    weight = found.noise.weight
+    base = jacobian.matrix * weight[:, None]
+    residual = (dataset.value - found.best.value) * weight
+    everything = list(range(base.shape[1]))
+    gram = Gram.of(base, residual)
+    whole, gained = _likelihood(gram, everything), []
+    for part, value in zip(jacobian.own, analysis.simulated[2:], strict=True):
+        others = [row for row in everything if not part.start <= row < part.stop]
+        lacking = residual + (analysis.simulated[1] - value) * weight
+        other = Gram(gram.matrix, base.T @ lacking, float(lacking @ lacking))
+        gained.append(whole - _likelihood(other, others))
+    return gained
+
+
+def _likelihood(gram: Gram, chosen: Sequence[int]) -> float:
+    """Log evidence of some columns, up to what all residuals of one weighting share."""
+    return solve(gram, chosen).evidence - 0.5 * gram.square
 
 
 def _comparisons(
-    analysis: AnalysisResult,
-    model: Model,
-    effect: Unmodelled | None,
-    after: Array,
-    held: Sequence[RecordingSimulation],
+    analysis: AnalysisResult, held: Sequence[RecordingSimulation]
 ) -> tuple[Comparison, ...]:
-    """All recordings before and after, with what the effect without a name amounts to."""
-    described, explained = analysis.base.robot, model.described.robot
-    besides = effect.torque if effect is not None else None
-    found, at, noise = [], 0, _noise(analysis)
+    """All recordings before and after; held-out ones with what they repeat of an unnamed term."""
+    described, explained = analysis.base.robot, analysis.found.best.model.described.robot
+    found, at, noise, effect = [], 0, _noise(analysis), analysis.unmodelled
     for item, run in zip(analysis.dataset.simulations, analysis.runs, strict=True):
         part = slice(at, at := at + item.size)
-        values: Array = np.stack([analysis.simulated[0][part], after[part]])
-        if besides is not None:
-            values, run = simulated(item, described, explained, besides)
+        values: Array = np.stack([analysis.simulated[0][part], analysis.simulated[1][part]])
         found.append(comparison(item, values, run, is_held_out=False, noise=noise))
+    terms = (effect.term,) if effect is not None and effect.is_repeatable else ()
     for item in held:
-        values, run = simulated(item, described, explained, besides)
+        termed = with_terms(item, explained, terms)
+        values = np.concatenate([item.predict([described]), termed.predict([explained])])
+        run = termed.run(explained)
         found.append(comparison(item, values, run, is_held_out=True, noise=noise))
     return tuple(found)
 
@@ -119,22 +121,6 @@ def _noise(analysis: AnalysisResult) -> dict[str, float]:
     for channel, part in zip(channels, rows_of(channels), strict=True):
         parts.setdefault(channel.name, []).append(sigma[part])
     return {name: float(np.median(np.concatenate(rows))) for name, rows in parts.items()}
-
-
-def _residuals(analysis: AnalysisResult, after: Array) -> list[Residuals]:
-    """Of what is drawn and of speeds, channel by channel."""
-    dataset, before = analysis.dataset, analysis.simulated[0]
-    return [
-        Residuals(
-            channel.value - before[part],
-            channel.value - after[part],
-            float(np.std(channel.value)),
-            channel.quantum,
-            channel.kind in DRAWN_KINDS,
-        )
-        for channel, part in zip(dataset.channels, rows_of(dataset.channels), strict=True)
-        if channel.kind in (*DRAWN_KINDS, "speed")
-    ]
 
 
 def _variables(analysis: AnalysisResult) -> Mapping[str, Array]:
@@ -182,8 +168,7 @@ def _sentence(findings: Sequence[Finding]) -> str:
     for item in findings:
         where = ", ".join(item.where).replace("_", " ")
         if item.effect == "unknown":
-            variable = item.shape.variable.partition(" [")[0] if item.shape else "?"
-            parts.append(f"an effect without a name ({where}, depending on {variable})")
+            parts.append(f"an effect without a name ({where}: {_unnamed(item.learnt)})")
             continue
         sizes = ", ".join(
             f"{name} {value.value:.3g} {value.unit}".rstrip()
@@ -191,6 +176,16 @@ def _sentence(findings: Sequence[Finding]) -> str:
         )
         parts.append(f"{_label(item.effect)} ({where}: {sizes})")
     return f"Reality differs: {'; '.join(parts)}."
+
+
+def _unnamed(learnt: Learnt | None) -> str:
+    """What it depends on, and what law it is like."""
+    if learnt is None:
+        return "nothing tells on what it depends"
+    words = learnt.term.family.words
+    if learnt.laws:
+        return f"{words}; {words_of(learnt.laws[0])}"
+    return words if learnt.is_repeatable else f"{words}, which no other drive repeats"
 
 
 def _label(effect: str) -> str:

@@ -4,6 +4,7 @@ import csv
 import math
 import os
 import tarfile
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,14 @@ import numpy as np
 import pytest
 
 from tomr_power_model.cli import run_main
+from tomr_power_model.errors import InputError
 from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.limits import limits
 from tomr_power_model.messages.intake import header_stamp_ns
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import shipped_robot
 from tomr_sim_bridge.cli.import_robotino import import_robotino
+from tomr_sim_bridge.importers.dataset import open_dataset
 from tomr_sim_bridge.importers.robotino import EPOCH_NS, body_twist, camera_pose
 
 FLOOR = (
@@ -285,3 +289,40 @@ def test_the_real_drives_agree_with_the_contract(tmp_path: Path) -> None:
         cosine = moved @ command / np.linalg.norm(moved) / np.linalg.norm(command)
         assert cosine > math.cos(math.radians(10.0))
         assert 0.4 < np.linalg.norm(moved) / np.linalg.norm(command) < 1.0
+
+
+@pytest.mark.parametrize("attack", ["zeros", "header", "outside", "members", "cut", "device"])
+def test_archives_that_are_none(
+    attack: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TOMR_LIMIT_ARCHIVE_BYTES", "2e6")
+    monkeypatch.setenv("TOMR_LIMIT_ARCHIVE_FILES", "5")
+    limits.cache_clear()
+    archive = tmp_path / "data.tar.gz"
+    if attack == "device":
+        archive.symlink_to("/dev/zero")
+    else:
+        with tarfile.open(archive, "w:gz", format=tarfile.PAX_FORMAT) as tar:
+            for number in range(9 if attack == "members" else 1):
+                name = "../out.csv" if attack == "outside" else f"gray/{number}.csv"
+                member = tarfile.TarInfo(name)
+                member.size = 3_000_000 if attack == "zeros" else 100
+                if attack == "header":
+                    member.pax_headers = {"comment": "x" * 2_000_000}
+                tar.addfile(member, BytesIO(bytes(member.size)))
+    if attack == "cut":
+        archive.write_bytes(archive.read_bytes()[:-20])
+    words = {
+        "zeros": "TOMR_LIMIT_ARCHIVE_BYTES",
+        "header": "a header of",
+        "outside": "leads out of it",
+        "members": "TOMR_LIMIT_ARCHIVE_FILES",
+        "cut": "cannot be unpacked",
+        "device": "neither a folder nor",
+    }
+    try:
+        with pytest.raises(InputError, match=words[attack]), open_dataset(archive):
+            pass
+    finally:
+        limits.cache_clear()
+    assert not (tmp_path / "out.csv").exists()

@@ -109,7 +109,7 @@ def test_base_is_taken_over_and_changed(tmp_path: Path) -> None:
         ("name: test\n", "phases is missing or empty"),
         ("phases: [{pause: 1.0}]\n", "name is missing: add it"),
         (PAUSE + "speed: 3\n", "speed is unknown: give name, description"),
-        (PAUSE + "command_rate: 0.0\n", "command_rate = 0 Hz: out of range, give above 0"),
+        (PAUSE + "command_rate: 0.0\n", "command_rate = 0 Hz: out of range, give at least 0.1"),
         (PAUSE + "command_rate: .nan\n", "give a finite number"),
         (PAUSE + "payload: heavy\n", "payload = 'heavy': give a number"),
         (PAUSE + "base: nowhere\n", "base = 'nowhere' is no shipped mission"),
@@ -172,7 +172,8 @@ def test_faults_are_in_force_from_start_to_end(make_robot: Callable[..., Robot])
     for samples in drive(mission, simulation, seed=1):
         for sample in samples:
             if sample.topic == "ground_truth/faults":
-                status = sample.message.fields["status"][1].fields  # type: ignore[index]
+                statuses = [item.fields for item in sample.message.fields["status"]]
+                status = next(item for item in statuses if item["name"] == "encoder_lost")
                 values = {p.fields["key"]: float(p.fields["value"]) for p in status["values"]}
                 time = round((sample.stamp_ns - 5_000_000_000) / 1e9, 3)
                 found[time] = (values["active"], values["wheel"], values["severity"])
@@ -194,3 +195,20 @@ def test_mission_sets_load_and_floor(make_robot: Callable[..., Robot]) -> None:
     ]  # fmt: skip
     assert np.ptp(simulation.engine.model.geom_friction[rollers, 0]) == 0.0
     assert simulation.engine.model.geom_friction[rollers[0], 0] == pytest.approx(0.33)
+
+
+@pytest.mark.parametrize(
+    ("text", "limit"),
+    [
+        ("repeat: 10000\nphases: [{pause: 1.0e+5}]", "MISSION_SECONDS"),
+        (
+            "repeat: 10000\nphases: [{random: "
+            "{count: 10000, speed: [0.1, 0.2], duration: [1.0e-4, 1.0e-4]}}]",
+            "MISSION_PHASES",
+        ),
+        ("phases: [{pause: !!int abc}]", "no int"),
+    ],
+)
+def test_missions_without_an_end_are_refused(text: str, limit: str) -> None:
+    with pytest.raises(InputError, match=limit):
+        parse_mission(f"name: long\n{text}", "long.yaml")

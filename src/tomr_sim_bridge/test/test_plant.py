@@ -133,6 +133,17 @@ def test_turning_robot_and_command_by_a_third_only_permutes_power(
     assert np.roll(means[0], 1) == pytest.approx(means[1], rel=0.02)
 
 
+@pytest.mark.parametrize(("timeout", "standing"), [(0.0, False), (0.5, True)])
+def test_a_command_is_held_or_times_out(
+    timeout: float, standing: bool, make_robot: MakeRobot, drive: Callable
+) -> None:
+    simulation = Simulation(make_robot(ideal=True), command_timeout=timeout)
+    moving = drive(simulation, 0.5, (0.0, 0.4, 0.0), skip=0.4).joints()
+    later = drive(simulation, 1.0, skip=0.8).joints()
+    assert np.abs(moving).max() > 7.0
+    assert (np.abs(later).max() < 0.05) == standing
+
+
 def test_energy_is_accounted_for(make_robot: MakeRobot) -> None:
     simulation = Simulation(make_robot(), seed=5)
     for count, command in enumerate(

@@ -101,7 +101,7 @@ def operator() -> Iterator[Operator]:
 
 
 def test_robot_on_topics(operator: Operator, spawn: Callable, wait_until: Callable) -> None:
-    bridge = spawn(command_of("start_time:=100.0"))
+    bridge = spawn(command_of("start_time:=100.0", "publish_clock:=true"))
     wait_until(lambda: operator.spin() or all(operator.heard.values()), "a message on every topic")
     assert 100 <= operator.heard["joint_states"][0].header.stamp.sec < 115
     assert operator.heard["joint_states"][0].name == [f"wheel_{n}_joint" for n in (1, 2, 3)]
@@ -115,7 +115,7 @@ def test_robot_on_topics(operator: Operator, spawn: Callable, wait_until: Callab
     )
     message.twist.linear.y = math.nan
     outlet.publish(message)
-    bridge.wait_for_output("is not finite: ignored, the last command is kept")
+    bridge.wait_for_output("ignored, the last command is kept")
 
     assert operator.set("faults.encoder_lost.wheel", 2) == (True, "")
     assert operator.set("faults.encoder_lost.severity", 1.0) == (True, "")
@@ -152,8 +152,11 @@ def test_real_time_that_cannot_be_held_slows_the_clock(
     assert bridge.output.count("cannot be held") == 1  # throttled
 
 
-def test_twist_without_stamp(operator: Operator, spawn: Callable, wait_until: Callable) -> None:
-    spawn(command_of("cmd_vel_type:=twist"))
+@pytest.mark.parametrize("parameters", [["cmd_vel_type:=twist"], []])
+def test_twist_without_stamp(
+    parameters: list[str], operator: Operator, spawn: Callable, wait_until: Callable
+) -> None:
+    spawn(command_of(*parameters))
     outlet = operator.node.create_publisher(Twist, "cmd_vel", 10)
     message = Twist()
     message.angular.z = 1.0
@@ -161,6 +164,13 @@ def test_twist_without_stamp(operator: Operator, spawn: Callable, wait_until: Ca
         lambda: (heard := operator.commanding(outlet, message)) and heard.velocity[0] < -3.8,
         "wheels at -4 rad/s",
     )
+
+
+def test_commands_of_a_type_that_is_not_heard(operator: Operator, spawn: Callable) -> None:
+    bridge = spawn(command_of("cmd_vel_type:=twist_stamped"))
+    operator.node.create_publisher(Twist, "cmd_vel", 10)
+    output = bridge.wait_for_output("which is not heard")
+    assert "/cmd_vel: published as geometry_msgs/msg/Twist, which is not heard" in output
 
 
 @pytest.mark.parametrize(
@@ -198,6 +208,14 @@ def test_robot_that_flies_apart_ends_it_with_one_line(
     assert bridge.wait() == 2
     assert bridge.output.startswith("error: the simulated robot has become unstable")
     assert bridge.output.count("\n") == 1
+
+
+def test_a_missing_parameter_file_is_one_line(spawn: Callable) -> None:
+    bridge = spawn(command_of(robot="nowhere/robot.yaml"))
+    assert bridge.wait() == 2
+    assert bridge.output == (
+        "error: sim_bridge: --params-file nowhere/robot.yaml: no such file: give a robot.yaml\n"
+    )
 
 
 def test_without_a_robot_it_says_what_to_do(spawn: Callable) -> None:

@@ -5,18 +5,13 @@ from collections.abc import Callable
 import numpy as np
 from attrs import evolve
 
+from tomr_fault_diag.classifier.belief import CONTROLS, DRAGS, ENCODERS, EXTERNAL, METERS, OTHER
+from tomr_fault_diag.classifier.states import NORMAL
 from tomr_power_model.robot import shipped_robot
 from tomr_sim_bridge.missions.schema import PlannedFault
-from tomr_training.drives import Drive
+from tomr_training.drives import Bump, Drive
 from tomr_training.labels import SLIPPING, Noise, deviates
-from tomr_training.planar.generate import (
-    CONTROL,
-    IGNORED,
-    MOTOR,
-    NORMAL,
-    STATE_OF,
-    simulate,
-)
+from tomr_training.planar.generate import BEYOND, IGNORED, PAPER_OF, simulate
 from tomr_training.planar.plant import run_plant
 
 REFERENCE = shipped_robot("reference")
@@ -26,10 +21,10 @@ def test_labels_follow_the_fault(chosen: Callable[..., Drive]) -> None:
     fault = PlannedFault("control_signal_lost", 2.0, 4.0, {"severity": 1.0, "wheel": 2})
     drive = chosen(11, phases=chosen(11).mission.phases[:5], faults=(fault,))
     labels = simulate(drive).labels
-    assert set(labels[41:79].tolist()) == {CONTROL + 1}
+    assert set(labels[41:79].tolist()) == {CONTROLS.start + 1}
     assert set(labels[20:40].tolist()) <= {NORMAL, IGNORED}
     assert labels[80] == IGNORED
-    assert MOTOR not in labels
+    assert ENCODERS.start not in labels
     healthy = simulate(evolve(drive, bumps=()).healthy).labels
     assert set(healthy.tolist()) <= {NORMAL, IGNORED}
     assert len(healthy) == len(labels)
@@ -56,5 +51,28 @@ def test_slipping_without_a_fault_is_ignored(straight: Callable[..., Drive]) -> 
     assert (labels[~slips] == NORMAL).all()
 
 
-def test_a_true_state_is_named_without_the_wheel_of_a_lost_signal() -> None:
-    assert STATE_OF.tolist() == [0, 1, 2, 2, 2, 3, 4, 5]
+def test_what_a_push_did_is_the_pushs(straight: Callable[..., Drive]) -> None:
+    bump = Bump(2.5, 0.15, (40.0, 0.0), 0.0)
+    labels = simulate(straight(bumps=(bump,))).labels
+    pushed = np.flatnonzero(labels == EXTERNAL)
+    assert 50 <= pushed[0] <= 52
+    assert 53 < pushed[-1] < 110
+    assert set(labels.tolist()) == {NORMAL, EXTERNAL}
+    assert (simulate(straight()).labels == NORMAL).all()
+
+
+def test_two_faults_at_once_are_none_that_is_known(straight: Callable[..., Drive]) -> None:
+    drags = PlannedFault("bearing_dragging", 2.0, 4.0, {"wheel": 2, "severity": 1, "torque": 0.2})
+    wrong = PlannedFault("power_sensor_scaled", 3.0, 5.0, {"wheel": 3, "factor": 0.5})
+    labels = simulate(straight(faults=(drags, wrong))).labels
+    for ticks, hypothesis in (
+        (slice(41, 59), DRAGS.start + 1),
+        (slice(61, 79), OTHER),
+        (slice(81, 99), METERS.start + 2),
+    ):
+        assert set(labels[ticks].tolist()) == {hypothesis}
+
+
+def test_what_the_paper_would_call_them() -> None:
+    beyond = [BEYOND] * 3
+    assert PAPER_OF.tolist() == [0, 1, 2, 2, 2, *[3, 4, 5] * 3, *beyond, 0, BEYOND, BEYOND]

@@ -59,6 +59,7 @@ class Drive:
     believed: Robot
     mission: Mission
     bumps: tuple[Bump, ...] = ()
+    gusts: tuple[Bump, ...] = ()  # pushes too weak to be called so
 
     @cached_property
     def _plan(self) -> Plan:
@@ -80,6 +81,11 @@ class Drive:
         """The same drive without its fault."""
         return evolve(self, mission=evolve(self.mission, faults=()))
 
+    @property
+    def undisturbed(self) -> "Drive":
+        """The same drive without its bumps."""
+        return evolve(self, bumps=())
+
 
 def random_drive(reference: Robot, seed: int, kind: str | None = "any") -> Drive:
     """A drive that depends on nothing but the seed, and on the fault where one is asked for.
@@ -88,10 +94,25 @@ def random_drive(reference: Robot, seed: int, kind: str | None = "any") -> Drive
     """
     random = np.random.default_rng(seed)
     believed = _another_robot(reference, random)
+    mission = _mission(believed, seed, kind, random)
+    plant = deviating(believed, random)
+    length = mission.plan(believed).duration
+    return Drive(
+        seed, plant, believed, mission, bumps(believed, random, int(random.integers(0, 4)), length)
+    )
+
+
+def another_drive(robot: Drive, seed: int) -> Drive:
+    """A healthy drive of the same robot: another mission, payload, floor, other sensor noise."""
+    mission = _mission(robot.believed, seed, None, np.random.default_rng([seed, 4]))
+    return evolve(robot, seed=seed, mission=mission, bumps=())
+
+
+def _mission(believed: Robot, seed: int, kind: str | None, random: np.random.Generator) -> Mission:
     phases = _phases(believed, random)
     length = math.fsum(phase.duration for phase in phases)
     payload = float(random.uniform(0.0, PAYLOAD) * believed.mass) if random.random() < 0.5 else 0.0
-    mission = Mission(
+    return Mission(
         name=f"drive_{seed}",
         description="",
         robot="reference",
@@ -103,10 +124,6 @@ def random_drive(reference: Robot, seed: int, kind: str | None = "any") -> Drive
         seed=seed,
         phases=tuple(phases),
         faults=_faults(_kind(kind, random), random, length),
-    )
-    plant = deviating(believed, random)
-    return Drive(
-        seed, plant, believed, mission, bumps(believed, random, int(random.integers(0, 4)), length)
     )
 
 
@@ -243,8 +260,9 @@ def _faults(
 
 
 def wheel_of(fault: PlannedFault) -> int | None:
-    """The wheel 0..2 that a fault of a random drive is at; None for the floor's."""
-    return None if fault.fault_id == "floor_slippery" else int(str(fault.settings["wheel"])) - 1
+    """The wheel 0..2 that a fault of a random drive is at; None where it is at none."""
+    wheel = fault.settings.get("wheel")
+    return None if wheel is None else int(str(wheel)) - 1
 
 
 def severity_of(fault: PlannedFault) -> float:

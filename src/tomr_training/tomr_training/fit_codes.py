@@ -8,12 +8,13 @@ from attrs import frozen
 from numpy.typing import NDArray
 from torch import nn
 
+from tomr_fault_diag.classifier.belief import DRAGS, EXTERNAL
 from tomr_fault_diag.classifier.network import Network
-from tomr_fault_diag.classifier.states import STATES
+from tomr_fault_diag.classifier.states import NORMAL, STATES
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, RESIDUALS, SPEEDS, TOTAL
 from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_training.fit import begin, epoch, weights_of
-from tomr_training.planar.generate import IGNORED, NORMAL, STATE_OF, LabelledTicks
+from tomr_training.planar.generate import PAPER_OF, LabelledTicks
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -47,15 +48,16 @@ class Examples:
 
 
 def examples_of(drives: Iterable[LabelledTicks], bands: BandSettings) -> Examples:
-    """Ticks with a label; those of a fault only where some residual leaves its band."""
+    """Ticks of the paper's states; those of a fault only where some residual leaves its band."""
     codes, labels = [], []
     for drive in drives:
         residual, band = drive.compared.residuals(bands)
         code = (residual > band).astype(np.int8) - (-residual > band).astype(np.int8)
-        kept = drive.labels != IGNORED
+        kept = (drive.labels >= NORMAL) & (drive.labels < DRAGS.start)
+        kept |= drive.labels == EXTERNAL
         kept &= (drive.labels == NORMAL) | code.any(axis=1)
         codes.append(code[kept])
-        labels.append(STATE_OF[drive.labels[kept]])
+        labels.append(PAPER_OF[drive.labels[kept]])
     return Examples(np.concatenate(codes), np.concatenate(labels))
 
 

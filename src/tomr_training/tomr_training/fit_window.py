@@ -8,7 +8,14 @@ from attrs import frozen
 from numpy.typing import NDArray
 from torch import nn
 
-from tomr_fault_diag.classifier.belief import HYPOTHESES
+from tomr_fault_diag.classifier.belief import (
+    CONTROLS,
+    DRAGS,
+    ENCODERS,
+    HYPOTHESES,
+    METERS,
+    WEAKS,
+)
 from tomr_fault_diag.classifier.features import (
     BLIND,
     CHANNELS,
@@ -17,10 +24,10 @@ from tomr_fault_diag.classifier.features import (
     by_wheel,
     channels,
 )
-from tomr_fault_diag.classifier.window_network import WindowNetwork
-from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_fault_diag.classifier.states import NORMAL
+from tomr_fault_diag.classifier.window_network import COMMON, VIEWS, WindowNetwork
 from tomr_training.fit import begin, epoch, weights_of
-from tomr_training.planar.generate import CONTROL, IGNORED, MOTOR, NORMAL, LabelledTicks
+from tomr_training.planar.generate import IGNORED, LabelledTicks
 
 Floats = NDArray[np.float32]
 
@@ -31,20 +38,20 @@ _CHUNK = 8192
 class WindowRecipe:
     """Size of the network and how it is trained."""
 
-    hidden: tuple[int, int] = (96, 48)
+    hidden: tuple[int, int] = (128, 64)
     learning_rate: float = 6e-3
     batch: int = 1024
-    epochs: int = 6
+    epochs: int = 5
     seed: int = 1
     # Shares of the ticks that are kept: windows overlap, and most healthy ones teach nothing new.
-    healthy: float = 0.25
-    faulty: float = 0.6
+    healthy: float = 0.2
+    faulty: float = 0.35
     blinded: float = 0.1  # share of the examples that lack a sensor
 
 
 @frozen
 class Examples:
-    """Drives as the network sees them, (n, WINDOW - 1 + ticks, 19), and what to learn of them."""
+    """Drives as the network sees them, (n, WINDOW - 1 + ticks, 20), and what to learn of them."""
 
     seen: Floats
     drive: NDArray[np.int64]  # of each example, (m,)
@@ -55,7 +62,7 @@ class Examples:
         return len(self.label)
 
     def windows(self, rows: NDArray[np.int64]) -> Floats:
-        """Windows of some examples, (rows, WINDOW, 19), the newest tick last."""
+        """Windows of some examples, (rows, WINDOW, 20), the newest tick last."""
         ticks = self.tick[rows, None] + np.arange(WINDOW)
         return np.asarray(self.seen[self.drive[rows, None], ticks])
 
@@ -77,8 +84,8 @@ def examples_of(drives: Iterable[LabelledTicks], recipe: WindowRecipe) -> Exampl
 
 
 def channels_of_drive(drive: LabelledTicks) -> Floats:
-    """Channels of a drive, (ticks, 19)."""
-    residual, band = drive.compared.residuals(BandSettings())
+    """Channels of a drive, (ticks, 20)."""
+    residual, band = drive.compared.residuals(drive.bands)
     return channels(residual, band, drive.compared.modelled).astype(np.float32)
 
 
@@ -93,13 +100,15 @@ class WindowModule(nn.Module):
             nn.ReLU(),
             nn.Linear(first, second),
             nn.ReLU(),
-            nn.Linear(second, 4),
+            nn.Linear(second, VIEWS),
         )
 
     def forward(self, views: torch.Tensor) -> torch.Tensor:
-        """Logits (m, 8) of views (m, 3, INPUTS)."""
+        """Logits (m, 19) of views (m, 3, INPUTS)."""
         out = self.layers(views)
-        return torch.cat([out[..., :2].mean(dim=1), out[..., 2], out[..., 3]], dim=1)
+        common = out[..., :COMMON].mean(dim=1)
+        wheels = out[..., COMMON:].transpose(1, 2).reshape(len(out), -1)
+        return torch.cat([common[:, :2], wheels, common[:, 2:]], dim=1)
 
 
 @frozen
@@ -107,8 +116,8 @@ class FittedWindow:
     """Trained weights, and what torch itself answers to some windows."""
 
     network: WindowNetwork
-    check_windows: NDArray[np.float64]  # (k, WINDOW, 19)
-    check_scores: NDArray[np.float64]  # (k, 8)
+    check_windows: NDArray[np.float64]  # (k, WINDOW, 20)
+    check_scores: NDArray[np.float64]  # (k, 19)
 
 
 def fit_window(
@@ -153,9 +162,9 @@ def blinded(windows: Floats, share: float, random: np.random.Generator) -> Float
 def prior_of(labels: NDArray[np.int64]) -> NDArray[np.float64]:
     """Share of each hypothesis among the examples; the wheels are alike."""
     share = np.bincount(labels, minlength=HYPOTHESES) / len(labels)
-    share[CONTROL : CONTROL + 3] = share[CONTROL : CONTROL + 3].mean()
-    share[MOTOR : MOTOR + 3] = share[MOTOR : MOTOR + 3].mean()
-    return share
+    for kind in (CONTROLS, ENCODERS, DRAGS, WEAKS, METERS):
+        share[kind] = share[kind].mean()
+    return np.maximum(share, 1.0 / len(labels))
 
 
 def _fitted(module: WindowModule, examples: Examples) -> FittedWindow:

@@ -12,7 +12,6 @@ from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.messages.plain import NANOSECONDS
-from tomr_power_model.messages.types import TWIST_STAMPED
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.topics.inputs import model_inputs
 from tomr_sim_bridge.missions.drive import drive
@@ -108,7 +107,7 @@ def simulated_drive(chosen: Drive) -> LabelledDrive:
     stage = ResidualStage(chosen.believed)
     takers: dict[str, list[Callable[[Any, int], str | None]]] = {}
     for item in (
-        *model_inputs(chosen.believed, predictor, TWIST_STAMPED),
+        *model_inputs(chosen.believed, predictor),
         *residual_inputs(chosen.believed, stage),
     ):
         takers.setdefault(item.topic, []).append(item.take)

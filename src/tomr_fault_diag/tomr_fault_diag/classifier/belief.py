@@ -6,28 +6,64 @@ with l_k the log-likelihood of the newest window if k holds, relative to the lik
 overlap and so say the same several times over: `weight` < 1. That a fault comes on within a tick is
 10^-caution likely: so many decades of evidence must speak for it before it is believed. What cannot
 be told apart from normal in this motion has l = 0 and leaves the belief as it is.
+
+A force from outside is one hypothesis of the network and two states here: pushes are frequent and
+soon over, loads are as rare as faults and stay. What looks like one fault now and like another
+then is none that is known: `OTHER` takes each window as any of the faults.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomr_fault_diag.classifier.states import NORMAL, SLIP
+from tomr_fault_diag.classifier.states import (
+    BURDENED,
+    CONTROL,
+    DEGRADED,
+    DRAGGING,
+    MOTOR,
+    NORMAL,
+    POWER_SENSOR,
+    PUSHED,
+    SLIP,
+    STATES,
+    UNKNOWN,
+    State,
+)
 
 Array = NDArray[np.float64]
 
-# What the window network tells apart: normal, slip, lost signal of wheels 1-3, of encoders 1-3.
-HYPOTHESES = 8
+# What the window network tells apart: normal, slip, and of wheels 1-3 each: signal lost, encoder
+# lost, axle dragging, motor weak, power sensor wrong; a force from outside; anything else.
+HYPOTHESES = 19
 CONTROLS = slice(2, 5)
 ENCODERS = slice(5, 8)
+DRAGS = slice(8, 11)
+WEAKS = slice(11, 14)
+METERS = slice(14, 17)
+EXTERNAL = 17  # a push, while it is young
+OTHER = 18
+LOADED = 19  # the same force, here to stay
+_STATES = 20
+_FAULTS = slice(SLIP, METERS.stop)
+# What each is called.
+STATE_OF: tuple[State, ...] = (
+    *STATES[:CONTROL], *(STATES[CONTROL],) * 3, *STATES[MOTOR:], *DRAGGING, *DEGRADED,
+    *POWER_SENSOR, PUSHED, UNKNOWN, BURDENED,
+)  # fmt: skip
 _CLIP = 24.0  # no window says more than so much against anything
 _ENDING = 1e-4  # likelihood that a fault ends within a tick ...
 _SLIP_ENDING = 5e-3  # ... and that a slippery place is left
+_PUSH = 1e-3  # that somebody pushes, and ...
+_PUSH_ENDING = 0.15  # ... that it is over: a push of 6 s is as unlikely as a load
 _OTHER = 1e-6  # and that one fault becomes another
+_STRANGE = 1e-2  # of a fault of no known kind, over that of a known one
+_SLIPPERY = 1e5  # of slip, over that of other faults: it may be over soon
+_SLOW = 1e-4  # of what a description that is off looks like, all the time
 _LEAST = 1e-30
 
 
 class Belief:
-    """Probabilities of the hypotheses, tick by tick."""
+    """Probabilities of the states, tick by tick."""
 
     def __init__(self, weight: float, caution: float) -> None:
         """`weight` of the evidence of one window, `caution` in decades."""
@@ -37,29 +73,47 @@ class Belief:
 
     def clear(self) -> None:
         """Start afresh, believing that all is well."""
-        self.shares: Array = np.zeros(HYPOTHESES)
+        self.shares: Array = np.zeros(_STATES)
         self.shares[NORMAL] = 1.0
 
     def update(self, likelihoods: Array) -> Array:
-        """Take the log-likelihoods (8,) of a window; returns the probabilities (8,)."""
+        """Take the log-likelihoods (20,) of a window; returns the probabilities (20,)."""
         relative = np.maximum(likelihoods - likelihoods.max(), -_CLIP)
         shares = (self.shares @ self._moves) * np.exp(self._weight * relative)
         self.shares = np.asarray(np.maximum(shares / shares.sum(), _LEAST))
         return self.shares
 
 
+def of_states(likelihoods: Array) -> Array:
+    """Log-likelihoods (20,) of the states from those of the network's hypotheses (19,)."""
+    found = np.append(likelihoods, likelihoods[EXTERNAL])
+    faults = found[_FAULTS]
+    most = faults.max()
+    any_fault = most + np.log(np.mean(np.exp(faults - most)))
+    found[OTHER] = np.logaddexp(found[OTHER], any_fault) - np.log(2.0)
+    return found
+
+
 def _transitions(onset: float) -> Array:
-    """P(j -> k), (8, 8)."""
-    moves = np.full((HYPOTHESES, HYPOTHESES), _OTHER)
-    moves[NORMAL] = onset
+    """P(j -> k), (20, 20)."""
+    moves = np.full((_STATES, _STATES), _OTHER)
     moves[:, NORMAL] = _ENDING
     moves[SLIP, NORMAL] = _SLIP_ENDING
+    moves[[NORMAL, EXTERNAL]] = onset
+    moves[[NORMAL, EXTERNAL], SLIP] *= _SLIPPERY
+    for kind in (DRAGS, WEAKS, METERS):
+        moves[[NORMAL, EXTERNAL], kind] *= _SLOW
+    moves[:, OTHER] *= _STRANGE
+    moves[NORMAL, EXTERNAL] = _PUSH
+    moves[EXTERNAL, NORMAL] = _PUSH_ENDING
     np.fill_diagonal(moves, 0.0)
     np.fill_diagonal(moves, 1.0 - moves.sum(axis=1))
     return moves
 
 
-def six_of(shares: Array) -> Array:
-    """Probabilities of the six states (..., 6): of a lost signal the wheel does not matter."""
+def named_of(shares: Array) -> Array:
+    """Probabilities (..., 18) of `states.NAMED`: of a lost signal the wheel does not matter."""
     control = shares[..., CONTROLS].sum(axis=-1, keepdims=True)
-    return np.concatenate([shares[..., :2], control, shares[..., 5:]], axis=-1)
+    first, last = shares[..., : CONTROLS.start], shares[..., EXTERNAL : EXTERNAL + 1]
+    middle = shares[..., ENCODERS.start : METERS.stop]
+    return np.concatenate([first, control, middle, last, shares[..., [LOADED, OTHER]]], axis=-1)

@@ -14,15 +14,38 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_fault_diag.classifier.belief import CONTROLS, ENCODERS, Belief, six_of
-from tomr_fault_diag.classifier.features import CHANNELS, WINDOW, channels_of
+from tomr_fault_diag.classifier.belief import (
+    CONTROLS,
+    DRAGS,
+    ENCODERS,
+    EXTERNAL,
+    LOADED,
+    METERS,
+    OTHER,
+    STATE_OF,
+    WEAKS,
+    Belief,
+    named_of,
+    of_states,
+)
+from tomr_fault_diag.classifier.features import CHANNELS, WINDOW, channels_of, turning
 from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
-from tomr_fault_diag.classifier.states import CONTROL, NORMAL, STATES
+from tomr_fault_diag.classifier.states import (
+    CONTROL,
+    DRAGGING,
+    NAMED,
+    NORMAL,
+    SLIP,
+    STATES,
+    STUCK,
+    State,
+)
 from tomr_fault_diag.classifier.window_network import WindowNetwork
 from tomr_fault_diag.residuals.frame import INPUT_ORDERS, ResidualFrame
 from tomr_power_model.model.ticks import to_ns
+from tomr_power_model.robot import WHEELS
 
 Array = NDArray[np.float64]
 
@@ -30,15 +53,45 @@ _SURE = 0.99
 _STRIKING_TICKS = 10  # in which one window must have been so
 _TICK = to_ns(0.05)
 _TOO_LONG = to_ns(0.5)  # between two frames that belong to one window
+_STAYS = 0.1  # of the share of a likelier fault of the same kind
+_STANDING = 6  # ticks
+_STILL = 0.2  # of the expected speed: a slower wheel stands
+# Hypotheses that are named together.
+_GROUPS: tuple[list[int], ...] = (
+    [NORMAL, EXTERNAL],
+    [SLIP],
+    list(range(CONTROLS.start, CONTROLS.stop)),
+    *([kind.start + wheel for kind in (ENCODERS, DRAGS, WEAKS)] for wheel in range(WHEELS)),
+    *([METERS.start + wheel] for wheel in range(WHEELS)),
+    [LOADED],
+    [OTHER],
+)
+_SLIP_MARGIN = 4.0  # that slip need be less striking: a short one shows in few windows
+# A description that is off looks like these: what a window says only slightly is not counted, for
+# it would say it again and again.
+_CREEPING = (DRAGS, WEAKS, METERS)
+_SLIGHT = 1.0
+_HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
+_OF_A_WHEEL = (*_HIDDEN, METERS)
 
 
 @frozen
 class Opinion:
-    """Probabilities of STATES (6,), whether to name the likeliest, and its wheel if it has one."""
+    """Probabilities of NAMED, or of as many as a judge knows, and what leads.
+
+    `sure`: whether to name it; `wheel`: that it concerns, if it has one; `state`: what leads, where
+    that is not just the likeliest.
+    """
 
     probabilities: Array
     sure: bool
     wheel: int | None = None
+    state: State | None = None
+
+    @property
+    def leading(self) -> State:
+        """The state that leads."""
+        return self.state or NAMED[int(np.argmax(self.probabilities))]
 
 
 class Judge(Protocol):
@@ -48,6 +101,10 @@ class Judge(Protocol):
 
     def clear(self) -> None:
         """Forget what was seen."""
+        ...
+
+    def interrupt(self) -> None:
+        """What comes next does not join up with what was seen."""
         ...
 
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
@@ -74,15 +131,20 @@ class WindowJudge:
         """Forget what was seen: as if the robot had stood still."""
         self._window = np.zeros((WINDOW, CHANNELS))
         self._slot: int | None = None
-        self._opinion = Opinion(np.eye(len(STATES))[NORMAL], sure=False)
+        self._lacking = WINDOW
+        self._opinion = Opinion(np.eye(len(NAMED))[NORMAL], sure=False)
         self._recent: deque[Array] = deque(maxlen=_STRIKING_TICKS)
+        self._best = NORMAL
         self._belief.clear()
+
+    def interrupt(self) -> None:
+        """Say nothing new until the window holds no other than joined frames."""
+        self._slot, self._lacking = None, WINDOW
 
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         """Look at the newest frame."""
         if elapsed_ns > _TOO_LONG:
-            self._window[:] = 0.0
-            self._slot = None
+            self.interrupt()
         slot = frame.stamp_ns // _TICK
         count = 1 if self._slot is None else slot - self._slot
         self._slot = slot
@@ -94,17 +156,59 @@ class WindowJudge:
         """Opinion after one more tick of the network."""
         self._window[:-1] = self._window[1:]
         self._window[-1] = seen
+        self._lacking = max(self._lacking - 1, 0)
+        if self._lacking:
+            return self._opinion
         likelihoods = self._network.log_likelihoods(self._window)
+        blind = [kind.start + wheel for wheel, _ in unseen.blind for kind in _OF_A_WHEEL]
+        if int(np.argmax(likelihoods)) in blind:
+            likelihoods[:] = 0.0
+        likelihoods[blind] = likelihoods[NORMAL]
         for idle in unseen.wheels:  # what an idle wheel hides it cannot refute either
-            faults = [CONTROLS.start + idle, ENCODERS.start + idle]
+            faults = [kind.start + idle for kind in _HIDDEN]
             likelihoods[faults] = np.maximum(likelihoods[faults], likelihoods[NORMAL])
-        self._recent.append(likelihoods - likelihoods[NORMAL])
+        for kind in _CREEPING:
+            over = likelihoods[kind] - likelihoods[NORMAL]
+            plain = np.sign(over) * np.maximum(np.abs(over) - _SLIGHT, 0.0)
+            likelihoods[kind] = likelihoods[NORMAL] + plain
+        likelihoods = of_states(likelihoods)
         shares = self._belief.update(likelihoods)
-        six, best = six_of(shares), int(np.argmax(shares))
-        leading = int(np.argmax(six))
-        striking = any(window[best] > self.settings.striking for window in reversed(self._recent))
-        concerned = best - CONTROLS.start if leading == CONTROL else STATES[leading].wheel
-        return Opinion(six, bool(six[leading] > _SURE and striking), concerned)
+        self._recent.append(_ratios(likelihoods))
+        group = max(_GROUPS, key=lambda group: float(shares[group].sum()))
+        best = self._kept(shares, group)
+        striking = any(window[best] > self.settings.striking for window in self._recent)
+        state = STATE_OF[best]
+        wheel = best - CONTROLS.start if state is STATES[CONTROL] else state.wheel
+        if state in DRAGGING and _stands(self._window, best - DRAGS.start):
+            state = STUCK[best - DRAGS.start]
+        sure = bool(shares[group].sum() > _SURE and striking)
+        return Opinion(named_of(shares), sure, wheel, state)
+
+    def _kept(self, shares: Array, group: list[int]) -> int:
+        """The likeliest of a group; the one before stays while it is not unlikely."""
+        best = group[int(np.argmax(shares[group]))]
+        if self._best in group and shares[self._best] > _STAYS * shares[best]:
+            best = self._best
+        self._best = best
+        return best
+
+
+def _ratios(likelihoods: Array) -> Array:
+    """How much a window says for each state, over what a healthy robot explains of it.
+
+    Of what a description that is off looks like, a push explains the rest.
+    """
+    ratios = likelihoods - likelihoods[NORMAL]
+    for kind in _CREEPING:
+        ratios[kind] -= max(likelihoods[EXTERNAL] - likelihoods[NORMAL], 0.0)
+    ratios[SLIP] += _SLIP_MARGIN
+    return np.asarray(ratios)
+
+
+def _stands(window: Array, wheel: int) -> bool:
+    """Whether a wheel that should turn has been standing."""
+    expected, measured = turning(window[-_STANDING:], wheel)
+    return bool((np.abs(measured) < _STILL * np.abs(expected)).all() and (expected != 0.0).all())
 
 
 class CodeJudge:
@@ -127,6 +231,10 @@ class CodeJudge:
         self._smoothed: Array | None = None
         self._leading = -1
         self._led = 0
+
+    def interrupt(self) -> None:
+        """What leads has to lead anew."""
+        self._smoothed, self._led = None, 0
 
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         """Look at the newest frame."""

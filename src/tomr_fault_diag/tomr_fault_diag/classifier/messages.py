@@ -1,11 +1,23 @@
 """A diagnosis as a DiagnosticArray (REP-107)."""
 
+from tomr_fault_diag.classifier.advice import check_first
 from tomr_fault_diag.classifier.stage import Diagnosis
-from tomr_fault_diag.classifier.states import NORMAL, NOT_OBSERVABLE, STALE, STATES, WAITING
-from tomr_fault_diag.residuals.frame import residual_names
+from tomr_fault_diag.classifier.states import (
+    NAMED,
+    NORMAL,
+    NOT_ENOUGH,
+    NOT_OBSERVABLE,
+    POWER_SENSOR,
+    STALE,
+    STATES,
+    UNKNOWN,
+    WAITING,
+    State,
+)
+from tomr_fault_diag.residuals.frame import GAP, residual_names
 from tomr_fault_diag.residuals.messages import sentence
 from tomr_power_model.messages.outgoing import DiagnosticMessage
-from tomr_power_model.messages.plain import Status
+from tomr_power_model.messages.plain import Level, Status
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.robot import Robot
 
@@ -13,13 +25,18 @@ TOPIC = "/diagnostics"
 NAME = "fault_classifier: drive"
 
 
-def diagnosis_message(robot: Robot, diagnosis: Diagnosis, hardware_id: str) -> DiagnosticMessage:
+def diagnosis_message(
+    robot: Robot, diagnosis: Diagnosis, hardware_id: str, commissioned: str = "no"
+) -> DiagnosticMessage:
     """The message of one diagnosis: state, since when, probabilities, evidence."""
     seconds, rest = divmod(diagnosis.since_ns, NANOSECONDS)
-    values = [("state", diagnosis.state.name), ("since", f"{seconds}.{rest:09d}")]
+    values = [("state", diagnosis.state.name), ("six_state", six_state(diagnosis.state))]
+    values += [("since", f"{seconds}.{rest:09d}")]
+    values.append(("check_first", check_first(diagnosis.state)))
     values.append(("not_observable", ", ".join(diagnosis.unseen.words)))
-    for state, share in zip(STATES, diagnosis.probabilities, strict=False):
+    for state, share in zip(NAMED, diagnosis.probabilities, strict=False):
         values.append((f"p {state.name}", f"{share:.4f}"))
+    values.append(("commissioned", commissioned))
     evidence = evidence_of(robot, diagnosis)
     values.extend((f"evidence {number}", text) for number, text in enumerate(evidence, start=1))
     status = Status(
@@ -38,15 +55,33 @@ def evidence_of(robot: Robot, diagnosis: Diagnosis) -> list[str]:
     ]
 
 
+def six_state(state: State) -> str:
+    """Which of the paper's six states it is; what is none of them is unknown."""
+    return UNKNOWN.name if state.paper is None else STATES[state.paper].name
+
+
 def _headline(robot: Robot, diagnosis: Diagnosis) -> str:
+    said = _said(robot, diagnosis)
+    is_held = not diagnosis.usable and diagnosis.state.level is not Level.STALE
+    return f"{said}; no data at present" if is_held and diagnosis.state != WAITING else said
+
+
+def _said(robot: Robot, diagnosis: Diagnosis) -> str:
     state = diagnosis.state
     if state == STALE:
         missing = next((r.missing for r in diagnosis.frame.residuals if r.stale), "too little seen")
         return f"{state.name}: {missing}"
+    if state == NOT_ENOUGH:
+        gaps = [r.missing for r in diagnosis.frame.residuals if r.missing.startswith(GAP)]
+        return f"{state.name}: {gaps[0] if gaps else 'gaps a moment ago'}"
     if state == WAITING:
-        return f"{state.name}: no command has come yet"
+        return f"{state.name}: no fresh command"
     if state == NOT_OBSERVABLE:
         return f"{state.name}: the robot stands still"
+    ailing = {wheel: reason for wheel, reason in diagnosis.unseen.blind if reason}
+    if state in POWER_SENSOR and ailing:
+        words = ", ".join(f"motor {wheel + 1} ({reason})" for wheel, reason in ailing.items())
+        return f"{state.name}; not observable: {words}"
     if diagnosis.wheel is not None:
         return f"{state.name} ({robot.wheel_names[diagnosis.wheel]})"
     if state is STATES[NORMAL] and diagnosis.unseen.wheels:

@@ -6,7 +6,14 @@ These rules ask nothing but the residuals themselves.
 
 from attrs import frozen
 
-from tomr_fault_diag.residuals.frame import SPEEDS, Residual, ResidualFrame
+from tomr_fault_diag.residuals.frame import (
+    MOTORS,
+    RESIDUALS,
+    SPEEDS,
+    TOTAL,
+    Residual,
+    ResidualFrame,
+)
 from tomr_power_model.model.ticks import to_ns
 
 _TURNING = 0.5  # rad/s: a wheel that is expected to turn
@@ -50,7 +57,9 @@ class MisfitWatch:
             self._ignored_since = None
         elif self._ignored_since is None:
             self._ignored_since = now
-        far = [index for index, item in enumerate(frame.residuals) if _is_far(item)]
+        # What no motor takes of the total is the computer's: it counts where they are not known.
+        first = TOTAL if any(frame.residuals[index].stale for index in MOTORS) else TOTAL + 1
+        far = [index for index in range(first, RESIDUALS) if _is_far(frame.residuals[index])]
         self._far_since = {index: self._far_since.get(index, now) for index in far}
         return Misfit(
             ignores,

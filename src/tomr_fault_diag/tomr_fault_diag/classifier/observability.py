@@ -24,6 +24,7 @@ class Unseen:
 
     wheels: tuple[int, ...] = ()
     slip: bool = False
+    blind: tuple[tuple[int, str], ...] = ()  # wheels without power of their own, and why
 
     @property
     def everything(self) -> bool:
@@ -33,7 +34,9 @@ class Unseen:
     @property
     def words(self) -> tuple[str, ...]:
         """What could not be seen, in words."""
-        motors = tuple(f"motor {wheel + 1}" for wheel in self.wheels)
+        reasons = {wheel: f" ({reason})" if reason else "" for wheel, reason in self.blind}
+        hidden = sorted({*self.wheels, *reasons})
+        motors = tuple(f"motor {wheel + 1}{reasons.get(wheel, '')}" for wheel in hidden)
         return (*motors, "slip") if self.slip else motors
 
 

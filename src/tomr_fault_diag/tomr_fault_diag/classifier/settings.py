@@ -8,7 +8,7 @@ from attrs import frozen
 from tomr_fault_diag.residuals.frame import INPUT_ORDERS
 from tomr_power_model.errors import InputError
 from tomr_power_model.model.ticks import to_ns
-from tomr_power_model.robot.parameters import ParameterSpec
+from tomr_power_model.robot.parameters import HARDWARE_ID, NAMELESS, ParameterSpec
 
 _S = ParameterSpec
 
@@ -35,8 +35,14 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
         "speeds_first",
         choices=tuple(INPUT_ORDERS),
     ),
-    _S("hardware_id", "of this robot, in every diagnostic status", "str", "tomr"),
-    _S("evidence_weight", "of window: what one window counts", "float", 0.4, "", 0.01, 1.0),
+    _S(
+        "commissioned",
+        "when tomr_commission set bands and caution, and with which weights",
+        "str",
+        "",
+    ),
+    HARDWARE_ID,
+    _S("evidence_weight", "of window: what one window counts", "float", 0.5, "", 0.01, 1.0),
     _S(
         "caution",
         "of window: decades of evidence needed before a fault is named",
@@ -57,8 +63,16 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
     ),
     _live("filter_time", "of wang2024: of the probabilities", 0.15, "s", 0.0, 10.0),
     _live("confirm_time", "of wang2024: a fault must lead so long to be named", 0.15, "s", 0.0, 10),
+    _live("raise_time", "a fault must be sure so long to be named", 0.0, "s", 0.0, 60.0),
     _live(
         "recovery_time", "normal must lead this long before it is named again", 1.0, "s", 0.0, 60.0
+    ),
+    _S(
+        "latch",
+        "a named fault stays until the service ~/clear is called",
+        "bool",
+        False,
+        read_only=False,
     ),
     _live("report_period", "of /diagnostics besides changes", 1.0, "s", 0.05, 60.0),
 )
@@ -70,15 +84,18 @@ class ClassifierSettings:
 
     classifier: str = "window"
     weights: str = ""
-    evidence_weight: float = 0.4
+    evidence_weight: float = 0.5
     caution: float = 11.0
     striking: float = 9.0
     filter_time: int = to_ns(0.15)
     confirm_time: int = to_ns(0.15)
+    raise_time: int = 0
     recovery_time: int = to_ns(1.0)
+    latch: bool = False
     report_period: int = to_ns(1.0)
-    hardware_id: str = "tomr"
+    hardware_id: str = NAMELESS
     input_order: str = "speeds_first"
+    commissioned: str = ""
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:
@@ -100,8 +117,11 @@ class ClassifierSettings:
             striking=number("striking"),
             filter_time=to_ns(number("filter_time")),
             confirm_time=to_ns(number("confirm_time")),
+            raise_time=to_ns(number("raise_time")),
             recovery_time=to_ns(number("recovery_time")),
+            latch=bool(values["latch"]),
             report_period=to_ns(number("report_period")),
-            hardware_id=str(values["hardware_id"]),
+            hardware_id=str(values["hardware_id"]) or NAMELESS,
             input_order=str(values["input_order"]),
+            commissioned=str(values["commissioned"]),
         )

@@ -1,23 +1,26 @@
 """The classifier stage: residual frames in, diagnoses out at 1 Hz and at once on a change."""
 
-import numpy as np
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 
 from tomr_fault_diag.classifier.judges import Judge, Opinion
-from tomr_fault_diag.classifier.misfit import MisfitWatch
+from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
 from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.states import (
     DISOBEYS,
     NORMAL,
+    NOT_ENOUGH,
     NOT_OBSERVABLE,
+    POWER_SENSOR,
+    PUSHED,
     STALE,
     STATES,
     UNKNOWN,
     WAITING,
     State,
 )
-from tomr_fault_diag.residuals.frame import MOTORS, NO_COMMAND, TOTAL, ResidualFrame
+from tomr_fault_diag.classifier.sufficiency import Sufficiency, SufficiencyWatch
+from tomr_fault_diag.residuals.frame import GAP, MOTORS, NO_COMMAND, ResidualFrame
 
 
 @frozen
@@ -27,15 +30,17 @@ class Diagnosis:
     stamp_ns: int
     state: State
     since_ns: int
-    probabilities: tuple[float, ...]  # of STATES, given all so far; empty where nothing is known
+    probabilities: tuple[float, ...]  # of NAMED, given all so far; empty where nothing is known
     frame: ResidualFrame
     changed: bool
     wheel: int | None = None  # 0..2 that the state concerns, where it is known
     unseen: Unseen = field(factory=Unseen)
+    usable: bool = True  # whether this tick held data to decide by
 
 
 # Whatever comes next may follow at once.
-_QUIET = (None, WAITING, STALE, NOT_OBSERVABLE, STATES[NORMAL])
+_WELL = (STATES[NORMAL], PUSHED)
+_QUIET = (None, WAITING, STALE, NOT_ENOUGH, NOT_OBSERVABLE, *_WELL, *POWER_SENSOR)
 
 
 class FaultClassifier:
@@ -44,13 +49,14 @@ class FaultClassifier:
     A fault is named when the judge is sure of it, normal again when it leads for `recovery_time`.
     A named fault stays named while nothing speaks against it, as when its wheel is idle. Whatever
     the judge says: a robot that does not follow its commands is called so, and what a healthy one
-    could not show is unknown, not normal.
+    could not show is unknown, not normal. Where data are missing nothing is concluded.
     """
 
     def __init__(self, judge: Judge) -> None:
         self._judge = judge
         self._motion = MotionWatch()
         self._misfits = MisfitWatch()
+        self._data = SufficiencyWatch()
         self.clear()
 
     @property
@@ -67,14 +73,24 @@ class FaultClassifier:
         self._judge.clear()
         self._motion.clear()
         self._misfits.clear()
+        self._data.clear()
         self._stamp = 0
         self._opinion: Opinion | None = None
         self._unseen = Unseen()
+        self._usable = True
         self._state: State | None = None
         self._since = 0
         self._wheel: int | None = None
         self._candidate = STALE
         self._candidate_since = 0
+        self._sure_since: int | None = None
+
+    def release(self) -> str:
+        """Let go of a named fault, latched or not; what still holds is named anew. Returns it."""
+        named = "" if self._state is None or self._state in _QUIET else self._state.name
+        if named:
+            self._state = None
+        return named
 
     def classify(self, frame: ResidualFrame) -> Diagnosis | None:
         """Take a frame; returns a diagnosis when one is to be published.
@@ -104,6 +120,7 @@ class FaultClassifier:
             changed,
             self._wheel,
             self._unseen,
+            self._usable,
         )
 
     def _is_periodic(self, stamp: int, elapsed: int) -> bool:
@@ -112,41 +129,82 @@ class FaultClassifier:
         return stamp // period != (stamp - elapsed) // period
 
     def _decide(self, frame: ResidualFrame, elapsed: int) -> None:
-        self._unseen, misfit = self._motion.take(frame), self._misfits.take(frame)
-        if not _is_decidable(frame):
-            self._judge.clear()
-            self._opinion = None
-            self._candidate = STALE
-            self._enter(WAITING if _is_waiting(frame) else STALE, frame.stamp_ns, None)
+        """Look at a frame, if there is something in it, and name a state."""
+        data = self._data.take(frame)
+        self._unseen = evolve(self._motion.take(frame), blind=data.blind)
+        misfit, self._usable = self._misfits.take(frame), data.usable
+        if not data.usable:
+            self._pause(frame, data)
             return
-        if misfit.disobeys:
+        if not data.joined:
+            self._judge.interrupt()
+            self._candidate_since = frame.stamp_ns
+        if misfit.disobeys and data.enough:
             # No fault of one wheel looks like this; what the judge makes of it says nothing.
             self._judge.clear()
             self._opinion = None
             self._candidate = DISOBEYS
             self._enter(DISOBEYS, frame.stamp_ns, None)
             return
-        opinion = self._opinion = self._judge.judge(frame, elapsed, self._unseen)
-        leading = STATES[int(np.argmax(opinion.probabilities))]
-        if leading is STATES[NORMAL] and misfit.unexplained:
+        self._opinion = self._judge.judge(frame, elapsed, self._unseen)
+        if data.enough or self._state not in _QUIET:
+            self._weigh(self._opinion, misfit, frame.stamp_ns)
+        else:
+            self._enter(NOT_ENOUGH, frame.stamp_ns, None)
+
+    def _weigh(self, opinion: Opinion, misfit: Misfit, stamp: int) -> None:
+        """Name what the judge is sure of, or what it does not know."""
+        leading = opinion.leading
+        if leading in _WELL and misfit.unexplained:
             leading = UNKNOWN
-        if leading != self._candidate:
-            self._candidate, self._candidate_since = leading, frame.stamp_ns
-        if leading is UNKNOWN:
+        candidate = STATES[NORMAL] if leading in _WELL else leading
+        if candidate != self._candidate:
+            self._candidate, self._candidate_since, self._sure_since = candidate, stamp, None
+        held = self._is_held(opinion.sure, stamp)
+        is_blind = opinion.wheel in [wheel for wheel, _ in self._unseen.blind]
+        if leading is UNKNOWN and misfit.unexplained:
             if self._state in _QUIET:
-                self._enter(UNKNOWN, frame.stamp_ns, None)
-        elif leading is STATES[NORMAL] or (misfit.ignores_commands and self._state in _QUIET):
-            self._settle(frame.stamp_ns)
-        elif opinion.sure and (leading != self._state or opinion.wheel != self._wheel):
+                self._enter(UNKNOWN, stamp, None)
+        elif leading in _WELL or ((misfit.ignores_commands or is_blind) and self._state in _QUIET):
+            self._settle(stamp, leading)
+        elif held and not is_blind and (leading != self._state or opinion.wheel != self._wheel):
             self._enter(leading, self._candidate_since, opinion.wheel)
         elif self._state is None:
+            self._enter(STALE, stamp, None)
+
+    def _is_held(self, sure: bool, stamp: int) -> bool:
+        """Whether the judge has been sure of what leads for `raise_time`."""
+        if not sure:
+            self._sure_since = None
+            return False
+        if self._sure_since is None:
+            self._sure_since = stamp
+        return stamp - self._sure_since >= self.settings.raise_time
+
+    def _pause(self, frame: ResidualFrame, data: Sufficiency) -> None:
+        """Nothing can be said of a frame: what was named stays, but normal not for long."""
+        self._opinion = None
+        if self._state is not None and (data.enough or self._state not in _QUIET):
+            return
+        if _is_waiting(frame):
+            self._enter(WAITING, frame.stamp_ns, None)
+        elif any(item.missing.startswith(GAP) for item in frame.residuals):
+            self._enter(NOT_ENOUGH, frame.stamp_ns, None)
+        else:
             self._enter(STALE, frame.stamp_ns, None)
 
-    def _settle(self, stamp: int) -> None:
+    def _settle(self, stamp: int, leading: State) -> None:
         """Nothing is wrong, any more or still; what that is called depends on the motion."""
         quiet = NOT_OBSERVABLE if self._unseen.everything else STATES[NORMAL]
+        if leading is PUSHED:
+            quiet = PUSHED
+        ailing = [wheel for wheel, reason in self._unseen.blind if reason]
+        if ailing:
+            quiet = POWER_SENSOR[ailing[0]]
         if self._state in _QUIET:
             self._enter(quiet, stamp, None)
+        elif self.settings.latch:
+            return
         elif stamp - self._candidate_since >= self.settings.recovery_time:
             self._enter(quiet, self._candidate_since, None)
 
@@ -159,8 +217,3 @@ class FaultClassifier:
 def _is_waiting(frame: ResidualFrame) -> bool:
     """Whether all that is missing is a first command."""
     return all(frame.residuals[index].missing == NO_COMMAND for index in MOTORS)
-
-
-def _is_decidable(frame: ResidualFrame) -> bool:
-    """Whether any motor's power, or the total, can be compared at all."""
-    return any(not frame.residuals[index].stale for index in (TOTAL, *MOTORS))

@@ -9,6 +9,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import read_arrays
 
 Array = NDArray[np.float64]
 Shapes = Mapping[str, tuple[int, ...]]
@@ -33,12 +34,9 @@ class Stored:
 
     def _read(self, path: Path) -> dict[str, Array]:
         try:
-            with np.load(path) as stored:
-                found = {name: np.asarray(stored[name], np.float64) for name in self.names}
-        except (OSError, ValueError, KeyError, EOFError) as error:
-            raise InputError(
-                f"{path}: no weights of {self.network} ({error}): {self.remedy}"
-            ) from None
+            found = read_arrays(path, self.names)
+        except InputError as error:
+            raise InputError(f"{error}: no weights of {self.network}: {self.remedy}") from None
         for name, shape in self.shapes(found).items():
             if found[name].shape != shape or not np.isfinite(found[name]).all():
                 raise InputError(

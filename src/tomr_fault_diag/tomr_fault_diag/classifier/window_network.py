@@ -1,10 +1,11 @@
 """The window network: continuous residuals of the last 0.4 s, one wheel's view at a time.
 
-    h = relu(W2 relu(W1 x_w + b1) + b2),  (n, s, c, m)_w = W3 h + b3
+    h = relu(W2 relu(W1 x_w + b1) + b2),  (n, s, x, o, c, e, d, r, p)_w = W3 h + b3
 
-for the view x_w of each wheel w; softmax over mean n, mean s, c_1..3, m_1..3: normal, slip, signal
-of wheel w lost, encoder of wheel w lost. The same network serves the three wheels, so what it has
-learned of one holds for all.
+for the view x_w of each wheel w; softmax over the means of n, s, x and o (normal, slip, a force
+from outside, anything else) and over those of each wheel: signal lost, encoder lost, axle dragging,
+motor weak, power sensor wrong. The same network serves the three wheels, so what it has learned of
+one holds for all.
 """
 
 from collections.abc import Mapping
@@ -22,7 +23,8 @@ from tomr_fault_diag.classifier.stored import Shapes, Stored
 
 Array = NDArray[np.float64]
 
-_VIEWS = 4  # outputs of one view
+COMMON = 4  # outputs of a view that are no single wheel's
+VIEWS = 9  # outputs of one view
 _NAMES = ("weight_1", "bias_1", "weight_2", "bias_2", "weight_3", "bias_3", "prior")
 
 
@@ -31,7 +33,7 @@ def _shapes(found: Mapping[str, Array]) -> Shapes:
     first, second = found["bias_1"].size, found["bias_2"].size
     return {
         "weight_1": (first, INPUTS), "bias_1": (first,), "weight_2": (second, first),
-        "bias_2": (second,), "weight_3": (_VIEWS, second), "bias_3": (_VIEWS,),
+        "bias_2": (second,), "weight_3": (VIEWS, second), "bias_3": (VIEWS,),
         "prior": (HYPOTHESES,),
     }  # fmt: skip
 
@@ -53,9 +55,9 @@ class WindowNetwork:
     bias_1: Array  # (h1,)
     weight_2: Array  # (h2, h1)
     bias_2: Array  # (h2,)
-    weight_3: Array  # (4, h2)
-    bias_3: Array  # (4,)
-    prior: Array  # (8,)
+    weight_3: Array  # (9, h2)
+    bias_3: Array  # (9,)
+    prior: Array  # (19,)
 
     @classmethod
     def load(cls, path: Path | str | None = None) -> Self:
@@ -63,18 +65,20 @@ class WindowNetwork:
         return cls(**_STORED.load(path))
 
     def scores(self, views: Array) -> Array:
-        """Logits (..., 8) of views (..., 3, INPUTS)."""
+        """Logits (..., 19) of views (..., 3, INPUTS)."""
         hidden = np.maximum(views @ self.weight_1.T + self.bias_1, 0.0)
         hidden = np.maximum(hidden @ self.weight_2.T + self.bias_2, 0.0)
         out = hidden @ self.weight_3.T + self.bias_3
-        return np.concatenate([out[..., :2].mean(axis=-2), out[..., 2], out[..., 3]], axis=-1)
+        common = out[..., :COMMON].mean(axis=-2)
+        wheels = np.swapaxes(out[..., COMMON:], -1, -2).reshape(*common.shape[:-1], -1)
+        return np.concatenate([common[..., :2], wheels, common[..., 2:]], axis=-1)
 
     def scores_of(self, windows: Array) -> Array:
-        """Logits (..., 8) of windows (..., WINDOW, 19)."""
+        """Logits (..., 19) of windows (..., WINDOW, 20)."""
         return self.scores(by_wheel(windows))
 
     def log_likelihoods(self, window: Array) -> Array:
-        """Log-likelihoods (8,), up to a constant, of a window (WINDOW, 19)."""
+        """Log-likelihoods (19,), up to a constant, of a window (WINDOW, 20)."""
         return np.asarray(self.scores_of(window) - self._log_prior)
 
     @cached_property

@@ -1,52 +1,98 @@
-"""`tomr_diagnose`: what was wrong with a robot in a recording."""
+"""`tomr_diagnose`: what was wrong with a robot in its recordings."""
 
 import argparse
 import json
+import os
 import sys
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
+from attrs import evolve
 from tqdm import tqdm
 
-from tomr_fault_diag.classifier.messages import evidence_of
-from tomr_fault_diag.diagnosis.offline import diagnose
-from tomr_fault_diag.diagnosis.pipeline import Pipeline
-from tomr_fault_diag.diagnosis.settings import PARAMETERS, DiagnosisSettings, parse_assignments
-from tomr_fault_diag.diagnosis.summary import Summariser, Summary
-from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK, run_main
-from tomr_power_model.messages.bag import to_bag
-from tomr_power_model.messages.outgoing import TYPES
-from tomr_power_model.model.ticks import NANOSECONDS
-from tomr_power_model.recordings import Recording, RecordingWriter, open_recording
+from tomr_fault_diag.diagnosis.bags import find_bags, is_bag
+from tomr_fault_diag.diagnosis.key_table import summaries
+from tomr_fault_diag.diagnosis.labels import RECORDED, Labels, load_labels
+from tomr_fault_diag.diagnosis.replayed import (
+    Failed,
+    Replayed,
+    Task,
+    pages_for,
+    replay_all,
+    replay_one,
+    write_page,
+)
+from tomr_fault_diag.diagnosis.settings import (
+    STAGE_NODES,
+    DiagnosisSettings,
+    parse_assignments,
+)
+from tomr_fault_diag.diagnosis.words import (
+    as_json,
+    bag_line,
+    notes,
+    phases_line,
+    score_lines,
+    summary_lines,
+    total_line,
+    verdict,
+)
+from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_MISMATCH, EXIT_OK, run_main
+from tomr_power_model.errors import InputError
+from tomr_power_model.files import make_folder
+from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.robot import load_robot, read_node_sections, shipped_robots
 
-STAGE_NODES = ("power_model", "power_residuals", "fault_classifier")
+EXIT_UNDECIDED = 3
+_MOST_PHASES = 50
 
 _EPILOG = """\
 examples:
   tomr_diagnose drive.mcap --robot my_robot.yaml
   tomr_diagnose bag_folder --out diagnosed --set band.power=2.0
   tomr_diagnose bag_folder --json | jq .shares
+  tomr_diagnose recordings/ --phases 5 --html pages
+  tomr_diagnose recordings/ --labels labels.yaml
 
-exit codes: 0 nothing wrong, 1 a fault was named, 2 bad input
+A label says what is true of a recording, as YAML, JSON or CSV (times in s after its first message):
+  - {bag: drive_17, state: motor system fault, wheel: 2, onset: 8.0, end: 14.0, severity: 0.6}
+  - {bag: drive_18}                                     # nothing is wrong
+Mission files of tomr_simulate serve as well; `--labels recorded` takes what it wrote into its bags.
+
+exit codes: 0 nothing wrong; 1 a fault was named, in any phase of any recording; 2 bad input, or
+one of many recordings failed; 3 nothing wrong in the others, and in one nothing could be decided
 The numbers are those that the three nodes publish on the same data."""
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="tomr_diagnose",
-        description="Diagnose a three-wheeled omni robot from a recording of its commands, wheel "
+        description="Diagnose a three-wheeled omni robot from recordings of its commands, wheel "
         "encoders and motor power.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("bag", type=Path, help="rosbag2 folder, .mcap or .db3 file")
+    parser.add_argument(
+        "bag", type=Path, nargs="+", help="rosbag2 folder, .mcap or .db3 file, or a folder of these"
+    )
     parser.add_argument(
         "--robot",
         default="reference",
         help=f"robot.yaml, or one of {', '.join(shipped_robots())} (default: %(default)s)",
     )
+    parser.add_argument(
+        "--phases",
+        type=int,
+        default=1,
+        metavar="N",
+        help="diagnose on N grids of decisions, each shifted by 1/N of the period (default: 1)",
+    )
+    parser.add_argument(
+        "--labels", metavar="PATH", help=f"score against a file, a folder of them, or `{RECORDED}`"
+    )
+    parser.add_argument("--html", type=Path, metavar="DIR", help="write a time line of each here")
+    parser.add_argument("--jobs", type=int, default=0, metavar="N", help="recordings side by side")
     parser.add_argument("--out", type=Path, help="write the suite's messages to this new bag")
     parser.add_argument("--namespace", help="of the robot's topics, if the bag holds several")
     parser.add_argument(
@@ -56,8 +102,8 @@ def _parser() -> argparse.ArgumentParser:
         metavar="NAME=VALUE",
         help="a parameter; --parameters lists them",
     )
-    parser.add_argument("--json", action="store_true", help="print the summary as JSON")
-    parser.add_argument("--parameters", action=_ListParameters, help="list all parameters")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    parser.add_argument("--parameters", action=_ListParameters, help="list all keys of robot.yaml")
     return parser
 
 
@@ -68,89 +114,149 @@ class _ListParameters(argparse.Action):
         super().__init__(option_strings, dest, nargs=0, help=help)
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        for spec in PARAMETERS.values():
-            print(spec.summary)
+        for line in summaries():
+            print(line)
         parser.exit()
 
 
-def _run(recording: Recording, pipeline: Pipeline, arguments: argparse.Namespace) -> Summary:
-    summariser = Summariser()
-    seconds = (recording.end_ns - recording.start_ns) / NANOSECONDS
-    with ExitStack() as stack:
-        writer = stack.enter_context(RecordingWriter(arguments.out)) if arguments.out else None
-        bar = stack.enter_context(
-            tqdm(total=round(seconds), unit="s", desc="diagnosing", disable=None, delay=1.0)
-        )
-        for receive_ns, step in diagnose(recording, pipeline, arguments.namespace):
-            if not step.frames and not step.predictions:
-                continue
-            done = (receive_ns - recording.start_ns) // NANOSECONDS
-            if done > bar.n:
-                bar.update(done - bar.n)
-            for diagnosis in step.diagnoses:
-                summariser.diagnosis(diagnosis, evidence_of(pipeline.robot, diagnosis))
-            for frame in step.frames:
-                summariser.frame(frame)
-            if writer is not None:
-                for message in pipeline.messages(step):
-                    writer.write(
-                        message.topic, TYPES[type(message)], to_bag(message.plain), message.stamp_ns
-                    )
-    return summariser.summary()
-
-
-def _print(summary: Summary, pipeline: Pipeline, start_ns: int) -> None:
-    print(f"{summary.ticks} decisions")
-    for name, share in summary.shares.items():
-        print(f"  {100 * share:5.1f} %  {name}")
-    stale = max(summary.stale_shares)
-    if stale:
-        print(f"  up to {100 * stale:.1f} % of a residual without an input")
-    for spell in summary.spells:
-        since, until = ((t - start_ns) / NANOSECONDS for t in (spell.start_ns, spell.end_ns))
-        print(f"{since:8.2f} s to {until:8.2f} s  {spell.state}")
-        for line in spell.evidence:
-            print(f"{'':26}{line}")
-    for (topic, problem), count in pipeline.complaints.counts.items():
-        print(f"note: {topic}: {problem} ({count} messages)", file=sys.stderr)
-
-
-def _as_json(summary: Summary) -> str:
-    return json.dumps(
-        {
-            "ticks": summary.ticks,
-            "shares": summary.shares,
-            "stale_shares": summary.stale_shares,
-            "spells": [
-                {
-                    "state": spell.state,
-                    "start_ns": spell.start_ns,
-                    "end_ns": spell.end_ns,
-                    "evidence": spell.evidence,
-                }
-                for spell in summary.spells
-            ],
-        },
-        indent=2,
-    )
-
-
-def _diagnose(arguments: Sequence[str] | None) -> int:
-    options = _parser().parse_args(arguments)
+def _tasks(options: argparse.Namespace) -> list[Task]:
+    """What there is to do. Raises InputError."""
+    if not 1 <= options.phases <= _MOST_PHASES:
+        raise InputError(f"--phases {options.phases}: give 1 to {_MOST_PHASES}")
+    if options.jobs < 0:
+        raise InputError(f"--jobs {options.jobs}: give 1 or more, or 0 for one per core")
     given = read_node_sections(options.robot, STAGE_NODES)
     settings = DiagnosisSettings.of(
         {**given, **parse_assignments(options.set)}, f"--set or {options.robot}"
     )
-    pipeline = Pipeline(load_robot(options.robot), settings)
-    with open_recording(options.bag) as recording:
-        if recording.warning:
-            print(f"note: {recording.warning}", file=sys.stderr)
-        summary = _run(recording, pipeline, options)
-        if options.json:
-            print(_as_json(summary))
+    load_robot(options.robot)  # a bad one is no fault of the recordings
+    task = Task(
+        options.bag[0],
+        options.robot,
+        settings,
+        options.namespace,
+        options.phases,
+        out=options.out,
+        is_truth_recorded=options.labels == RECORDED,
+    )
+    bags = find_bags(options.bag)
+    if options.out is not None and len(bags) > 1:
+        raise InputError(f"--out {options.out}: give one recording with it, not {len(bags)}")
+    is_file = options.labels and options.labels != RECORDED
+    labels = load_labels(Path(options.labels)) if is_file else Labels(())
+    pages: Sequence[Path | None] = [None] * len(bags)
+    if options.html is not None:
+        make_folder(options.html)  # before hours of work
+        pages = pages_for(options.html, bags)
+    return [
+        evolve(task, bag=bag, page=page, labels=labels.of(bag))
+        for bag, page in zip(bags, pages, strict=True)
+    ]
+
+
+def _replayed_alone(task: Task) -> Replayed:
+    """One recording, with a bar of its seconds."""
+    with tqdm(unit="s", desc="diagnosing", disable=None, delay=1.0) as bar:
+
+        def progress(done_ns: int) -> None:
+            done = done_ns // NANOSECONDS
+            if done > bar.n:
+                bar.update(done - bar.n)
+
+        return replay_one(task, progress)
+
+
+def _replayed(tasks: Sequence[Task], jobs: int) -> Iterator[Replayed | Failed]:
+    """Many recordings, with a bar of these."""
+    workers = jobs or len(os.sched_getaffinity(0))
+    done = replay_all(tasks, workers)
+    yield from tqdm(done, total=len(tasks), desc="diagnosing", unit="bag", disable=None)
+
+
+def _exit_code(done: Sequence[Replayed], failed: Sequence[Failed]) -> int:
+    if failed:
+        return EXIT_BAD_INPUT
+    if any(item.has_fault for item in done):
+        return EXIT_MISMATCH
+    return EXIT_UNDECIDED if any(item.undecided for item in done) else EXIT_OK
+
+
+def _scores(done: Sequence[Replayed]) -> dict[str, Any]:
+    from tomr_fault_diag.diagnosis.score import Scores  # scipy takes its time to load
+
+    for item in done:
+        if not item.seen:
+            print(f"note: {item.task.bag}: nothing is said of it: not scored", file=sys.stderr)
+    seen = tuple(one for item in done for one in item.seen)
+    if not seen:
+        raise InputError("--labels: nothing is said of any of the recordings: check their names")
+    return Scores(seen).as_dict()
+
+
+def _print_one(item: Replayed) -> None:
+    if item.undecided:
+        print(f"{item.task.bag}: {verdict(item)}", file=sys.stderr)
+    for line in summary_lines(item.phases[0].summary, item.start_ns):
+        print(line)
+    if len(item.phases) > 1:
+        print(phases_line(item))
+
+
+def _print_notes(item: Replayed, is_alone: bool) -> None:
+    place = "" if is_alone else f"{item.task.bag}: "
+    for line in notes(item):
+        print(f"note: {place}{line}", file=sys.stderr)
+
+
+def _print_json(
+    done: Sequence[Replayed], failed: Sequence[Failed], scores: object, is_alone: bool
+) -> None:
+    found = {
+        "recordings": [as_json(item) for item in done],
+        "failed": [{"bag": str(item.task.bag), "reason": item.reason} for item in failed],
+    }
+    if is_alone:
+        found = as_json(done[0])
+    print(json.dumps(found if scores is None else {**found, "scores": scores}, indent=2))
+
+
+def _print_all(done: Sequence[Replayed], failed: Sequence[Failed], is_alone: bool) -> None:
+    if is_alone:
+        _print_one(done[0])
+        return
+    for item in done:
+        print(bag_line(item))
+    print(total_line(done, failed))
+
+
+def _diagnose(arguments: Sequence[str] | None) -> int:
+    options = _parser().parse_args(arguments)
+    tasks = _tasks(options)
+    is_alone = len(tasks) == 1 and is_bag(options.bag[0])
+    done: list[Replayed] = []
+    failed: list[Failed] = []
+    for item in [_replayed_alone(tasks[0])] if is_alone else _replayed(tasks, options.jobs):
+        if isinstance(item, Failed):
+            failed.append(item)
+            print(f"error: {item.reason}", file=sys.stderr)
         else:
-            _print(summary, pipeline, recording.start_ns)
-    return EXIT_MISMATCH if summary.has_fault else EXIT_OK
+            done.append(item)
+    order = {task.bag: number for number, task in enumerate(tasks)}
+    done.sort(key=lambda item: order[item.task.bag])
+    scores = _scores(done) if options.labels and done else None
+    if options.html is not None and not is_alone:
+        from tomr_fault_diag.diagnosis.page import INDEX, index_page
+
+        write_page(options.html / INDEX, index_page(done, failed, scores))
+    for item in done:
+        _print_notes(item, is_alone)
+    if options.json:
+        _print_json(done, failed, scores, is_alone)
+    else:
+        _print_all(done, failed, is_alone)
+        for line in score_lines(scores) if scores else ():
+            print(line)
+    return _exit_code(done, failed)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,11 +1,14 @@
-"""A recording through the pipeline, as fast as it can."""
+"""A recording through the pipeline, or through several side by side, as fast as it can."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 from tomr_fault_diag.diagnosis.pipeline import Pipeline, Step
 from tomr_power_model.errors import InputError
 from tomr_power_model.recordings import Recording, resolve_topic
 from tomr_power_model.topics.inputs import Input
+
+Note = Callable[[str, Any, int], None]  # topic of the contract, message, receive stamp [ns]
 
 
 def find_topics(
@@ -52,12 +55,29 @@ def check_wheels(recording: Recording, topic: str, wheel_names: tuple[str, str, 
         return
 
 
+def replay(
+    recording: Recording,
+    pipelines: Sequence[Pipeline],
+    namespace: str | None = None,
+    note: Note | None = None,
+) -> Iterator[tuple[int, list[Step]]]:
+    """Yield (receive stamp [ns], what it brought about in each pipeline) for every message.
+
+    All pipelines are of the same robot; `note` hears of each message before they do.
+    """
+    topics = find_topics(recording, pipelines[0].inputs, namespace)
+    joints = next(topic for topic, name in topics.items() if name == "joint_states")
+    check_wheels(recording, joints, pipelines[0].robot.wheel_names)
+    for topic, _, message, receive_ns in recording.messages(topics):
+        name = topics[topic]
+        if note is not None:
+            note(name, message, receive_ns)
+        yield receive_ns, [pipeline.take(name, message, receive_ns) for pipeline in pipelines]
+
+
 def diagnose(
     recording: Recording, pipeline: Pipeline, namespace: str | None = None
 ) -> Iterator[tuple[int, Step]]:
     """Yield (receive stamp [ns], what it brought about) for every message of the inputs."""
-    topics = find_topics(recording, pipeline.inputs, namespace)
-    joints = next(topic for topic, name in topics.items() if name == "joint_states")
-    check_wheels(recording, joints, pipeline.robot.wheel_names)
-    for topic, _, message, receive_ns in recording.messages(topics):
-        yield receive_ns, pipeline.take(topics[topic], message, receive_ns)
+    for receive_ns, (step,) in replay(recording, [pipeline], namespace):
+        yield receive_ns, step

@@ -1,7 +1,7 @@
 """The three stages in one process: messages in, the suite's messages out.
 
-The nodes run the same stages apart; both give the same numbers, because the stages are driven by
-stamps and whatever crosses a topic is rounded as its message rounds it.
+The three nodes run the same stages apart; both give the same numbers, because the stages are driven
+by stamps and whatever crosses a topic is rounded as its message rounds it.
 """
 
 from collections.abc import Callable, Iterator
@@ -9,6 +9,7 @@ from typing import Any
 
 from attrs import frozen
 
+from tomr_fault_diag.classifier.commissioned import commissioned_words
 from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
@@ -19,8 +20,7 @@ from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.dynamics.binding import has_numba
 from tomr_power_model.messages.intake import WheelFinder
-from tomr_power_model.messages.outgoing import Outgoing
-from tomr_power_model.messages.types import TWIST_STAMPED
+from tomr_power_model.messages.outgoing import DiagnosticMessage, Outgoing
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import Robot
@@ -37,24 +37,37 @@ class Step:
     predictions: tuple[Prediction, ...] = ()
     frames: tuple[ResidualFrame, ...] = ()
     diagnoses: tuple[Diagnosis, ...] = ()
+    reports: tuple[DiagnosticMessage, ...] = ()  # how the inputs do
 
 
 _NOTHING = Step()
 
 
 class Pipeline:
-    """Model, residuals and classifier of one robot, fed with recorded messages."""
+    """Model, residuals and classifier of one robot, fed with recorded or live messages."""
 
-    def __init__(self, robot: Robot, settings: DiagnosisSettings) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        settings: DiagnosisSettings,
+        *,
+        is_compiled: bool | None = None,
+        warn: Callable[[str], object] | None = None,
+    ) -> None:
+        """`is_compiled`: run the dynamics compiled, None where that can be had; `warn` hears the
+        complaints that are worth a line."""
         self.robot = robot
         self.settings = settings
         self.complaints = Complaints()
-        self._predictor = PowerPredictor(robot, settings.model, is_compiled=has_numba())
+        self._warn = warn
+        compiled = has_numba() if is_compiled is None else is_compiled
+        self._predictor = PowerPredictor(robot, settings.model, is_compiled=compiled)
         self._residuals = ResidualStage(robot, settings.residuals)
         self._classifier = FaultClassifier(make_judge(settings.classifier))
+        self._commissioned = commissioned_words(settings.classifier)
         wheels = WheelFinder(robot.wheel_names)
         self.inputs: tuple[Input, ...] = (
-            *model_inputs(robot, self._predictor, TWIST_STAMPED, wheels),
+            *model_inputs(robot, self._predictor, wheels),
             *residual_inputs(robot, self._residuals, wheels),
         )
         self._takers: dict[str, list[Take]] = {}
@@ -67,7 +80,9 @@ class Pipeline:
         for take in self._takers[topic]:
             problem = take(message, receive_ns)
             if problem is not None and problem != heard:  # two stages may say the same
-                self.complaints.note(topic, problem)
+                line = self.complaints.note(topic, problem)
+                if line is not None and self._warn is not None:
+                    self._warn(line)
             heard = problem
         predictions = self._predictor.due()
         for prediction in predictions:
@@ -76,7 +91,22 @@ class Pipeline:
         if not predictions and not frames:
             return _NOTHING
         diagnoses = (self._classifier.classify(frame) for frame in frames)
-        return Step(tuple(predictions), tuple(frames), tuple(d for d in diagnoses if d is not None))
+        return Step(
+            tuple(predictions),
+            tuple(frames),
+            tuple(d for d in diagnoses if d is not None),
+            (*self._predictor.reports(), *self._residuals.reports()),
+        )
+
+    def retune(self, settings: DiagnosisSettings) -> None:
+        """Change what may be changed while running: bands, and times of the classifier."""
+        self.settings = settings
+        self._residuals.retune(settings.residuals.bands)
+        self._classifier.settings = settings.classifier
+
+    def release(self) -> str:
+        """Let go of a named fault, latched or not; returns its name, empty if there was none."""
+        return self._classifier.release()
 
     def messages(self, step: Step) -> Iterator[Outgoing]:
         """The messages that the nodes publish at such a step."""
@@ -86,4 +116,5 @@ class Pipeline:
         for frame in step.frames:
             yield residual_message(self.robot, frame, hardware_id)
         for diagnosis in step.diagnoses:
-            yield diagnosis_message(self.robot, diagnosis, hardware_id)
+            yield diagnosis_message(self.robot, diagnosis, hardware_id, self._commissioned)
+        yield from step.reports

@@ -3,15 +3,18 @@
 from collections.abc import Iterable, Mapping
 from typing import Self
 
-import yaml
-from attrs import frozen
+from attrs import evolve, frozen
 
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
 from tomr_fault_diag.residuals.settings import RESIDUAL_PARAMETERS, ResidualSettings
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import load_yaml
 from tomr_power_model.model.settings import MODEL_PARAMETERS, ModelSettings
 from tomr_power_model.robot.description import closest
 from tomr_power_model.robot.parameters import ParameterSpec, check_all
+
+# Whose sections of a robot.yaml hold settings of the diagnosis; a later one counts more.
+STAGE_NODES = ("power_model", "power_residuals", "fault_classifier", "tomr_diagnosis")
 
 # The stages share some parameters by name and meaning; a name stands once.
 PARAMETERS: Mapping[str, ParameterSpec] = {
@@ -43,6 +46,16 @@ class DiagnosisSettings:
             ClassifierSettings.of(checked),
         )
 
+    def at_phase(self, share: float) -> Self:
+        """The same with the grid of decisions shifted by a share of its period."""
+        ticks = self.model.ticks
+        shifted = evolve(ticks, phase=round(share * ticks.period))
+        return evolve(
+            self,
+            model=evolve(self.model, ticks=shifted),
+            residuals=evolve(self.residuals, ticks=shifted),
+        )
+
 
 def parse_assignments(assignments: Iterable[str]) -> dict[str, object]:
     """`name=value` pairs from a command line, values read as YAML."""
@@ -51,8 +64,5 @@ def parse_assignments(assignments: Iterable[str]) -> dict[str, object]:
         name, equals, text = assignment.partition("=")
         if not equals:
             raise InputError(f"--set {assignment}: write name=value, e.g. band.power=2.0")
-        try:
-            values[name.strip()] = yaml.safe_load(text)
-        except yaml.YAMLError:
-            raise InputError(f"--set {assignment}: {text!r} is no value") from None
+        values[name.strip()] = load_yaml(text, f"--set {assignment}")
     return values

@@ -1,22 +1,37 @@
-"""What a whole recording amounts to: shares of states, and the spells of each."""
+"""What a whole recording amounts to: shares of states, and the episodes of each."""
 
 from collections import Counter
 
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 
 from tomr_fault_diag.classifier.stage import Diagnosis
-from tomr_fault_diag.classifier.states import FAULTLESS
+from tomr_fault_diag.classifier.states import (
+    FAULTLESS,
+    NOT_ENOUGH,
+    NOT_OBSERVABLE,
+    STALE,
+    WAITING,
+)
 from tomr_fault_diag.residuals.frame import RESIDUALS, ResidualFrame
+
+# States in which nothing was decided, not even that all is well.
+UNDECIDED = frozenset({NOT_OBSERVABLE.name, STALE.name, WAITING.name, NOT_ENOUGH.name})
 
 
 @frozen
-class Spell:
-    """One state from a stamp to another [ns]."""
+class Episode:
+    """One state from its naming to the last tick at which it stood; episodes do not overlap."""
 
     state: str
-    start_ns: int
+    start_ns: int  # tick that named it
     end_ns: int
+    since_ns: int  # when its evidence began, mostly before it was named
+    wheel: int | None = None  # 1..3
     evidence: tuple[str, ...] = ()
+
+    @property
+    def is_fault(self) -> bool:
+        return self.state not in FAULTLESS
 
 
 @frozen
@@ -26,12 +41,23 @@ class Summary:
     ticks: int
     shares: dict[str, float]  # of the ticks, by state
     stale_shares: tuple[float, ...]  # of the ticks, by residual
-    spells: tuple[Spell, ...]
+    episodes: tuple[Episode, ...]
+    missing: str = ""  # what was missing most often of what a residual needs
 
     @property
     def has_fault(self) -> bool:
         """Whether anything was named that is wrong."""
         return any(name not in FAULTLESS for name in self.shares)
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether anything at all was said of the robot."""
+        return any(name not in UNDECIDED for name in self.shares)
+
+    @property
+    def faults(self) -> tuple[Episode, ...]:
+        """The episodes in which something was wrong."""
+        return tuple(episode for episode in self.episodes if episode.is_fault)
 
 
 @frozen
@@ -40,26 +66,30 @@ class Summariser:
 
     _counts: Counter[str] = field(factory=Counter)
     _stale: Counter[int] = field(factory=Counter)
-    _spells: list[Spell] = field(factory=list)
+    _missing: Counter[str] = field(factory=Counter)
+    _episodes: list[Episode] = field(factory=list)
 
     def frame(self, frame: ResidualFrame) -> None:
         """Count a tick; its diagnosis, if there is one, comes before it."""
         for index, residual in enumerate(frame.residuals):
             if residual.stale:
                 self._stale[index] += 1
-        if self._spells:
-            last = self._spells[-1]
+                self._missing[residual.missing] += 1
+        if self._episodes:
+            last = self._episodes[-1]
             self._counts[last.state] += 1
-            self._spells[-1] = Spell(last.state, last.start_ns, frame.stamp_ns, last.evidence)
+            self._episodes[-1] = evolve(last, end_ns=frame.stamp_ns)
 
     def diagnosis(self, diagnosis: Diagnosis, evidence: list[str]) -> None:
-        """Note a diagnosis; only a change starts a new spell."""
-        if not self._spells or diagnosis.changed:
-            self._spells.append(
-                Spell(
+        """Note a diagnosis; only a change starts a new episode."""
+        if not self._episodes or diagnosis.changed:
+            self._episodes.append(
+                Episode(
                     diagnosis.state.name,
-                    diagnosis.since_ns,
                     diagnosis.stamp_ns,
+                    diagnosis.stamp_ns,
+                    diagnosis.since_ns,
+                    None if diagnosis.wheel is None else diagnosis.wheel + 1,
                     tuple(evidence),
                 )
             )
@@ -67,9 +97,11 @@ class Summariser:
     def summary(self) -> Summary:
         """All that was gathered."""
         ticks = sum(self._counts.values())
+        missing = [reason for reason, _ in self._missing.most_common() if reason]
         return Summary(
             ticks,
             {name: count / ticks for name, count in self._counts.most_common()},
             tuple(self._stale[index] / max(ticks, 1) for index in range(RESIDUALS)),
-            tuple(self._spells),
+            tuple(self._episodes),
+            missing[0] if missing else "",
         )

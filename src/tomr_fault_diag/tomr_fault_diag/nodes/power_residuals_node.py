@@ -13,10 +13,10 @@ from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.messages.intake import stamp_of
 from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.types import BATTERY, JOINT_STATE
+from tomr_power_model.model.input_health import TOPIC as DIAGNOSTICS
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.nodes.command_line import node_arguments
 from tomr_power_model.nodes.stage_node import STAGE_QOS, StageNode, run_node
-from tomr_power_model.robot.parameters import ParameterSpec
 from tomr_power_model.topics.inputs import Input, guarded
 from tomr_power_model.topics.predictions import (
     EXPECTED,
@@ -24,18 +24,16 @@ from tomr_power_model.topics.predictions import (
     prediction_topics,
 )
 
-HARDWARE_ID = ParameterSpec("hardware_id", "of this robot, in every status", "str", "tomr")
-PARAMETERS = (*RESIDUAL_PARAMETERS, HARDWARE_ID)
-
 
 class PowerResidualsNode(StageNode):
-    """Publishes the residuals of each tick as one DiagnosticArray."""
+    """Publishes the residuals of each tick as one DiagnosticArray, and how the sensors do."""
 
     def __init__(self) -> None:
-        super().__init__("power_residuals", PARAMETERS)
+        super().__init__("power_residuals", RESIDUAL_PARAMETERS)
         self.stage = ResidualStage(self._robot, ResidualSettings.of(self.values))
         self._assembler = PredictionAssembler(self._robot)
         self.offer(TOPIC, DiagnosticMessage)
+        self.offer(DIAGNOSTICS, DiagnosticMessage)
         predictions = [self._prediction(topic) for topic in prediction_topics(self._robot)]
         self.listen(predictions, self._advance, STAGE_QOS)
         self.listen(residual_inputs(self._robot, self.stage), self._advance)
@@ -51,11 +49,13 @@ class PowerResidualsNode(StageNode):
 
     def _advance(self) -> None:
         for frame in self.stage.due():
-            self.send(residual_message(self._robot, frame, str(self.values["hardware_id"])))
+            self.send(residual_message(self._robot, frame, self.stage.settings.hardware_id))
+        for report in self.stage.reports():
+            self.send(report)
 
 
 def main() -> int:
     """Entry point of `power_residuals`."""
     description = "Compare the measured power of each motor with the predicted."
-    given = node_arguments("power_residuals", description, PARAMETERS)
+    given = node_arguments("power_residuals", description, RESIDUAL_PARAMETERS)
     return run_node(PowerResidualsNode, given)

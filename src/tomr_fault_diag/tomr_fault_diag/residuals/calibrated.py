@@ -71,6 +71,27 @@ def fit_bands(
     return found
 
 
+def widened(bands: BandSettings, margin: float = 1.5, speed_margin: float = 3.0) -> BandSettings:
+    """Bands with a margin for what other days and floors bring.
+
+    Args:
+        bands: as they were fitted.
+        margin: of powers and currents.
+        speed_margin: of wheel speeds: loops of real drivers are not known as well.
+    """
+    return evolve(
+        bands,
+        relative=margin * bands.relative,
+        power=margin * bands.power,
+        current=margin * bands.current,
+        transient=margin * bands.transient,
+        total_relative=margin * bands.total_relative,
+        speed=speed_margin * bands.speed,
+        speed_relative=speed_margin * bands.speed_relative,
+        speed_transient=speed_margin * bands.speed_transient,
+    )
+
+
 def fit_band(residual: Array, modelled: Array, change: Array, within: float) -> Band | None:
     """One band for some residuals, None where there are too few."""
     known = np.isfinite(residual) & np.isfinite(modelled) & np.isfinite(change)

@@ -18,8 +18,12 @@ INPUT_ORDERS: Mapping[str, tuple[int, ...]] = {
     "powers_first": (TOTAL, *MOTORS, *ENCODERS, *SPEEDS),
 }
 
-# Why a motor's residual is unknown until the first command.
+# Why a residual is unknown: until the first command, and on robots without power of single motors.
 NO_COMMAND = "no fresh cmd_vel for the model"
+NOT_MEASURED = "not measured on this robot"
+GAP = "a gap in "  # and which stream: it paused, or went on only just before
+SCATTER = "the stamps of joint_states scatter too much to tell a speed"
+FROZEN = " repeats itself while the motor works"  # and before it which stream
 
 Unit = Literal["W", "A", "rad/s"]
 UNITS: dict[str, Unit] = {"W": "W", "A": "A", "rad/s": "rad/s"}

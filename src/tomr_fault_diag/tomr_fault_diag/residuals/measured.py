@@ -17,6 +17,7 @@ class Measured:
 
     value: float
     unit: Unit
+    missing: str = ""  # why it is not known
 
 
 class SupplyWindow:

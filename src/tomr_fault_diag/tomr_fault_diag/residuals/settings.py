@@ -7,7 +7,7 @@ from attrs import field, frozen
 
 from tomr_power_model.model.settings import TICK_PARAMETERS, tick_settings
 from tomr_power_model.model.ticks import TickSettings, to_ns
-from tomr_power_model.robot.parameters import ParameterSpec
+from tomr_power_model.robot.parameters import HARDWARE_ID, NAMELESS, ParameterSpec
 
 
 def _live(name: str, description: str, default: float, unit: str = "") -> ParameterSpec:
@@ -16,6 +16,7 @@ def _live(name: str, description: str, default: float, unit: str = "") -> Parame
 
 RESIDUAL_PARAMETERS: tuple[ParameterSpec, ...] = (
     *TICK_PARAMETERS,
+    HARDWARE_ID,
     ParameterSpec("encoder_window", "span of the fit to the encoders", "float", 0.07, "s", 0.01, 1),
     _live("band.relative", "of the modelled power or current of a motor", 0.6),
     _live("band.power", "least band of a motor's power", 1.1, "W"),
@@ -82,6 +83,7 @@ class ResidualSettings:
     stale: int = to_ns(0.5)
     encoder_window: int = to_ns(0.07)
     bands: BandSettings = field(factory=BandSettings)
+    hardware_id: str = NAMELESS
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:
@@ -91,4 +93,5 @@ class ResidualSettings:
             stale=to_ns(cast(float, values["stale_after"])),
             encoder_window=to_ns(cast(float, values["encoder_window"])),
             bands=BandSettings.of(values),
+            hardware_id=str(values["hardware_id"]) or NAMELESS,
         )

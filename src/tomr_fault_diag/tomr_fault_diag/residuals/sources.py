@@ -10,4 +10,4 @@ def residual_inputs(
     robot: Robot, stage: ResidualStage, wheels: WheelFinder | None = None
 ) -> tuple[Input, ...]:
     """Encoders, and power as the robot publishes it."""
-    return measured_inputs(robot, stage.encoders, stage.power, wheels)
+    return measured_inputs(robot, stage.encoders, stage.power, wheels, refused=stage.refused)

@@ -2,26 +2,60 @@
 
 import math
 from collections import deque
+from statistics import median
 from typing import Self
 
 from attrs import evolve, frozen
 
-from tomr_fault_diag.residuals.frame import NO_COMMAND, Residual, ResidualFrame, Unit, rounded
+from tomr_fault_diag.residuals.frame import (
+    FROZEN,
+    GAP,
+    MOTORS,
+    NO_COMMAND,
+    NOT_MEASURED,
+    SCATTER,
+    Residual,
+    ResidualFrame,
+    Unit,
+    rounded,
+)
 from tomr_fault_diag.residuals.measured import Measured, SupplyWindow
+from tomr_fault_diag.residuals.repeats import RepeatWatch, Work
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
-from tomr_power_model.drive.sources import TOTAL, TOTAL_TOPIC, PowerReading
+from tomr_power_model.drive.plausible import PowerLimits, fastest_wheel
+from tomr_power_model.drive.sources import (
+    ARRAY_TOPIC,
+    TOTAL,
+    TOTAL_TOPIC,
+    PowerReading,
+    motor_topics,
+)
+from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.readings import NAN, UNKNOWN_READING
-from tomr_power_model.model.encoders import UNKNOWN, EncoderSample, EncoderWindow, Triple
+from tomr_power_model.model.continuity import POWER_TOLERANCE, Continuity
+from tomr_power_model.model.encoders import (
+    UNKNOWN,
+    EncoderSample,
+    EncoderWindow,
+    Triple,
+    WheelEstimate,
+)
+from tomr_power_model.model.input_health import InputReporter, InputState
 from tomr_power_model.model.prediction import Prediction
-from tomr_power_model.model.ticks import Arrival, TickClock
+from tomr_power_model.model.ticks import Arrival, TickClock, to_ns
 from tomr_power_model.robot import WHEELS, Robot
 
 PREDICTIONS = "predictions"
 ENCODERS = "joint_states"
 
-# The model's change over so many ticks widens the band: where power jumps, a lag of a few
+# The model's change over so long, in ticks, widens the band: where power jumps, a lag of a few
 # milliseconds between the streams is a large residual.
-_TRANSIENT_TICKS = 3
+_TRANSIENT = to_ns(0.15)
+_FEWEST = 2  # ticks, of slow decisions
+
+_UNSURE = 0.5  # bands: a speed is not known whose standard deviation is larger
+_SCATTERS = 20  # ticks over which the scatter of stamps is looked at
+_TURNS = 0.3  # rad/s: a slower wheel may rest
 
 _UNKNOWN_READINGS = (UNKNOWN_READING, UNKNOWN_READING, UNKNOWN_READING)
 
@@ -66,11 +100,18 @@ class ResidualStage:
             SupplyWindow(ticks.period, self.settings.stale, signed or supply == TOTAL_TOPIC)
             for supply in self._supplies
         ]
+        self._flows = [Continuity(POWER_TOLERANCE) for _ in self._supplies]
+        self._repeats = [RepeatWatch() for _ in self._topics]
+        self._limits = PowerLimits.of(robot)
+        self._health = InputReporter()
         self._encoders = EncoderWindow(
-            self.settings.encoder_window, ticks.period, self.settings.stale
+            self.settings.encoder_window, ticks.period, self.settings.stale, fastest_wheel(robot)
         )
+        self._has_motor_power = bool(motor_topics(robot))
         self._predictions: dict[int, Prediction] = {}
-        self._recent: deque[_Modelled] = deque(maxlen=_TRANSIENT_TICKS)
+        lately = max(_FEWEST, round(_TRANSIENT / ticks.period))
+        self._recent: deque[_Modelled] = deque(maxlen=lately)
+        self._scatter: deque[float] = deque(maxlen=_SCATTERS)
 
     def retune(self, bands: BandSettings) -> None:
         """Change the bands while running."""
@@ -83,29 +124,78 @@ class ResidualStage:
             self._predictions[prediction.stamp_ns] = prediction
         return arrival
 
-    def encoders(self, stamp_ns: int, position: Triple, velocity: Triple) -> Arrival:
+    def encoders(self, stamp_ns: int, position: Triple, velocity: Triple) -> Arrival | str:
         """Take wheel angles [rad] and speeds [rad/s], NaN for what a message lacks."""
         arrival = self._arrive(ENCODERS, stamp_ns)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
-            self._encoders.add(EncoderSample(stamp_ns, position, velocity))
+            if not self._encoders.add(EncoderSample(stamp_ns, position, velocity)):
+                self._encoders.continuity.refuse()
+                return "no wheel can turn so far so fast; the sample is ignored"
+        elif arrival is Arrival.REPEATED:
+            self._encoders.continuity.precedes(stamp_ns)
         return arrival
 
-    def power(self, reading: PowerReading) -> Arrival:
-        """Take what a motor or the whole robot draws."""
-        arrival = self._arrive(self._supplies[reading.wheel], reading.stamp_ns)
+    def power(self, reading: PowerReading) -> Arrival | str:
+        """Take what a motor or the whole robot draws; returns why it cannot be, if so."""
+        supply, stamp = reading.wheel, reading.stamp_ns
+        problem = self._limits.problem(reading)
+        if problem is not None:
+            self._flows[supply].refuse()
+            return problem
+        arrival = self._arrive(self._supplies[supply], stamp)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
-            self._windows[reading.wheel].add(reading)
+            self._windows[supply].add(reading)
+            self._flows[supply].take(stamp)
+            if supply != TOTAL:
+                self._repeats[supply].take(stamp, (reading.voltage, reading.current, reading.power))
+        elif arrival is Arrival.REPEATED:
+            self._flows[supply].precedes(stamp)
         return arrival
+
+    def refused(self, topic: str) -> None:
+        """Take note of a message that nothing can be read from."""
+        if topic == ENCODERS:
+            self._encoders.continuity.refuse()
+        for supply, flow in zip(self._supplies, self._flows, strict=True):
+            if topic in (supply, f"{supply}/power") or (
+                topic == ARRAY_TOPIC and supply != TOTAL_TOPIC
+            ):
+                flow.refuse()
 
     def due(self) -> list[ResidualFrame]:
         """Residuals for the ticks that the stamps have reached, in order."""
-        return [self._frame(tick) for tick in self._clock.due()]
+        found = []
+        for tick in self._clock.due():
+            found.append(self._frame(tick))
+            self._health.take(tick, self._inputs(tick, found[-1]), self.settings.hardware_id)
+        return found
+
+    def reports(self) -> list[DiagnosticMessage]:
+        """How the sensors do, as far as it is to be said anew; after `due`."""
+        return self._health.due()
+
+    def _inputs(self, tick: int, frame: ResidualFrame) -> list[InputState]:
+        absent = [self._robot.wheel_names[wheel] for wheel in self._encoders.absent(tick)]
+        without = f"no {', '.join(absent)} among its names" if absent else ""
+        found = [InputState(ENCODERS, self._encoders.continuity, without)]
+        if self._has_motor_power:
+            for wheel, topic in enumerate(self._topics):
+                missing = frame.residuals[MOTORS[wheel]].missing
+                ailment = FROZEN.strip() if missing.endswith(FROZEN) else ""
+                found.append(InputState(f"{topic}/power", self._flows[wheel], ailment))
+        if self._robot.measurement.total == TOTAL_TOPIC:
+            found.append(InputState(TOTAL_TOPIC, self._flows[TOTAL]))
+        return found
 
     def _arrive(self, stream: str, stamp_ns: int) -> Arrival:
         arrival = self._clock.arrive(stream, stamp_ns)
         if arrival is Arrival.RESTARTED:
             for window in self._windows:
                 window.clear()
+            for flow in self._flows:
+                flow.clear()
+            for watch in self._repeats:
+                watch.clear()
             self._encoders.clear()
             self._predictions.clear()
             self._recent.clear()
@@ -117,17 +207,39 @@ class ResidualStage:
         known = self._predictions.pop(tick, None)
         prediction = known or _no_prediction(tick)
         self._recent.append(_Modelled.of(prediction))
-        motors = [window.at(tick) for window in self._windows[:WHEELS]]
         absent = "" if known else "no prediction: is the power_model node running?"
+        speeds = self._speeds(tick, absent)
+        motors = [self._supply(tick, wheel, speeds[wheel]) for wheel in range(WHEELS)]
         return ResidualFrame(
             tick,
             (
                 self._total(tick, motors, absent),
                 *(self._motor(wheel, motors[wheel], absent) for wheel in range(WHEELS)),
-                *self._speeds(tick, absent),
+                *speeds,
                 *(self._derived(wheel, motors[wheel], absent) for wheel in range(WHEELS)),
             ),
         )
+
+    def _supply(self, tick: int, wheel: int, speed: Residual) -> Measured:
+        """What a motor draws, or why that is not known."""
+        measured = self._windows[wheel].at(tick)
+        frozen = self._repeats[wheel].is_frozen(tick, self._work(wheel, speed, measured.unit))
+        if not self._has_motor_power:
+            return Measured(NAN, "W", NOT_MEASURED)
+        missing = f"no fresh {self._topics[wheel]}/power"
+        if measured.value == measured.value:
+            missing = ""
+            if self._flows[wheel].is_broken(tick):
+                missing = f"{GAP}{self._topics[wheel]}/power"
+            if frozen:
+                missing = f"{self._topics[wheel]}/power{FROZEN}"
+        return evolve(measured, value=NAN, missing=missing) if missing else measured
+
+    def _work(self, wheel: int, speed: Residual, unit: Unit) -> Work:
+        asked = abs(speed.modelled)
+        turns = asked > _TURNS or abs(asked + speed.residual) > _TURNS
+        expected = self._recent[-1].of_unit(unit)[wheel]
+        return Work(turns, not speed.code, expected, self._least(unit))
 
     def _total(self, tick: int, motors: list[Measured], absent: str) -> Residual:
         source = self._robot.measurement.total
@@ -142,43 +254,57 @@ class ResidualStage:
             value = self._windows[TOTAL].at(tick).value if source == "battery_state" else NAN
             models = [past.power[WHEELS] for past in self._recent]
             missing = "no fresh battery_state"
+            if value == value and self._flows[TOTAL].is_broken(tick):
+                value, missing = NAN, f"{GAP}{TOTAL_TOPIC}"
         least = self._least(unit) * self.settings.bands.total_factor
         relative = self.settings.bands.total_relative
         return self._residual(value, models, unit, least, missing, absent, relative=relative)
 
     def _motor(self, wheel: int, measured: Measured, absent: str) -> Residual:
         models = [past.of_unit(measured.unit)[wheel] for past in self._recent]
-        missing = f"no fresh {self._topics[wheel]}/power"
         least = self._least(measured.unit)
-        return self._residual(measured.value, models, measured.unit, least, missing, absent)
+        return self._residual(
+            measured.value, models, measured.unit, least, measured.missing, absent
+        )
 
     def _derived(self, wheel: int, measured: Measured, absent: str) -> Residual:
         models = [past.of_unit(measured.unit)[WHEELS + 1 + wheel] for past in self._recent]
-        missing = f"no fresh {self._topics[wheel]}/power"
         least = self._least(measured.unit)
         unmodelled = "no fresh joint_states for the model"
         return self._residual(
-            measured.value, models, measured.unit, least, missing, absent, unmodelled
+            measured.value, models, measured.unit, least, measured.missing, absent, unmodelled
         )
 
     def _speeds(self, tick: int, absent: str) -> list[Residual]:
-        measured = self._encoders.at(tick).speed.tolist()
+        estimate = self._encoders.at(tick)
         bands = self.settings.bands
+        pauses = self._encoders.continuity.is_broken(tick)
+        is_fresh = tick - self._encoders.continuity.last(tick) < self.settings.stale
+        reason = f"{GAP}{ENCODERS}" if pauses and is_fresh else "no fresh joint_states"
+        scatter = self._scatter_of(estimate)
         speeds = []
-        for wheel, value in enumerate(measured):
+        for wheel, value in enumerate(estimate.speed.tolist()):
             models = [past.speed[wheel] for past in self._recent]
             model = models[-1]
             # Against the set direction: "slower than told" is negative whichever way it turns.
             sign = -1.0 if model < 0.0 else 1.0
             spread = bands.speed_transient * _spread(models)
             band = max(bands.speed, bands.speed_relative * abs(model)) + spread
-            missing = _missing(value, model, "no fresh joint_states", absent)
+            if estimate.gain * scatter * max(abs(model), abs(value)) > _UNSURE * band:
+                value, reason = NAN, SCATTER
+            missing = _missing(value, model, reason, absent)
             speeds.append(
                 Residual(
                     rounded(sign * (value - model)), rounded(band), rounded(model), "rad/s", missing
                 )
             )
         return speeds
+
+    def _scatter_of(self, estimate: WheelEstimate) -> float:
+        """How far the times of encoder samples have scattered lately [s]."""
+        if estimate.scatter == estimate.scatter:  # not NaN
+            self._scatter.append(estimate.scatter)
+        return median(self._scatter) if self._scatter else 0.0
 
     def _least(self, unit: Unit) -> float:
         bands = self.settings.bands

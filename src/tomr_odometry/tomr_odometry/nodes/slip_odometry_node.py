@@ -5,7 +5,8 @@ from tomr_odometry.settings import PARAMETERS, OdometrySettings
 from tomr_odometry.topics import OUTPUTS, TF, TF_TOPIC, estimate_messages, odometry_inputs
 from tomr_power_model.errors import InputError
 from tomr_power_model.nodes.command_line import node_arguments
-from tomr_power_model.nodes.stage_node import CMD_VEL_TYPE, TWIST_TYPES, StageNode, run_node
+from tomr_power_model.nodes.stage_node import StageNode, run_node
+from tomr_power_model.robot.parameters import CMD_VEL_TYPE
 
 NODE_PARAMETERS = (*PARAMETERS, CMD_VEL_TYPE)
 
@@ -25,8 +26,7 @@ class SlipOdometryNode(StageNode):
                 raise InputError(
                     f"publish_tf = true: {error}: install tf2_msgs or set it to false"
                 ) from error
-        twist_type = TWIST_TYPES[str(self.values["cmd_vel_type"])]
-        self.listen(odometry_inputs(self._robot, self._core, twist_type), self._advance)
+        self.listen(odometry_inputs(self._robot, self._core), self._advance)
 
     def _advance(self) -> None:
         for estimate in self._core.due():

@@ -4,14 +4,17 @@ The header and the section of `tomr_calibrate` say what was fitted to what, how 
 robot; reading the file as a robot description looks at that robot's identity again.
 """
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from tomr_power_model.errors import one_line
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, Values
 from tomr_power_model.robot import WHEELS, read_sections
 from tomr_power_model.robot.description import split_effect
@@ -64,9 +67,24 @@ def fitted_text(
     changed = ParameterisedRobot(values, str(source)).given(dict(zip(keys, rounded, strict=True)))
     sections[EVERY_NODE] = _own_values_alone(changed.values, parameters)
     sections[CALIBRATION] = {**identity, **provenance}
-    lines = [f"# {line}".rstrip() for line in header]
+    return sections_text(sections, header, comments)
+
+
+def sections_text(
+    sections: Mapping[str, Mapping[str, object]],
+    header: Sequence[str],
+    comments: Mapping[str, str] = MappingProxyType({}),
+) -> str:
+    """Text of a ROS 2 parameter file.
+
+    Args:
+        sections: flat parameters by node.
+        header: lines of comment at the top.
+        comments: behind values of the description, by key.
+    """
+    lines = [f"# {one_line(line)}".rstrip() for line in header]
     for node, flat in sections.items():
-        lines += [f"{node}:", "  ros__parameters:"]
+        lines += [f"{_scalar(node)}:", "  ros__parameters:"]
         lines += _lines(_nested(flat), 4, "", comments if node == EVERY_NODE else {})
     return "\n".join(lines) + "\n"
 
@@ -104,15 +122,19 @@ def _lines(tree: Tree, indent: int, prefix: str, comments: Mapping[str, str]) ->
     lines = []
     for key, value in tree.items():
         name = f"{prefix}{key}"
-        start = f"{' ' * indent}{key}:"
+        start = f"{' ' * indent}{_scalar(key)}:"
         if isinstance(value, dict):
             lines += [start, *_lines(value, indent + 2, name + ".", comments)]
             continue
-        dumped = yaml.safe_dump(_plain(value), default_flow_style=True, width=10_000)
-        text = dumped.partition("\n")[0]
         comment = f"  # {comments[name]}" if name in comments else ""
-        lines.append(f"{start} {text}{comment}")
+        lines.append(f"{start} {_scalar(value)}{comment}")
     return lines
+
+
+def _scalar(value: object) -> str:
+    """A value or a key on one line, quoted where YAML would read something else."""
+    dumped = yaml.safe_dump(_plain(value), default_flow_style=True, width=math.inf)
+    return str(dumped).partition("\n")[0]
 
 
 def _plain(value: object) -> object:

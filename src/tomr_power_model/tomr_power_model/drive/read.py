@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tomr_power_model.drive.dejitter import dejitter, even
 from tomr_power_model.drive.record import Drive
+from tomr_power_model.drive.series import Series
 from tomr_power_model.drive.sources import (
     ENCODER_TOPIC,
     TOTAL,
@@ -17,7 +18,8 @@ from tomr_power_model.drive.sources import (
     motor_topics,
     total_topics,
 )
-from tomr_power_model.errors import InputError
+from tomr_power_model.errors import InputError, one_line
+from tomr_power_model.limits import limits, too_large
 from tomr_power_model.messages.intake import (
     MALFORMED,
     WheelFinder,
@@ -32,50 +34,11 @@ Array = NDArray[np.float64]
 Taker = Callable[[Any, int], None]
 
 _ENCODERS, _COMMANDS, _GYRO = ENCODER_TOPIC, "cmd_vel", "imu/data"
+_AROUND = 60.0  # s before and after the encoders, in which commands count
 _TOGETHER = 2e-4  # s: samples of several supplies that were taken at once
-_CLOCK_SPAN = 10.0  # s, that it takes to compare clocks
 _CLOCK_OFF = 5e-3  # by which two clocks may run apart
+_MOST_KINDS = 20  # of complaints that are told apart
 _NO_CLOCK = 0.1  # simulated time is no clock that is off
-
-
-class _Series:
-    """Rows with rising stamps; one that repeats or goes back is dropped, as the stages do."""
-
-    def __init__(self, width: int) -> None:
-        self._width = width
-        self._stamps: list[int] = []
-        self._received: list[int] = []
-        self._rows: list[tuple[float, ...]] = []
-        self.dropped = 0
-
-    def add(self, stamp_ns: int, receive_ns: int, *row: float) -> None:
-        if stamp_ns <= (self._stamps[-1] if self._stamps else 0):
-            self.dropped += 1
-            return
-        self._stamps.append(stamp_ns)
-        self._received.append(receive_ns)
-        self._rows.append(row)
-
-    def __len__(self) -> int:
-        return len(self._stamps)
-
-    @property
-    def first(self) -> int:
-        return self._stamps[0]
-
-    def since(self, start_ns: int) -> tuple[Array, Array]:
-        """Times [s] since a stamp, and the rows."""
-        seconds = np.float64(1e-9) * (np.array(self._stamps, dtype=np.int64) - start_ns)
-        return seconds, np.array(self._rows, dtype=np.float64).reshape(-1, self._width)
-
-    def fast(self) -> float:
-        """Part by which its clock runs faster than the recorder's; NaN where none can tell."""
-        received = 1e-9 * (np.array(self._received, dtype=np.int64) - self._received[0])
-        stamped = 1e-9 * (np.array(self._stamps, dtype=np.int64) - self._stamps[0])
-        spread = received - received.mean()
-        if min(np.ptp(received), np.ptp(stamped)) < _CLOCK_SPAN:
-            return float("nan")
-        return float(spread @ stamped / (spread @ spread)) - 1.0
 
 
 class _Collector:
@@ -85,10 +48,10 @@ class _Collector:
         self.recording = recording
         self.robot = robot
         self.namespace = namespace
-        self.encoders = _Series(2 * WHEELS)
-        self.supplies = [_Series(3) for _ in range(WHEELS + 1)]  # power, current, voltage
-        self.commands = _Series(3)
-        self.gyro = _Series(1)
+        self.encoders = Series(2 * WHEELS)
+        self.supplies = [Series(3) for _ in range(WHEELS + 1)]  # power, current, voltage
+        self.commands = Series(3)
+        self.gyro = Series(1)
         self.takers: dict[str, list[Taker]] = {}
         self.complaints: dict[str, int] = {}
         self._wheels = WheelFinder(robot.wheel_names)
@@ -118,10 +81,18 @@ class _Collector:
                 try:
                     taker(message, receive_ns)
                 except MALFORMED as error:
-                    problem = f"{topic}: {error}"
-                    self.complaints[problem] = self.complaints.get(problem, 0) + 1
+                    self._complain(f"{topic}: {one_line(error)}")
+        for name, series in self.streams().items():
+            series.finish(f"{self.recording.name}: {name}", jumps=True)
+        # Nobody commands for minutes: that is no jump.
+        self.commands.finish(f"{self.recording.name}: {_COMMANDS}", jumps=False)
 
-    def streams(self) -> Mapping[str, _Series]:
+    def _complain(self, problem: str) -> None:
+        if problem not in self.complaints and len(self.complaints) >= _MOST_KINDS:
+            problem = "further problems of other kinds"
+        self.complaints[problem] = self.complaints.get(problem, 0) + 1
+
+    def streams(self) -> Mapping[str, Series]:
         """The sensors' streams by name; commands come when they like."""
         names = [f"{name}/power" for name in self.robot.wheel_topics]
         named = zip([*names, TOTAL_TOPIC], self.supplies, strict=True)
@@ -170,6 +141,8 @@ def read_drive(path: Path, robot: Robot, namespace: str | None = None) -> Drive:
     notes += [*_clock_notes(path, collector.streams()), *_notes(path, collector)]
     start = collector.encoders.first
     encoder_time, encoders = collector.encoders.since(start)
+    if encoder_time[-1] > limits().drive_seconds:
+        too_large(str(path), f"it lasts {encoder_time[-1]:,.0f} s", "drive_seconds")
     encoder_time, jitters = dejitter(encoder_time, encoders[:, :WHEELS])
     on_grid = even if jitters else np.asarray
     supplies = [series.since(start) for series in collector.supplies]
@@ -188,7 +161,7 @@ def read_drive(path: Path, robot: Robot, namespace: str | None = None) -> Drive:
             for power, row in zip(powers, rows[:TOTAL], strict=True)
         ],
     )
-    command_time, command = collector.commands.since(start)
+    command_time, command = _in_force(*collector.commands.since(start), encoder_time[-1])
     yaw_time, yaw_rate = collector.gyro.since(start)
     if not len(power_time) and not len(times[TOTAL]):
         raise InputError(f"{path}: no power was measured: record the power topics too")
@@ -211,6 +184,12 @@ def read_drive(path: Path, robot: Robot, namespace: str | None = None) -> Drive:
         start_ns=start,
         notes=tuple(notes),
     )
+
+
+def _in_force(time: Array, command: Array, end: float) -> tuple[Array, Array]:
+    """The commands that can have moved the robot: those of another epoch only where all are."""
+    near = (time > -_AROUND) & (time < end + _AROUND)
+    return (time[near], command[near]) if near.any() else (time, command)
 
 
 def _drawn(rows: Array, robot: Robot) -> tuple[Array, bool]:
@@ -236,13 +215,16 @@ def _no_encoders(recording: Recording, robot: Robot, collector: _Collector) -> s
 
 def _notes(path: Path, collector: _Collector) -> list[str]:
     notes = [f"{path}: {text} ({count} messages)" for text, count in collector.complaints.items()]
-    dropped = sum(series.dropped for series in (collector.encoders, *collector.supplies))
+    series = (collector.encoders, *collector.supplies)
+    dropped, strays = sum(one.dropped for one in series), sum(one.strays for one in series)
     if dropped:
         notes.append(f"{path}: {dropped} samples repeat or precede an earlier stamp: left out")
+    if strays:
+        notes.append(f"{path}: {strays} samples are stamped far from all others: left out")
     return notes
 
 
-def _clock_notes(path: Path, streams: Mapping[str, _Series]) -> list[str]:
+def _clock_notes(path: Path, streams: Mapping[str, Series]) -> list[str]:
     """What to say of a clock that all sensors share. Raises InputError where they have several."""
     fast = {name: series.fast() for name, series in streams.items() if len(series) > 1}
     known = {name: value for name, value in fast.items() if abs(value) < _NO_CLOCK}

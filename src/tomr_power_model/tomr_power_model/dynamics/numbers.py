@@ -7,7 +7,6 @@ from functools import lru_cache
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.contacts import SLIDING_PARTS
@@ -230,7 +229,7 @@ def _discretise(p: Array, records: Array, geometry: Geometry, timing: Timing) ->
     body = p[at.INERTIA : at.INERTIA + 9].reshape(3, 3)
     inertia = body + roll.T @ (axle[:, None] * roll)
     # With V of D V = M V Lambda, V^T M V = 1: E = V e^(-h Lambda) V^T M, G likewise.
-    rates, shapes = eigh(roll.T @ (damping[:, None] * roll), inertia)
+    rates, shapes = _modes(roll.T @ (damping[:, None] * roll), inertia)
     rates = np.maximum(rates, 0.0)
     held = np.where(rates * h > 1e-12, -np.expm1(-h * rates) / np.maximum(rates, 1e-300), h)
     gain = (shapes * held) @ shapes.T
@@ -245,6 +244,16 @@ def _discretise(p: Array, records: Array, geometry: Geometry, timing: Timing) ->
     # Row r of the coupling: what the force of row r does to every rate.
     p[first : first + 4 * n * n] = (rows @ moves).T.ravel()
     _discretise_sliding(p, records, geometry, h / SLIDING_PARTS)
+
+
+def _modes(damping: Array, inertia: Array) -> tuple[Array, Array]:
+    """Rates [1/s] and modes V of damping V = inertia V diag(rates), V^T inertia V = 1.
+
+    By Cholesky, as scipy.linalg.eigh does it, which takes a node longer to import than to start.
+    """
+    back = np.linalg.inv(np.linalg.cholesky(inertia))
+    rates, shapes = np.linalg.eigh(back @ damping @ back.T)
+    return rates, back.T @ shapes
 
 
 def _discretise_sliding(p: Array, records: Array, geometry: Geometry, part: float) -> None:

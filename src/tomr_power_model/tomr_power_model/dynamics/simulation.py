@@ -242,15 +242,26 @@ def worker_count() -> int:
     return max(1, int(given)) if given.isdecimal() else len(os.sched_getaffinity(0))
 
 
-def drive(variant: Variant, excitation: Excitation, wheels: int = 3) -> Steps:
-    """All that happens to one variant in a drive."""
+def drive(
+    variant: Variant,
+    excitation: Excitation,
+    wheels: int = 3,
+    changes: Sequence[tuple[int, Array]] = (),
+) -> Steps:
+    """All that happens to one variant in a drive.
+
+    `changes`: periods, rising, from which on other numbers of the robot hold, of the same drivers.
+    """
     job, dynamics = _Job(excitation, wheels), compiled()
     steps = int(variant.numbers[at.SUBSTEPS])
     out = np.empty((len(excitation.inputs), steps * at.output_size(wheels)))
-    state, scratch = job.state(), job.scratch()
-    numbers, extra = variant.numbers, job.resisting(variant)
-    dynamics.begin(numbers, state, scratch[1], scratch[2], wheels)
-    dynamics.run(numbers, state, excitation.inputs, extra, variant.late, out, scratch[0], wheels)
+    state, scratch, extra = job.state(), job.scratch(), job.resisting(variant)
+    dynamics.begin(variant.numbers, state, scratch[1], scratch[2], wheels)
+    starts = [0, *(start for start, _ in changes), len(out)]
+    parts = (variant.numbers, *(numbers for _, numbers in changes))
+    for numbers, start, end in zip(parts, starts, starts[1:], strict=False):
+        inputs, own = excitation.inputs[start:end], extra[start:end]
+        dynamics.run(numbers, state, inputs, own, variant.late, out[start:end], scratch[0], wheels)
     return Steps.of(out, wheels)
 
 

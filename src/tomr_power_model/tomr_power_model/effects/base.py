@@ -10,7 +10,6 @@ Laws are plain scalar functions of the parameters, in the order of `parameters`,
 numba compiles them as they stand. They must not use anything but arithmetic and `math`.
 """
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Literal, NamedTuple
 
@@ -38,12 +37,11 @@ class Wheel(NamedTuple):
 
 @frozen
 class EffectParameter:
-    """One number of an effect."""
+    """One number of an effect, within what a robot on wheels can have."""
 
     unit: str
     minimum: float = 0.0
-    maximum: float = math.inf
-    above: float = -math.inf
+    maximum: float = 1e3
     default: float | None = None  # where a description leaves it out; None: must be given
     neutral: float = 0.0  # with which the effect does nothing, where that is its doing
     start: float = 0.0  # of a fit to a description without the effect
@@ -63,6 +61,8 @@ class HypothesisPrior:
     shapes: Callable[[Scales], Sequence[Mapping[str, float]]] = _no_shape
     sign: int = 1  # of the permitted side of the sizes; 0: both
     least: Size = lambda scales: 0.0  # size below which sampling cannot tell it from none
+    stands_for: int = 1  # effects whose work it does alone: it must bring the evidence of as many
+    log_prior: float = 0.0  # against the usual effects
 
 
 @define

@@ -18,7 +18,6 @@ from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
 Array = NDArray[np.float64]
 Values = Mapping[str, object]
 
-_TINY = 1e-9  # an exclusive bound, seen from the permitted side
 _CENTER, _AXES = "robot.mass_center", ("x", "y", "z")
 
 
@@ -159,7 +158,7 @@ def bounds_of(key: str) -> tuple[float, float]:
     described = effect_parameter(key) or _fixed(key)
     if described is None:
         return -math.inf, math.inf
-    return max(described.minimum, described.above + _TINY), described.maximum
+    return described.minimum, described.maximum
 
 
 def unit_of(key: str) -> str:

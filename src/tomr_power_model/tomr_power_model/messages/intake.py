@@ -16,6 +16,22 @@ NAN = float("nan")
 _UNKNOWN = (NAN, NAN, NAN)
 
 
+@frozen
+class Largest:
+    """What no sensor of a robot on wheels gives: more is damage, and no sample."""
+
+    angle: float = 1e9  # rad
+    speed: float = 1e5  # rad/s
+    current: float = 1e5  # A
+    voltage: float = 1e5  # V
+    power: float = 1e7  # W
+    twist: float = 1e3  # m/s or rad/s
+    yaw_rate: float = 1e3  # rad/s
+
+
+LARGEST = Largest()
+
+
 class Unusable(ValueError):
     """A message that says nothing usable, and why."""
 
@@ -48,16 +64,15 @@ def twist_of(message: Any) -> Triple:
     """v_x, v_y [m/s], omega_z [rad/s] of a Twist or TwistStamped."""
     twist = getattr(message, "twist", message)
     values = (float(twist.linear.x), float(twist.linear.y), float(twist.angular.z))
-    if not all(math.isfinite(value) for value in values):
-        raise Unusable("the twist is not finite")
+    for value in values:
+        _check(value, LARGEST.twist, "the twist")
     return values
 
 
 def yaw_rate_of(message: Any) -> float:
     """Yaw rate of an Imu [rad/s]."""
     rate = float(message.angular_velocity.z)
-    if not math.isfinite(rate):
-        raise Unusable("the yaw rate is not finite")
+    _check(rate, LARGEST.yaw_rate, "the yaw rate")
     return rate
 
 
@@ -93,9 +108,9 @@ class WheelFinder:
             raise Unusable(f"none of {', '.join(self._wheels)} is there, but {found}")
         count = len(names)
         self._found = Wheels(
-            self._pick(message.position, count, "position"),
-            self._pick(message.velocity, count, "velocity"),
-            self._pick(message.effort, count, "effort"),
+            self._pick(message.position, count, "position", LARGEST.angle),
+            self._pick(message.velocity, count, "velocity", LARGEST.speed),
+            self._pick(message.effort, count, "effort", LARGEST.current),
         )
         self._last = message
         return self._found
@@ -111,7 +126,7 @@ class WheelFinder:
         )
         self._missing = tuple(wheel for wheel in self._wheels if wheel not in names)
 
-    def _pick(self, values: Sequence[float], count: int, field: str) -> Triple:
+    def _pick(self, values: Sequence[float], count: int, field: str, largest: float) -> Triple:
         if len(values) == 0:
             return _UNKNOWN
         if len(values) != count:
@@ -122,27 +137,36 @@ class WheelFinder:
         first = NAN if a is None else plain[a]
         second = NAN if b is None else plain[b]
         third = NAN if c is None else plain[c]
-        if math.isfinite(first + second + third):
+        if abs(first) <= largest and abs(second) <= largest and abs(third) <= largest:
             return first, second, third
-        return _finite(first), _finite(second), _finite(third)
+        return _within(first, largest), _within(second, largest), _within(third, largest)
 
 
-def _finite(value: float) -> float:
+def _check(value: float, largest: float, what: str) -> None:
+    if not math.isfinite(value):
+        raise Unusable(f"{what} is not finite")
+    if abs(value) > largest:
+        raise Unusable(f"{what} is {value:g}, more than can be")
+
+
+def _within(value: float, largest: float) -> float:
+    """The value, NaN where a sensor cannot have measured it."""
     number = float(value)
-    return number if math.isfinite(number) else NAN
+    return number if abs(number) <= largest else NAN
 
 
 def battery_of(message: Any) -> tuple[float, float]:
     """Voltage [V], NaN if unknown, and current [A], negative while drawing."""
     voltage, current = float(message.voltage), float(message.current)
-    if not math.isfinite(current):
-        raise Unusable("the current is not finite")
-    return (voltage if math.isfinite(voltage) else NAN), current
+    _check(current, LARGEST.current, "the current")
+    if not math.isnan(voltage):
+        _check(voltage, LARGEST.voltage, "the voltage")
+    return voltage, current
 
 
 def numbers_of(message: Any, least: int) -> tuple[float, ...]:
     """Numbers of a Float64MultiArray, at least so many."""
-    values = tuple(_finite(value) for value in message.data)
+    values = tuple(_within(value, LARGEST.power) for value in message.data)
     if len(values) < least:
         raise Unusable(f"{len(values)} values, needs {least}")
     return values

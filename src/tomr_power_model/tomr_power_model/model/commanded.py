@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.simulation import Simulation, State
 from tomr_power_model.dynamics.vehicle import vehicle_of
+from tomr_power_model.geometry.kinematics import wheels_to_twist
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import Robot
+from tomr_power_model.unmodelled.online import NOTHING, OnlineTerms
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -105,6 +107,11 @@ class CommandPath:
 
     def __init__(self, robot: Robot, timing: CommandTiming, *, is_compiled: bool = False) -> None:
         self._simulation = Simulation(vehicle_of(robot), is_compiled=is_compiled)
+        self._terms = (
+            OnlineTerms(robot.unmodelled, wheels_to_twist(robot), 1e-9 * timing.period)
+            if robot.unmodelled
+            else None
+        )
         self._step = to_ns(self._simulation.period_s)
         self._part = self._step // self._simulation.steps
         self._timing = timing
@@ -121,6 +128,10 @@ class CommandPath:
         self._next = 0  # when the next period begins [ns]
         self._taken = 0  # commands
         self.motion = SimulatedMotion()
+        self.besides = NOTHING  # what learnt terms do in the last tick
+        self._flowing: Sequence[float] = (0.0, 0.0, 0.0)  # currents of its last step [A]
+        if self._terms is not None:
+            self._terms.clear()
         resting = [0.0] * self._simulation.wheels
         self._means = resting, resting, float(self._simulation.numbers[at.VOLTAGE])
 
@@ -144,6 +155,7 @@ class CommandPath:
             return None
         assert self.state is not None
         self._see(seen)
+        self._resist(seen)
         edge = tuple(self.wheel(at.SPEED))
         starts: list[int] = []
         rows: list[list[float]] = []
@@ -153,7 +165,7 @@ class CommandPath:
             out = self._simulation.advance(self.state, self._inputs)
             for k in range(self._simulation.steps):
                 starts.append(self._next + k * self._part)
-                rows.append(out[k * width : (k + 1) * width])
+                rows.append(self._with_drawn(out[k * width : (k + 1) * width]))
             self._see(None)
             self._next += self._step
             self.motion.add(self._next, *self._standing())
@@ -176,6 +188,24 @@ class CommandPath:
         begin = tick_ns - self._timing.period
         self._next = first + -(-(begin - first - self._step // 2) // self._step) * self._step
         return True
+
+    def _resist(self, seen: Seen) -> None:
+        """Learnt terms resist in all periods of the tick as the motion at its start asks."""
+        if self._terms is None:
+            return
+        angle, heading = self.wheel(at.ANGLE), seen.heading
+        self.besides = self._terms.over(self.wheel(at.SPEED), self._flowing, angle, heading)
+        for wheel, torque in enumerate(self.besides.torque):
+            place = at.INPUT_HEADER + wheel * at.INPUT_WHEEL + at.RESISTING
+            self._inputs[place] = torque
+
+    def _with_drawn(self, row: list[float]) -> list[float]:
+        """A step's outputs with what learnt terms draw."""
+        if self._terms is not None:
+            self._flowing = row[at.OUT_HEADER + at.OUT_CURRENT :: at.OUT_WHEEL]
+            for wheel, power in enumerate(self.besides.driver):
+                row[at.OUT_HEADER + wheel * at.OUT_WHEEL + at.OUT_POWER] += power
+        return row
 
     def _standing(self) -> tuple[list[float], list[float]]:
         return self.wheel(at.TURNED), self.wheel(at.SPEED)

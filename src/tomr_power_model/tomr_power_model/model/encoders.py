@@ -1,5 +1,6 @@
 """Speed and acceleration of the wheels from encoder samples of the last moments."""
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from functools import lru_cache
@@ -7,10 +8,11 @@ from itertools import compress
 from typing import Protocol
 
 import numpy as np
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.drive.dejitter import Grid, grid_of, is_jitter
+from tomr_power_model.model.continuity import ENCODER_TOLERANCE, Continuity
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -19,6 +21,10 @@ _LEAST = 50
 _EVERY = 25  # samples: how often
 LONG_S = 0.2  # of the fit beside a simulation
 _FIT = 5  # samples that it takes
+_FREE = 2  # more samples than unknowns, to tell how they scatter
+_MOVING = 1.0  # rad/s of the fastest wheel, likewise
+_LEEWAY = 0.05  # s that a stamp may be late: angles that no motor reaches till then are bad
+_NEW_ZERO = 3  # such angles in a row are those of an encoder that counts from elsewhere
 UNKNOWN: Triple = (float("nan"), float("nan"), float("nan"))
 
 
@@ -38,6 +44,8 @@ class WheelEstimate:
     speed: Array  # rad/s
     acceleration: Array  # rad/s^2
     angle: Array = field(factory=lambda: np.full(3, np.nan))  # rad
+    scatter: float = math.nan  # of the samples' times about the fit [s], NaN where it does not show
+    gain: float = 0.0  # standard deviation of the speed over that of the angles [1/s]
 
 
 UNKNOWN_MOTION = WheelEstimate(np.full(3, np.nan), np.full(3, np.nan))
@@ -97,25 +105,59 @@ class EncoderWindow:
 
     Least squares over the samples in (t - span, t]: positions by p + v s + a s^2 / 2, or, where a
     robot gives no positions, velocities by v + a s; evaluated at t - period / 2. Stamps that only
-    jitter are put on their grid first.
+    jitter are put on their grid first. Around a gap nothing is known, and no fit spans one.
     """
 
-    def __init__(self, span_ns: int, period_ns: int, stale_ns: int) -> None:
+    def __init__(
+        self, span_ns: int, period_ns: int, stale_ns: int, fastest: float = math.inf
+    ) -> None:
+        """Times in nanoseconds; `fastest` that a wheel can turn [rad/s]."""
         self._span = span_ns
         self._period = period_ns
         self._stale = stale_ns
+        self._fastest = fastest
         self._samples: deque[EncoderSample] = deque()
         self._stamps = RecentStamps()
+        self.continuity = Continuity(ENCODER_TOLERANCE)
+        self._leaps = 0
 
     def clear(self) -> None:
         """Forget all samples."""
         self._samples.clear()
         self._stamps = RecentStamps()
+        self.continuity.clear()
+        self._leaps = 0
 
-    def add(self, sample: EncoderSample) -> None:
-        """Take a sample newer than those before."""
+    def add(self, sample: EncoderSample) -> bool:
+        """Take a sample newer than those before; returns whether it can be true."""
+        if self._leaps_to(sample):
+            self._leaps += 1
+            if self._leaps < _NEW_ZERO:
+                return False
+            self.continuity.restart(sample.stamp_ns)
+        self._leaps = 0
         self._samples.append(sample)
         self._stamps.add(sample.stamp_ns, sample.position)
+        self.continuity.take(sample.stamp_ns)
+        return True
+
+    def absent(self, tick_ns: int) -> list[int]:
+        """Wheels of which the newest message up to a tick says nothing."""
+        for sample in reversed(self._samples):
+            if sample.stamp_ns <= tick_ns:
+                pairs = zip(sample.position, sample.velocity, strict=True)
+                return [wheel for wheel, (p, v) in enumerate(pairs) if p != p and v != v]  # NaN
+        return []
+
+    def _leaps_to(self, sample: EncoderSample) -> bool:
+        """Whether no wheel can have turned so far since the last sample, or turns so fast."""
+        if _exceeds(sample.velocity, (0.0, 0.0, 0.0), self._fastest):
+            return True
+        if not self._samples:
+            return False
+        last = self._samples[-1]
+        furthest = self._fastest * (1e-9 * (sample.stamp_ns - last.stamp_ns) + _LEEWAY)
+        return _exceeds(sample.position, last.position, furthest)
 
     def at(self, tick_ns: int) -> WheelEstimate:
         """Estimate for the window that ends at a tick; NaN if its samples are missing or stale."""
@@ -151,12 +193,15 @@ class EncoderWindow:
 
     def _until(self, tick_ns: int, span: int | None = None) -> list[EncoderSample]:
         """Samples of the window, and the two newest where encoders are slower than it."""
+        if self.continuity.is_broken(tick_ns):
+            return []
         oldest = tick_ns - (self._span if span is None else span)
+        joined = self.continuity.resumed
         while len(self._samples) > 2 and self._samples[1].stamp_ns <= tick_ns - self._stale:
             self._samples.popleft()
         window: list[EncoderSample] = []
         for sample in reversed(self._samples):
-            if len(window) > 2 and sample.stamp_ns <= oldest:
+            if sample.stamp_ns < joined or (len(window) > 2 and sample.stamp_ns <= oldest):
                 break
             if sample.stamp_ns <= tick_ns:
                 window.append(sample)
@@ -190,13 +235,29 @@ class EncoderWindow:
         return WheelEstimate(speed, acceleration, angle)
 
 
+def _exceeds(values: Triple, others: Triple, most: float) -> bool:
+    """Whether any two differ by more; NaN differs by nothing. Written out: it is asked often."""
+    (a, b, c), (x, y, z) = values, others
+    return abs(a - x) > most or abs(b - y) > most or abs(c - z) > most
+
+
 def _chosen(times: tuple[int, ...], which: NDArray[np.bool_]) -> tuple[int, ...]:
     return tuple(compress(times, which))
 
 
 def _from_positions(times: tuple[int, ...], positions: Array) -> WheelEstimate:
-    shape = _weights(times, 2) @ (positions - positions[0])
-    return WheelEstimate(shape[1], 2.0 * shape[2], positions[0] + shape[0])
+    weights = _weights(times, 2)
+    shape = weights @ (positions - positions[0])
+    gain = math.sqrt(float((weights[1] ** 2).sum()))
+    estimate = WheelEstimate(shape[1], 2.0 * shape[2], positions[0] + shape[0], gain=gain)
+    free = len(times) - 3
+    if free < _FREE or not float(np.abs(shape[1]).max()) > _MOVING:
+        return estimate
+    powers = (1e-9 * np.array(times))[:, None] ** np.arange(3)
+    rest = positions - positions[0] - powers @ shape
+    # All wheels are read at once: what scatters is when.
+    scatter = math.sqrt(float((rest**2).sum() / (free * (shape[1] ** 2).sum())))
+    return evolve(estimate, scatter=scatter)
 
 
 @lru_cache(maxsize=64)

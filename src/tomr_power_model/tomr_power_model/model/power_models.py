@@ -18,6 +18,7 @@ from tomr_power_model.model.means import Means
 from tomr_power_model.model.trace import Monitor, Trace, Value
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_power_model.robot.parameters import ParameterSpec
+from tomr_power_model.unmodelled.online import NOTHING, Besides
 from tomr_power_model.wang2024 import WANG2024_PARAMETERS, Coefficients, Wang2024Model
 
 _PARTS = 10  # of a tick, where torque ripples with the wheels' angles
@@ -69,6 +70,7 @@ class MeasuredMotion:
     rise: Sequence[float]  # of the windings above 25 C [K]
     held: Sequence[float]  # voltage of a driver whose wheel is at rest [V]; NaN: not known
     offset: float = 0.0  # how much later than the middle the power was measured [s]
+    besides: Besides = NOTHING  # what learnt terms do
 
 
 class TickPower(Protocol):
@@ -205,10 +207,13 @@ class Physical:
             speed, change = motion.speed[wheel], motion.acceleration[wheel]
             angle = motion.angle[wheel] + instant * (speed + 0.5 * change * instant)
             rise, held = motion.rise[wheel], motion.held[wheel]
-            row += [speed + change * instant, change, angle, 0.0, rise, held]
+            resisting = motion.besides.torque[wheel]
+            row += [speed + change * instant, change, angle, resisting, rise, held]
         found = self._made([0.0] * (WHEELS * at.POWER_WHEEL))
         self._step.drive_power(self._numbers, self._made(row), found, WHEELS)
         out = as_list(found)
+        for wheel, power in enumerate(motion.besides.driver):
+            out[wheel * at.POWER_WHEEL + at.POWER_DRAWN] += power
         return [out[first : first + 4] for first in range(0, len(out), at.POWER_WHEEL)]
 
 

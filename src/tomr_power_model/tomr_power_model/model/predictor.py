@@ -8,12 +8,15 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
+from tomr_power_model.drive.plausible import fastest_wheel
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.body import Body
 from tomr_power_model.dynamics.vehicle import plant_numbers, vehicle_of
 from tomr_power_model.effects import EFFECTS
+from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.readings import NAN, UNKNOWN_READING, SupplyReading
 from tomr_power_model.model.commanded import Commanded, CommandPath, CommandTiming, Seen
+from tomr_power_model.model.continuity import COMMAND_TOLERANCE, Continuity
 from tomr_power_model.model.encoders import (
     UNKNOWN,
     UNKNOWN_MOTION,
@@ -22,6 +25,7 @@ from tomr_power_model.model.encoders import (
     Triple,
     WheelEstimate,
 )
+from tomr_power_model.model.input_health import InputReporter, InputState
 from tomr_power_model.model.means import Means
 from tomr_power_model.model.monitors import Monitors
 from tomr_power_model.model.power_models import POWER_MODELS, MeasuredMotion, Windows
@@ -60,7 +64,11 @@ class PowerPredictor:
         timing = CommandTiming(given.ticks.period, given.command_timeout, given.stale)
         self._path = CommandPath(robot, timing, is_compiled=is_compiled)
         self._resting = RestingDrivers(robot.controller, WHEELS)
-        self._encoders = EncoderWindow(given.encoder_window, given.ticks.period, given.stale)
+        self._encoders = EncoderWindow(
+            given.encoder_window, given.ticks.period, given.stale, fastest_wheel(robot)
+        )
+        self._commands = Continuity(COMMAND_TOLERANCE)
+        self._health = InputReporter()
         self._window = to_ns(robot.sensors.power_window)
         self._reads_motor = robot.measurement.quantity == "motor_current"
         numbers = plant_numbers(vehicle_of(robot))
@@ -77,6 +85,7 @@ class PowerPredictor:
         self._path.clear()
         self._resting.clear()
         self._encoders.clear()
+        self._commands.clear()
         self._gyro: tuple[int, float] | None = None
         self._heading = 0.0  # at the start of the next tick, against the first [rad]
         self._model.clear()
@@ -89,6 +98,9 @@ class PowerPredictor:
         arrival = self._arrive(COMMANDS, stamp_ns, periodic=False)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
             self._path.command(stamp_ns, twist)
+            self._commands.take(stamp_ns)
+        elif arrival is Arrival.REPEATED:
+            self._commands.precedes(stamp_ns)
         return arrival
 
     def encoders(self, stamp_ns: int, position: Triple, velocity: Triple) -> Arrival:
@@ -96,6 +108,8 @@ class PowerPredictor:
         arrival = self._arrive(ENCODERS, stamp_ns)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
             self._encoders.add(EncoderSample(stamp_ns, position, velocity))
+        elif arrival is Arrival.REPEATED:
+            self._encoders.continuity.precedes(stamp_ns)
         return arrival
 
     def imu(self, stamp_ns: int, yaw_rate: float) -> Arrival:
@@ -114,7 +128,16 @@ class PowerPredictor:
 
     def due(self) -> list[Prediction]:
         """Predictions for the ticks that the stamps have reached, in order."""
-        return [self._predict(tick) for tick in self._clock.due()]
+        found = []
+        for tick in self._clock.due():
+            found.append(self._predict(tick))
+            commands = InputState(COMMANDS, self._commands, is_optional=True)
+            self._health.take(tick, (commands,), self.settings.hardware_id)
+        return found
+
+    def reports(self) -> list[DiagnosticMessage]:
+        """How the commands come, as far as it is to be said anew; after `due`."""
+        return self._health.due()
 
     def _arrive(self, stream: str, stamp_ns: int, periodic: bool = True) -> Arrival:
         arrival = self._clock.arrive(stream, stamp_ns, periodic)
@@ -147,11 +170,12 @@ class PowerPredictor:
             rise,
             held,
             windows.offset_s,
+            self._path.besides,
         )
         self._heading += turned
         measured = self._model.measured(motion)
         from_encoders = self._readings(self._where_known(measured, motion), self._measured)
-        if commanded is None:
+        if commanded is None or self._is_silent(tick, commanded, speed):
             return Prediction(tick, UNKNOWN, UNKNOWN, _UNKNOWN, UNKNOWN_READING, from_encoders)
         means = self._model.commanded(commanded, windows)
         return Prediction(
@@ -162,6 +186,22 @@ class PowerPredictor:
             total=self._total(means),
             from_encoders=from_encoders,
         )
+
+    def _is_silent(self, tick: int, commanded: Commanded, speed: Sequence[float]) -> bool:
+        """Whether the commands paused lately, so that what the robot was told is not known.
+
+        After `command_timeout` it was told to stop; that it stands as it should ends the doubt.
+        Without a timeout commands may come when they change only, and no silence means anything.
+        """
+        timeout = self.settings.command_timeout
+        if not timeout:
+            return False
+        silent = self._commands.is_broken(tick)
+        stands = all(abs(value) < _RESTS for value in (*commanded.speed, *speed))
+        if silent and stands and tick - self._commands.last(tick) > timeout:
+            self._commands.excuse(tick)
+            return False
+        return silent
 
     @staticmethod
     def _moved(estimate: WheelEstimate, seconds: float) -> list[float]:
@@ -256,7 +296,7 @@ class PowerPredictor:
             voltage = self._robot.supply.nominal_voltage
             return SupplyReading.rounded(voltage, sum(means.at_motor) / voltage)
         auxiliary = self._robot.supply.auxiliary_power if means.other is None else means.other
-        power = means.total + auxiliary
+        power = means.total + auxiliary + self._path.besides.supply
         voltage = self._bus_voltage(means, power)
         return SupplyReading.rounded(voltage, power / voltage)
 

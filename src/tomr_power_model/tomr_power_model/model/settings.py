@@ -7,7 +7,12 @@ from attrs import field, frozen
 
 from tomr_power_model.model.power_models import POWER_MODELS, own_parameters
 from tomr_power_model.model.ticks import TickSettings, to_ns
-from tomr_power_model.robot.parameters import ParameterSpec
+from tomr_power_model.robot.parameters import (
+    CMD_VEL_TYPE,
+    HARDWARE_ID,
+    NAMELESS,
+    ParameterSpec,
+)
 
 _S = ParameterSpec
 TICK_PARAMETERS: tuple[ParameterSpec, ...] = (
@@ -19,16 +24,18 @@ TICK_PARAMETERS: tuple[ParameterSpec, ...] = (
 )
 MODEL_PARAMETERS: tuple[ParameterSpec, ...] = (
     *TICK_PARAMETERS,
+    HARDWARE_ID,
     _S("encoder_window", "span of the fit to the encoders", "float", 0.07, "s", 0.01, 1.0),
     _S(
         "command_timeout",
-        "a command this old counts as a stop; 0: it is held",
+        "a command this old counts as a stop; 0: it is held, and may come on a change only",
         "float",
-        0.0,
+        0.5,
         "s",
         0.0,
         60.0,
     ),
+    CMD_VEL_TYPE,
     _S("use_imu", "take the yaw rate from imu/data", "bool", False),
     _S(
         "power_model",
@@ -62,9 +69,10 @@ class ModelSettings:
     ticks: TickSettings = field(factory=TickSettings)
     stale: int = to_ns(0.5)
     encoder_window: int = to_ns(0.07)
-    command_timeout: int = 0
+    command_timeout: int = to_ns(0.5)
     use_imu: bool = False
     power_model: str = "physical"
+    hardware_id: str = NAMELESS
     model_values: Mapping[str, object] = field(factory=dict)  # of the models' own parameters
 
     @classmethod
@@ -77,5 +85,6 @@ class ModelSettings:
             command_timeout=to_ns(cast(float, values["command_timeout"])),
             use_imu=bool(values["use_imu"]),
             power_model=str(values["power_model"]),
+            hardware_id=str(values["hardware_id"]) or NAMELESS,
             model_values={spec.name: values[spec.name] for spec in own_parameters()},
         )

@@ -32,6 +32,7 @@ class TickSettings:
     settle: int = to_ns(0.02)
     patience: int = to_ns(0.25)
     gap: int = to_ns(1.0)  # a longer silence or a jump starts the stage afresh
+    phase: int = 0  # by which the grid is shifted
 
 
 Sample = TypeVar("Sample", bound=tuple[int, *tuple[float, ...]])  # stamp [ns] and values
@@ -99,8 +100,8 @@ class TickClock:
         self._newest = {stream: stamp_ns}
         self._periodic = {stream} if periodic else set()
         self._watermark = self._resumed = stamp_ns
-        period = self.settings.period
-        self._next = (stamp_ns // period + 1) * period
+        period, phase = self.settings.period, self.settings.phase
+        self._next = ((stamp_ns - phase) // period + 1) * period + phase
 
     def due(self) -> Sequence[int]:
         """Stamps of the ticks that can be decided now, in order."""

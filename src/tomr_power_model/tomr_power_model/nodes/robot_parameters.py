@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from attrs import evolve
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -17,10 +18,20 @@ from rclpy.parameter import Parameter
 from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import Robot, robot_from_parameters
+from tomr_power_model.robot.description import effect_spec
 from tomr_power_model.robot.parameters import ParameterSpec, Value
 from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
 
-GROUPS = ("robot", "motor", "controller", "supply", "physics", "sensors", "measurement")
+GROUPS = (
+    "robot",
+    "motor",
+    "controller",
+    "supply",
+    "physics",
+    "sensors",
+    "measurement",
+    "unmodelled",
+)
 _ROS_OWN = ("use_sim_time", "qos_overrides", "start_type_description_service")
 
 
@@ -88,29 +99,26 @@ def declare_robot(node: Node) -> Robot:
 def _spec_of(name: str, wheels: tuple[str, str, str]) -> ParameterSpec | None:
     """What is known of a parameter that only some robots have."""
     key = name.rpartition(".")[2]
-    for effect_id, effect in EFFECTS.items():
+    for effect_id in EFFECTS:
         if name.startswith(f"physics.{effect_id}."):
-            bounds = effect.parameters[key]
-            return ParameterSpec(
-                name,
-                f"of {effect_id}",
-                unit=bounds.unit,
-                minimum=bounds.minimum,
-                maximum=bounds.maximum,
-                above=bounds.above,
-            )
+            return effect_spec(effect_id, key, name)
     for wheel in wheels:
         if name.startswith(f"motor.{wheel}."):
             spec = next(s for s in MOTOR_PARAMETERS if s.name == f"motor.{key}")
-            return ParameterSpec(name, spec.description, unit=spec.unit, above=spec.above)
+            return evolve(spec, name=name)
     return None
 
 
-def declare_specs(node: Node, specs: Iterable[ParameterSpec]) -> dict[str, Value]:
-    """Declare a node's own parameters; returns their checked values by name."""
+def declare_specs(
+    node: Node, specs: Iterable[ParameterSpec], fallback: Mapping[str, object] | None = None
+) -> dict[str, Value]:
+    """Declare a node's own parameters; returns their checked values by name.
+
+    `fallback`: values of parameters that are not given to the node, in place of their defaults.
+    """
     table = {spec.name: spec for spec in specs}
     place = node.get_name()
-    given = given_parameters(node)
+    given = {**(fallback or {}), **given_parameters(node)}
     values: dict[str, Value] = {}
     for name, spec in table.items():
         if name not in given and spec.default is None:

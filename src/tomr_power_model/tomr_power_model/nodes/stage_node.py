@@ -2,15 +2,18 @@
 
 import signal
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import rclpy
+from attrs import evolve
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -18,11 +21,12 @@ from rclpy.signals import SignalHandlerOptions
 
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_OK
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.outgoing import TYPES, Outgoing
+from tomr_power_model.messages.outgoing import TYPES, DiagnosticMessage, Outgoing
 from tomr_power_model.messages.plain import Plain, build
-from tomr_power_model.messages.types import TWIST, TWIST_STAMPED
+from tomr_power_model.nodes.command_type import CommandType
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
-from tomr_power_model.robot.parameters import ParameterSpec, Value
+from tomr_power_model.robot import Robot
+from tomr_power_model.robot.parameters import NAMELESS, ParameterSpec, Value
 from tomr_power_model.topics.inputs import Complaints, Input
 
 # Sensors are best effort: a late sample is worth less than the next one. The depth bridges the
@@ -32,21 +36,20 @@ STAGE_QOS = QoSProfile(depth=500, reliability=ReliabilityPolicy.RELIABLE)
 
 _SIGNAL_CHECK_S = 0.2  # the longest that a signal waits while no message comes
 
-CMD_VEL_TYPE = ParameterSpec(
-    "cmd_vel_type",
-    "message type of cmd_vel; a Twist counts from when it arrives",
-    "str",
-    "twist_stamped",
-    choices=("twist_stamped", "twist"),
-)
-TWIST_TYPES = {"twist_stamped": TWIST_STAMPED, "twist": TWIST}
-
 
 @cache
 def message_class(type_name: str) -> Any:
-    """The Python class of a message type such as sensor_msgs/msg/JointState."""
-    package, _, name = type_name.split("/")
-    return getattr(import_module(f"{package}.msg"), name)
+    """The Python class of a message type such as sensor_msgs/msg/JointState.
+
+    The name may come from a recording: what is no package of messages is not imported. Raises
+    ImportError, AttributeError or ValueError.
+    """
+    package, kind, name = type_name.split("/")
+    found = find_spec(package) if package.isidentifier() else None
+    folders = (found.submodule_search_locations or ()) if found else ()
+    if kind != "msg" or not any(Path(folder, kind).is_dir() for folder in folders):
+        raise ImportError(f"no messages of {package!r} are installed")
+    return getattr(import_module(f"{package}.{kind}"), name)
 
 
 def to_ros(plain: Plain) -> Any:
@@ -57,12 +60,22 @@ def to_ros(plain: Plain) -> Any:
 class StageNode(Node):
     """A node around a streaming core: it passes messages in and publishes what comes out."""
 
-    def __init__(self, name: str, specs: Iterable[ParameterSpec]) -> None:
+    def __init__(
+        self,
+        name: str,
+        specs: Iterable[ParameterSpec],
+        fallback: Mapping[str, object] | None = None,
+    ) -> None:
+        """`fallback`: values of parameters that are not given to the node."""
         super().__init__(name, automatically_declare_parameters_from_overrides=True)
-        self.values: dict[str, Value] = declare_specs(self, specs)
+        self.values: dict[str, Value] = declare_specs(self, specs, fallback)
         self._robot = declare_robot(self)
+        self._namespace = self.get_namespace().strip("/")
+        if self.values.get("hardware_id") == "":
+            self.values["hardware_id"] = self._namespace or NAMELESS
         self._complaints = Complaints()
         self._outlets: dict[str, Any] = {}
+        self._topics: dict[str, list[str]] = {"listens to": [], "publishes": []}
 
     def listen(
         self, inputs: Iterable[Input], advance: Callable[[], None], qos: QoSProfile = SENSOR_QOS
@@ -73,6 +86,7 @@ class StageNode(Node):
 
     def _subscribe(self, item: Input, advance: Callable[[], None], qos: QoSProfile) -> None:
         clock = self.get_clock()
+        self._note("listens to", item.topic, item.type_name)
 
         def receive(message: Any) -> None:
             problem = item.take(message, clock.now().nanoseconds)
@@ -80,14 +94,30 @@ class StageNode(Node):
                 self.complain(item.topic, problem)
             advance()
 
-        self.create_subscription(
-            message_class(item.type_name),
-            item.topic,
-            receive,
-            qos,
-            # Each default event adds to every wait: together a sixth of the nodes' CPU.
-            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-        )
+        def subscribe(type_name: str) -> Any:
+            return self.create_subscription(
+                message_class(type_name),
+                item.topic,
+                receive,
+                qos,
+                # Each default event adds to every wait: together a sixth of the nodes' CPU.
+                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+            )
+
+        if item.other_types:
+            CommandType(self, item.topic, str(self.values["cmd_vel_type"]), subscribe)
+        else:
+            subscribe(item.type_name)
+
+    def _note(self, what: str, topic: str, type_name: str) -> None:
+        kind = type_name.rpartition("/")[2]
+        self._topics[what].append(f"{self.resolve_topic_name(topic)} ({kind})")
+
+    def introduce(self) -> None:
+        """Log robot, topics and types, once."""
+        self.get_logger().info(described(self._robot))
+        for what, topics in self._topics.items():
+            self.get_logger().info(f"{what} {', '.join(topics)}")
 
     def on_change(self, apply: Callable[[dict[str, Value]], None]) -> None:
         """Apply all values anew when some of them are set while the node runs."""
@@ -112,6 +142,7 @@ class StageNode(Node):
 
     def offer_type(self, topic: str, type_name: str) -> None:
         """Prepare a topic to publish messages of a type on."""
+        self._note("publishes", topic, type_name)
         self._outlets[topic] = self.create_publisher(
             message_class(type_name),
             topic,
@@ -120,12 +151,37 @@ class StageNode(Node):
         )
 
     def send(self, message: Outgoing) -> None:
-        """Publish a record on its topic."""
+        """Publish a record on its topic, if anybody listens."""
+        if not self.is_heard(message.topic):
+            return
+        if self._namespace and isinstance(message, DiagnosticMessage):
+            message = _of_robot(message, self._namespace)
         self.publish(message.topic, message.plain)
 
     def publish(self, topic: str, message: Plain) -> None:
         """Publish a plain message on a topic that was offered."""
         self._outlets[topic].publish(to_ros(message))
+
+    def is_heard(self, topic: str) -> bool:
+        """Whether a topic is offered and anybody listens to it."""
+        outlet = self._outlets.get(topic)
+        return outlet is not None and outlet.get_subscription_count() > 0
+
+
+def _of_robot(message: DiagnosticMessage, namespace: str) -> DiagnosticMessage:
+    """Robots share /diagnostics: there the names of statuses begin with their namespaces."""
+    if not message.topic.startswith("/"):
+        return message
+    named = [evolve(status, name=f"/{namespace}/{status.name}") for status in message.statuses]
+    return evolve(message, statuses=tuple(named))
+
+
+def described(robot: Robot) -> str:
+    """A robot in a line."""
+    return (
+        f"robot of {robot.mass:g} kg on wheels of {robot.wheel_radius:g} m at "
+        f"{robot.robot_radius:g} m: {', '.join(robot.wheel_names)}"
+    )
 
 
 class StopRequest:
@@ -141,8 +197,21 @@ class StopRequest:
         self.is_set = True
 
 
+def make_executor() -> Executor:
+    """The executor that costs least: waiting for a set of entities takes more than half of the
+    nodes' CPU, which events do without."""
+    try:
+        from rclpy.experimental import EventsExecutor
+    except ImportError:  # rclpy before 7.1.5
+        return SingleThreadedExecutor()
+    return EventsExecutor()
+
+
 def run_node(make: Callable[[], Node], arguments: list[str] | None = None) -> int:
-    """Make a node and spin it until a signal; bad parameters end it with one line and code 2."""
+    """Make a node and spin it until a signal; bad parameters end it with one line and code 2.
+
+    Raises what a node keeps as its `failure`: an executor prints a trace of what callbacks raise.
+    """
     stop = StopRequest()
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
@@ -155,11 +224,17 @@ def run_node(make: Callable[[], Node], arguments: list[str] | None = None) -> in
         # A parameter file that rcl cannot read; its text ends with where it was in C.
         print(f"error: {str(error).partition(', at ')[0]}: mend the file", file=sys.stderr)
         return EXIT_BAD_INPUT
-    executor = SingleThreadedExecutor()
+    if isinstance(node, StageNode):
+        node.introduce()
+    executor = make_executor()
     executor.add_node(node)
-    while not stop.is_set:
+    failure: InputError | None = None
+    while not stop.is_set and failure is None:
         executor.spin_once(_SIGNAL_CHECK_S)
+        failure = getattr(node, "failure", None)
     executor.shutdown()
     node.destroy_node()
     rclpy.try_shutdown()
+    if failure is not None:
+        raise failure
     return EXIT_OK

@@ -1,5 +1,6 @@
 """The robot's description: read from robot.yaml or from ROS parameters."""
 
+from tomr_power_model.robot.commissioned import COMMISSIONING, digest_of
 from tomr_power_model.robot.description import (
     GRAVITY,
     WHEELS,
@@ -21,6 +22,7 @@ from tomr_power_model.robot.files import (
 )
 
 __all__ = [
+    "COMMISSIONING",
     "GRAVITY",
     "WHEELS",
     "Controller",
@@ -29,6 +31,7 @@ __all__ = [
     "Robot",
     "Sensors",
     "Supply",
+    "digest_of",
     "load_robot",
     "read_description",
     "read_node_sections",

@@ -1,5 +1,6 @@
 """The robot as its owner describes it: frozen records made from flat dotted parameters."""
 
+import re
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import cast
@@ -8,10 +9,14 @@ from attrs import frozen
 
 from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
-from tomr_power_model.robot.parameters import ParameterSpec, Value, check_all
+from tomr_power_model.robot.parameters import SHARED_PARAMETERS, ParameterSpec, Value, check_all
 from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
+from tomr_power_model.unmodelled import LearntTerm
+from tomr_power_model.unmodelled.described import PREFIX, terms_of
 
 WHEELS = 3
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_/-]{0,99}")
+_LIGHTEST = 0.01  # share of the mass that a negative payload leaves
 GRAVITY = 9.80665  # m/s^2
 
 Parameters = Mapping[str, float]
@@ -100,6 +105,7 @@ class Robot:
     sensors: Sensors
     measurement: Measurement
     physics: Mapping[str, PerWheel]
+    unmodelled: tuple[LearntTerm, ...] = ()  # what was learnt and has no name
 
     @property
     def wheel_topics(self) -> tuple[str, str, str]:
@@ -128,10 +134,15 @@ def robot_from_parameters(values: Mapping[str, object], place: str) -> Robot:
     """
     checked = check_all(ROBOT_PARAMETERS, values, place)
     names = cast(tuple[str, str, str], checked["robot.wheel_names"])
-    if len(set(names)) != WHEELS or not all(names):
-        raise InputError(f"{place}: robot.wheel_names = {list(names)}: give three different names")
+    if len(set(names)) != WHEELS or not all(_NAME.fullmatch(name) for name in names):
+        raise InputError(
+            f"{place}: robot.wheel_names = {list(names)}: give three different names of letters, "
+            "digits and _ / -, as joints and topics have"
+        )
     _reject_unknown(values, names, place)
     number = _Group(checked)
+    physics = _physics(values, names, place)
+    _check_payload(number("robot.mass"), physics, place)
     return Robot(
         wheel_names=names,
         wheel_offset=number("robot.wheel_offset"),
@@ -153,8 +164,18 @@ def robot_from_parameters(values: Mapping[str, object], place: str) -> Robot:
             signed=bool(checked["measurement.signed"]),
             total=str(checked["measurement.total"]),
         ),
-        physics=MappingProxyType(_physics(values, names, place)),
+        physics=MappingProxyType(physics),
+        unmodelled=terms_of(values, names, place),
     )
+
+
+def _check_payload(mass: float, physics: Mapping[str, PerWheel], place: str) -> None:
+    payload = (physics.get("body.payload_mass") or (None,))[0]
+    if payload is not None and mass + payload["mass"] < _LIGHTEST * mass:
+        raise InputError(
+            f"{place}: physics.body.payload_mass.mass = {payload['mass']:g} kg leaves nothing of "
+            f"robot.mass = {mass:g} kg: give a smaller one"
+        )
 
 
 class _Group:
@@ -234,16 +255,19 @@ def _effect_parameter(effect_id: str, parameter: str, key: str, value: object, p
     known = EFFECTS[effect_id].parameters
     if parameter not in known:
         raise InputError(f"{place}: {key} is unknown: {effect_id} takes {', '.join(known)}")
-    described = known[parameter]
-    spec = ParameterSpec(
+    return cast(float, effect_spec(effect_id, parameter, key).check(value, place))
+
+
+def effect_spec(effect_id: str, parameter: str, key: str) -> ParameterSpec:
+    """What an effect's number may be, under the key that a description gives it by."""
+    described = EFFECTS[effect_id].parameters[parameter]
+    return ParameterSpec(
         key,
-        effect_id,
+        f"of {effect_id}",
         unit=described.unit,
         minimum=described.minimum,
         maximum=described.maximum,
-        above=described.above,
     )
-    return cast(float, spec.check(value, place))
 
 
 def _complete(
@@ -270,8 +294,12 @@ def _reject_unknown(values: Mapping[str, object], names: tuple[str, ...], place:
         for name in names
         for spec in MOTOR_PARAMETERS
     }
+    shared = {spec.name: spec for spec in SHARED_PARAMETERS}
     for key in values:
-        if key in fixed or key in overrides or split_effect(key):
+        if key in fixed or key in overrides or split_effect(key) or key.startswith(PREFIX):
+            continue
+        if key in shared:
+            shared[key].check(values[key], place)
             continue
         near = closest(key, [*fixed, *(f"physics.{effect}" for effect in EFFECTS)])
         raise InputError(f"{place}: {key} is unknown: {near}")

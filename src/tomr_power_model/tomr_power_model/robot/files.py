@@ -3,12 +3,12 @@
 from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
-
-import yaml
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import load_yaml, read_text
+from tomr_power_model.robot.commissioned import COMMISSIONING, check_commissioned
 from tomr_power_model.robot.description import Robot, robot_from_parameters
+from tomr_power_model.robot.parameters import SHARED_PARAMETERS, USE_SIM_TIME
 
 EVERY_NODE = "/**"
 # Section in which tomr_calibrate keeps which robot its values were fitted to.
@@ -36,6 +36,7 @@ def read_description(source: Path | str) -> dict[str, object]:
     if not section:
         raise InputError(f"{source}: no `/**: ros__parameters:` section: see robots/reference.yaml")
     check_identity(sections.get(CALIBRATION, {}), section, str(source))
+    check_commissioned(sections.get(COMMISSIONING, {}), section, str(source))
     return dict(section)
 
 
@@ -53,11 +54,15 @@ def check_identity(
 
 
 def read_node_sections(source: Path | str, nodes: Iterable[str]) -> dict[str, object]:
-    """Flat parameters that a description gives to some nodes in their own sections, merged."""
+    """Flat parameters that a description gives to some nodes: those for all nodes, then those of
+    their own sections, merged. Without use_sim_time, which is no node's own."""
     sections = read_sections(source)
-    merged: dict[str, object] = {}
+    shared = {spec.name for spec in SHARED_PARAMETERS}
+    common = sections.get(EVERY_NODE, {})
+    merged = {name: value for name, value in common.items() if name in shared}
     for node in nodes:
         merged.update(sections.get(node) or sections.get(f"/{node}") or {})
+    merged.pop(USE_SIM_TIME.name, None)
     return merged
 
 
@@ -80,7 +85,7 @@ def shipped_robot(name: str) -> Robot:
 
 def read_sections(source: Path | str) -> dict[str, dict[str, object]]:
     """Flat dotted parameters of each section of a ROS 2 parameter file, not checked."""
-    document = _document(_text(source), str(source))
+    document = load_yaml(_text(source), str(source))
     if not isinstance(document, Mapping):
         return {}
     found: dict[str, dict[str, object]] = {}
@@ -97,22 +102,9 @@ def _text(source: Path | str) -> str:
         resource = files("tomr_power_model").joinpath("robots").joinpath(f"{source}.yaml")
         return resource.read_text(encoding="utf-8")
     try:
-        return Path(source).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(
-            f"{source}: cannot be read ({reason}): give a robot.yaml or one of {shipped_robots()}"
-        ) from None
-
-
-def _document(text: str, place: str) -> Any:
-    try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f" line {mark.line + 1}" if mark is not None else ""
-        problem = getattr(error, "problem", None) or "not YAML"
-        raise InputError(f"{place}:{line} {problem}: mend the YAML") from None
+        return read_text(Path(source))
+    except InputError as error:
+        raise InputError(f"{error}: give a robot.yaml or one of {shipped_robots()}") from None
 
 
 def _flat(tree: Mapping[object, object], prefix: str = "") -> dict[str, object]:

@@ -6,7 +6,7 @@ from typing import Literal
 
 from attrs import frozen
 
-from tomr_power_model.errors import InputError
+from tomr_power_model.errors import InputError, one_line
 
 Value = float | int | bool | str | tuple[float, ...] | tuple[str, ...]
 Kind = Literal["float", "int", "bool", "str", "floats", "strs"]
@@ -56,8 +56,9 @@ class ParameterSpec:
         """Return the value in its type, or raise InputError naming the key and the remedy."""
         try:
             typed = _typed(self.kind, value)
-        except TypeError as error:
-            raise InputError(f"{place}: {self.name} = {value!r}: {error}") from None
+        except (TypeError, OverflowError) as error:
+            shown = one_line(repr(value))
+            raise InputError(f"{place}: {self.name} = {shown}: {error}") from None
         if self.length is not None and isinstance(typed, tuple) and len(typed) != self.length:
             raise InputError(
                 f"{place}: {self.name} = {value!r}: needs {self.length} values, has {len(typed)}"
@@ -115,6 +116,25 @@ def _text(value: object) -> str:
     if not isinstance(value, str):
         raise TypeError("give a text")
     return value
+
+
+NAMELESS = "tomr"  # the robot outside of any namespace
+HARDWARE_ID = ParameterSpec(
+    "hardware_id",
+    f"of this robot, in every status; empty: its namespace, else {NAMELESS}",
+    "str",
+    "",
+)
+CMD_VEL_TYPE = ParameterSpec(
+    "cmd_vel_type",
+    "message type of cmd_vel, auto: that of its publishers; a Twist counts from when it arrives",
+    "str",
+    "auto",
+    choices=("auto", "twist_stamped", "twist"),
+)
+USE_SIM_TIME = ParameterSpec("use_sim_time", "time comes from /clock", "bool", False)
+# What a description may hold for all nodes besides the robot, in its /** section.
+SHARED_PARAMETERS = (CMD_VEL_TYPE, HARDWARE_ID, USE_SIM_TIME)
 
 
 def check_all(

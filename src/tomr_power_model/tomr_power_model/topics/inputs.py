@@ -1,10 +1,12 @@
 """Which topics a stage reads and what it does with each message; nodes and tools share this."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from attrs import frozen
 
+from tomr_power_model.drive.plausible import PowerLimits
 from tomr_power_model.drive.sources import (
     ENCODER_TOPIC,
     PowerReading,
@@ -12,6 +14,7 @@ from tomr_power_model.drive.sources import (
     motor_topics,
     total_topics,
 )
+from tomr_power_model.errors import one_line
 from tomr_power_model.messages.intake import (
     MALFORMED,
     Triple,
@@ -26,6 +29,7 @@ from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.robot import Robot
 
+_MOST_KINDS = 200  # of complaints that are told apart: their words may be a message's
 Take = Callable[[Any, int], Arrival | str | None]
 
 
@@ -40,17 +44,23 @@ class Input:
     other_types: tuple[str, ...] = ()
 
 
-def guarded(take: Take) -> Callable[[Any, int], str | None]:
-    """Turn an unusable message or stamp into a complaint: no message may stop a stage."""
+def guarded(
+    take: Take, refused: Callable[[], None] = lambda: None
+) -> Callable[[Any, int], str | None]:
+    """Turn an unusable message or stamp into a complaint: no message may stop a stage.
+
+    `refused` is called for each message that nothing can be read from.
+    """
 
     def taken(message: Any, receive_ns: int) -> str | None:
         try:
-            arrival = take(message, receive_ns)
+            return _complaint(take(message, receive_ns))
         except Unusable as error:
-            return f"{error}; the message is ignored"
+            problem = f"{error}; the message is ignored"
         except MALFORMED as error:
-            return f"malformed ({error}); the message is ignored"
-        return _complaint(arrival)
+            problem = f"malformed ({error}); the message is ignored"
+        refused()
+        return problem
 
     return taken
 
@@ -67,7 +77,7 @@ def _complaint(arrival: Arrival | str | None) -> str | None:
 
 
 def model_inputs(
-    robot: Robot, predictor: PowerPredictor, twist_type: str, wheels: WheelFinder | None = None
+    robot: Robot, predictor: PowerPredictor, wheels: WheelFinder | None = None
 ) -> tuple[Input, ...]:
     """Inputs of the model stage; `wheels` may be shared with another stage."""
 
@@ -77,11 +87,14 @@ def model_inputs(
     def imu(message: Any, receive_ns: int) -> Arrival:
         return predictor.imu(stamp_of(message, receive_ns), yaw_rate_of(message))
 
-    def power(reading: PowerReading) -> Arrival:
-        return predictor.measured(reading.wheel, reading.stamp_ns)
+    limits = PowerLimits.of(robot)
+
+    def power(reading: PowerReading) -> Arrival | str:
+        problem = limits.problem(reading)
+        return problem or predictor.measured(reading.wheel, reading.stamp_ns)
 
     inputs = [
-        Input("cmd_vel", twist_type, guarded(command), (TWIST, TWIST_STAMPED)),
+        Input("cmd_vel", TWIST_STAMPED, guarded(command), (TWIST, TWIST_STAMPED)),
         *measured_inputs(robot, predictor.encoders, power, wheels),
     ]
     if predictor.settings.use_imu:
@@ -91,47 +104,55 @@ def model_inputs(
 
 def measured_inputs(
     robot: Robot,
-    encoders: Callable[[int, Triple, Triple], Arrival],
-    power: Callable[[PowerReading], Arrival],
+    encoders: Callable[[int, Triple, Triple], Arrival | str],
+    power: Callable[[PowerReading], Arrival | str],
     wheels: WheelFinder | None = None,
+    *,
+    refused: Callable[[str], None] = lambda topic: None,
 ) -> tuple[Input, ...]:
-    """Inputs of a stage that takes encoders and power; `wheels` may be shared with another one."""
+    """Inputs of a stage that takes encoders and power; `wheels` may be shared with another one.
+
+    `refused` gets the topic of each message that nothing can be read from.
+    """
     take = _encoders(wheels or WheelFinder(robot.wheel_names), encoders)
     inputs = []
     for source in (*motor_topics(robot), *total_topics(robot)):
         if source.topic == ENCODER_TOPIC:
             take = _with_power(take, source, power)
         else:
-            taker = guarded(_power(source, power))
+            taker = guarded(_power(source, power), partial(refused, source.topic))
             inputs.append(Input(source.topic, source.type_name, taker))
-    return (Input(ENCODER_TOPIC, JOINT_STATE, guarded(take)), *inputs)
+    encoder_taker = guarded(take, partial(refused, ENCODER_TOPIC))
+    return (Input(ENCODER_TOPIC, JOINT_STATE, encoder_taker), *inputs)
 
 
-def _power(source: PowerTopic, power: Callable[[PowerReading], Arrival]) -> Take:
-    def take(message: Any, receive_ns: int) -> Arrival | None:
-        arrival = None
+def _power(source: PowerTopic, power: Callable[[PowerReading], Arrival | str]) -> Take:
+    def take(message: Any, receive_ns: int) -> Arrival | str | None:
+        outcome: Arrival | str | None = None
         for reading in source.read(message, receive_ns):
-            arrival = power(reading)
-        return arrival
+            found = power(reading)
+            outcome = outcome if isinstance(outcome, str) else found
+        return outcome
 
     return take
 
 
 def _with_power(
-    encoders: Take, source: PowerTopic, power: Callable[[PowerReading], Arrival]
+    encoders: Take, source: PowerTopic, power: Callable[[PowerReading], Arrival | str]
 ) -> Take:
     also = _power(source, power)
 
     def take(message: Any, receive_ns: int) -> Arrival | str | None:
         arrival = encoders(message, receive_ns)
-        if arrival not in (Arrival.UNSTAMPED, Arrival.REPEATED):
-            also(message, receive_ns)
-        return arrival
+        if arrival in (Arrival.UNSTAMPED, Arrival.REPEATED):
+            return arrival
+        problem = also(message, receive_ns)
+        return problem if isinstance(problem, str) else arrival
 
     return take
 
 
-def _encoders(wheels: WheelFinder, take: Callable[[int, Triple, Triple], Arrival]) -> Take:
+def _encoders(wheels: WheelFinder, take: Callable[[int, Triple, Triple], Arrival | str]) -> Take:
     """Reads the wheels out of joint_states for a stage's `encoders`; tells of missing wheels."""
 
     def encoders(message: Any, receive_ns: int) -> Arrival | str:
@@ -152,8 +173,10 @@ class Complaints:
 
     def note(self, topic: str, problem: str) -> str | None:
         """Count a complaint; returns the line to print, if it is time for one."""
-        key = (topic, problem)
+        key = (topic, one_line(problem))
+        if key not in self.counts and len(self.counts) >= _MOST_KINDS:
+            key = (topic, "further problems of other kinds")
         count = self.counts[key] = self.counts.get(key, 0) + 1
         if str(count).rstrip("0") != "1":
             return None
-        return f"{topic}: {problem}" + (f" ({count} times)" if count > 1 else "")
+        return f"{topic}: {key[1]}" + (f" ({count} times)" if count > 1 else "")

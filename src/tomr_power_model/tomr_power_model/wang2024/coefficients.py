@@ -13,6 +13,7 @@ import yaml
 from attrs import Attribute, evolve, field, fields, frozen
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import write_text
 from tomr_power_model.robot import WHEELS, Robot, read_node_sections
 from tomr_power_model.robot.description import closest
 from tomr_power_model.robot.parameters import ParameterSpec, check_all
@@ -28,8 +29,10 @@ Triple = tuple[float, float, float]
 _ZEROS: Triple = (0.0, 0.0, 0.0)
 
 
-def _number(where: str, meaning: str, unit: str = "", default: float | Triple = 0.0) -> Any:
-    notes = {"where": where, "meaning": meaning, "unit": unit}
+def _number(
+    where: str, meaning: str, unit: str = "", default: float | Triple = 0.0, most: float = 1e9
+) -> Any:
+    notes = {"where": where, "meaning": meaning, "unit": unit, "most": most}
     return field(default=default, metadata=notes)
 
 
@@ -39,17 +42,21 @@ class Coefficients:
     them apart (h: Eq. 6, m: Eq. 9, c: Eq. 11). Those that end in `_ours` the paper lacks."""
 
     # Given by the robot or by the conditions of the fit.
-    M: float = _number("Eq. 5", "mass of the robot fitted", "kg")
-    L: float = _number("Eqs 12-16", "side of the robot: of the triangle on the wheels", "m")
-    L_R: float = _number("Eqs 12-17", "centre to drive wheel", "m")
-    L_v: float = _number("Eqs 14-16", "centre to side", "m")
-    v_max: float = _number("Eq. 11", "highest speed", "m/s")
-    v_0: float = _number("Eqs 6, 8", "speed at the start", "m/s")
-    t: float = _number("Eqs 6, 11", "running time", "s", 600.0)
-    t_0: float = _number("Eq. 6", "time at the start", "s")
-    T: float = _number("Eq. 6", "temperature of the motors", "deg C", 45.0)
-    T_0: float = _number("Eq. 6", "temperature at the start", "deg C", 25.0)
-    dv_max_ours: float = _number("Eq. 8", "largest |dv/dt| that the fit has seen", "m/s^2")
+    M: float = _number("Eq. 5", "mass of the robot fitted", "kg", most=1e5)
+    L: float = _number(
+        "Eqs 12-16", "side of the robot: of the triangle on the wheels", "m", most=1e2
+    )
+    L_R: float = _number("Eqs 12-17", "centre to drive wheel", "m", most=1e2)
+    L_v: float = _number("Eqs 14-16", "centre to side", "m", most=1e2)
+    v_max: float = _number("Eq. 11", "highest speed", "m/s", most=1e3)
+    v_0: float = _number("Eqs 6, 8", "speed at the start", "m/s", most=1e2)
+    t: float = _number("Eqs 6, 11", "running time", "s", 600.0, most=1e7)
+    t_0: float = _number("Eq. 6", "time at the start", "s", most=1e7)
+    T: float = _number("Eq. 6", "temperature of the motors", "deg C", 45.0, most=300.0)
+    T_0: float = _number("Eq. 6", "temperature at the start", "deg C", 25.0, most=300.0)
+    dv_max_ours: float = _number(
+        "Eq. 8", "largest |dv/dt| that the fit has seen", "m/s^2", most=1e2
+    )
     # Fitted to the power of the motors.
     P_stanby: tuple[float, float, float] = _number("Eq. 3", "by motor at rest", "W", _ZEROS)
     k_1h: float = _number("Eq. 6", "heat time parameter k_1")
@@ -128,12 +135,7 @@ class Coefficients:
         }
         document = {NODE: {"ros__parameters": {GROUP.rstrip("."): group}}}
         text = yaml.safe_dump(document, sort_keys=False, default_flow_style=None)
-        try:
-            path.write_text(
-                "# Wang 2024: coefficients fitted to a healthy drive.\n" + text, encoding="utf-8"
-            )
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written ({error.strerror})") from None
+        write_text(path, "# Wang 2024: coefficients fitted to a healthy drive.\n" + text)
 
     def check(self, robot: Robot) -> None:
         """Raise InputError unless they were fitted for this robot."""
@@ -142,6 +144,10 @@ class Coefficients:
                 "power_model = wang2024 has no coefficients: fit them to a healthy drive and give "
                 f"the file as {FILE_PARAMETER}, or the group wang2024 in the section {NODE}"
             )
+        for name in ("L", "L_v", "v_max", "t"):
+            value = getattr(self, name)
+            if not value > 0.0:
+                raise InputError(f"wang2024.{name} = {value:g}: give more than 0, or fit again")
         if abs(self.L_R - robot.robot_radius) > _RADIUS_TOLERANCE * robot.robot_radius:
             raise InputError(
                 f"wang2024.L_R = {self.L_R:g} m was fitted for another robot: robot.robot_radius "
@@ -168,6 +174,7 @@ def _spec(key: "Attribute[Any]") -> ParameterSpec:
         key.default,
         notes["unit"],
         0.0,
+        notes["most"],
         length=WHEELS if is_list else None,
     )
 

@@ -92,6 +92,7 @@ class RecordingSimulation:
     channels: tuple[Channel, ...]
     timeline: Timeline
     resisting: Array | None = None  # torques that no description holds [N m], (count, n)
+    drawn: Array | None = None  # power that no description holds, of all channels' values, (rows,)
 
     @classmethod
     def of(
@@ -193,6 +194,8 @@ class RecordingSimulation:
         """First values of each variant, then those of the first when it is later."""
         rest: list[Array] = []
         for found in predict(variants, self.excitation, self.readout, WHEELS, tick):
+            if self.drawn is not None:
+                found += self.drawn
             rest.extend(found[1:])
             yield found[0]
         yield from rest

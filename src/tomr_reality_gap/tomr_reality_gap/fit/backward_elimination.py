@@ -1,5 +1,7 @@
 """Backward elimination: whether each finding is still needed, and what could take its place."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from attrs import evolve
 
@@ -8,54 +10,90 @@ from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection, finding_cost
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.refine import FittedModel, refine
+from tomr_reality_gap.fit.rivals import Responses
+from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 
 _STAND_INS = 4  # alternatives that are tried for each finding
 _SWAPS = 3  # at most
+_FRICTION = ("friction.coulomb", "friction.viscous")
 
 
 def backward_elimination(
-    dataset: Dataset, found: Selection, tick: Tick = lambda done: None
+    dataset: Dataset,
+    found: Selection,
+    candidates: Sequence[Hypothesis] = (),
+    tick: Tick = lambda done: None,
 ) -> Selection:
-    """Drop findings that later ones made needless, and try what each of them displaced."""
+    """Drop findings that later ones made needless, and try what could stand in for each of them:
+    what it displaced, and whatever of the candidates would show nearly the same.
+    """
     best = found.best
-    if len(best.model.hypotheses) < 2:
-        tried = found.rounds[0].tried if best.model.hypotheses else ()
-        return evolve(found, alternatives=(tuple(tried),) if tried else ())
+    if not best.model.hypotheses:
+        return found
     jacobian, noise = found.rounds[-1].jacobian, found.noise
     while len(best.model.hypotheses) > 1:
         count = len(best.model.hypotheses)
         fewer = [(best.model.without(number), best.sensors) for number in range(count)]
         shorter = refine(dataset, fewer, jacobian, noise, tick=tick)
-        gains = [best.evidence - item.evidence for item in shorter]
+        gains = [
+            _worth(best, cost) - _worth(item, cost)
+            for item, cost in zip(shorter, _costs(dataset, found, best), strict=True)
+        ]
         weakest = int(np.argmin(gains))
-        if gains[weakest] > finding_cost(
-            len(dataset.value), best.evidence - found.without.evidence
-        ):
+        if gains[weakest] > 0.0:
             break
         best = shorter[weakest]
-    groups = _alternatives(dataset, found, best, tick)
+    responses = Responses(dataset, found, candidates)
+    groups = _alternatives(responses, best, tick)
     for _ in range(_SWAPS):
-        better = max((item for group in groups for item in group), key=lambda item: item.evidence)
-        if better.evidence <= best.evidence:
+        cost = _cost(dataset, found, best)
+        better = max((item for group in groups for item in group), key=lambda m: _worth(m, cost))
+        if _worth(better, cost) <= _worth(best, cost):
             break
         best = better
-        groups = _alternatives(dataset, found, best, tick)
+        groups = _alternatives(responses, best, tick)
     return evolve(found, best=best, alternatives=tuple(groups))
 
 
+def _cost(dataset: Dataset, found: Selection, best: FittedModel) -> float:
+    return finding_cost(len(dataset.value), best.evidence - found.without.evidence)
+
+
+def _costs(dataset: Dataset, found: Selection, best: FittedModel) -> list[float]:
+    """What each finding must bring; friction's two parts at one place count as one finding."""
+    usual, least = _cost(dataset, found, best), finding_cost(len(dataset.value))
+    parts = [item for item in best.model.hypotheses if item.effect in _FRICTION]
+    return [
+        least
+        if any(one is not item and one.where == item.where for one in parts)
+        and item.effect in _FRICTION
+        else usual
+        for item in best.model.hypotheses
+    ]
+
+
+def _worth(item: FittedModel, cost: float) -> float:
+    """Log evidence less what so many effects must bring."""
+    return item.evidence - cost * item.model.weight
+
+
 def _alternatives(
-    dataset: Dataset, found: Selection, best: FittedModel, tick: Tick
+    responses: Responses, best: FittedModel, tick: Tick
 ) -> list[tuple[FittedModel, ...]]:
     """For each finding the model as it is, then with something else in the finding's place."""
-    jacobian, noise = found.rounds[-1].jacobian, found.noise
-    trials = [_stand_ins(found, best.model, at) for at in range(len(best.model.hypotheses))]
+    found = responses.found
+    trials = [_stand_ins(responses, best, at) for at in range(len(best.model.hypotheses))]
     states = [(model, best.sensors) for group in trials for model in group]
-    fitted = iter(refine(dataset, states, jacobian, noise, tick=tick))
+    jacobian = found.rounds[-1].jacobian
+    fitted = iter(refine(responses.dataset, states, jacobian, found.noise, tick=tick))
     return [(best, *(next(fitted) for _ in group)) for group in trials]
 
 
-def _stand_ins(found: Selection, model: Model, number: int) -> list[Model]:
-    """Models in which something else that was tried stands in for one finding."""
+def _stand_ins(responses: Responses, best: FittedModel, number: int) -> list[Model]:
+    """Models in which something else stands in for one finding: what was tried in its place, and
+    what shows the same.
+    """
+    model, found = best.model, responses.found
     place = model.hypotheses[number].name
     candidates: dict[str, Model] = {}
     for step in found.rounds:
@@ -66,4 +104,8 @@ def _stand_ins(found: Selection, model: Model, number: int) -> list[Model]:
         for other, offsets in others:
             if other.name not in model.names and other.name not in candidates:
                 candidates[other.name] = model.swapped(number, other, offsets)
-    return list(candidates.values())[:_STAND_INS]
+    nearest = responses.nearest(best, number) if responses.candidates else []
+    # What was worked out beside the other findings is the better start.
+    calculated = {item.hypotheses[number].name: item for item in nearest[:_STAND_INS]}
+    tried = dict(list(candidates.items())[:_STAND_INS])
+    return list({**tried, **calculated}.values())

@@ -77,9 +77,9 @@ def forward_selection(
         current, tried = _tried(dataset, start, screened, jacobian, noise, tick)
         without = without or current
         cost = finding_cost(len(dataset.value), current.evidence - without.evidence)
-        tried.sort(key=lambda item: len(item.model.hypotheses) * cost - item.evidence)
+        tried.sort(key=lambda item: item.model.weight * cost - item.evidence)
         rounds.append(Round(jacobian, noise, tuple(tried)))
-        added = len(tried[0].model.hypotheses) - len(model.hypotheses) if tried else 0
+        added = tried[0].model.weight - model.weight if tried else 0
         if not tried or tried[0].evidence < current.evidence + added * cost:
             break
         model = tried[0].model

@@ -47,6 +47,11 @@ class Model:
         """Names of the hypotheses."""
         return frozenset(hypothesis.name for hypothesis in self.hypotheses)
 
+    @property
+    def weight(self) -> int:
+        """Effects whose evidence it must bring."""
+        return sum(hypothesis.stands_for for hypothesis in self.hypotheses)
+
     def joined(self, hypothesis: Hypothesis) -> "Model":
         """With one more hypothesis, at no offset yet."""
         return evolve(

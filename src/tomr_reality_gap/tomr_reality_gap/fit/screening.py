@@ -5,7 +5,8 @@ at its edge, and parameters that an addition would push far out of it are tried 
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
 
 import numpy as np
 from attrs import evolve, frozen
@@ -24,6 +25,8 @@ Array = NDArray[np.float64]
 _STARTED = 5  # best additions for which starts are worked out
 _FAR = 2.0  # tolerances
 _MOST_JOINT = 2
+_PAIRED = 16  # best additions of which pairs are tried
+_PAIRS = 2  # that are started
 
 
 @frozen
@@ -67,7 +70,28 @@ def screen(
             best[candidate.name] = Screened(gain, candidate, joint)
     ranked = sorted(best.values(), key=lambda item: -item.gain)
     started = [evolve(item, starts=linear.starts(item)) for item in ranked[:_STARTED]]
-    return linear.start(()), [*started, *ranked[_STARTED:]]
+    pairs = sorted(_pairs(linear, before, ranked[:_PAIRED]), key=lambda item: -item.gain)
+    return linear.start(()), [*started, *pairs[:_PAIRS], *ranked[_STARTED:]]
+
+
+def _pairs(linear: "_Linear", before: float, ranked: Sequence[Screened]) -> Iterator[Screened]:
+    """Two additions at once that are worth more than either: effects that hide each other."""
+    for one, other in combinations([item for item in ranked if not is_discrete(item)], 2):
+        together = (one.hypothesis, other.hypothesis)
+        gain = linear.gain(together, before)
+        if not exclude_each_other(*together) and gain > max(one.gain, other.gain):
+            yield Screened(gain, together[0], together[1:], (linear.start(together),))
+
+
+def is_discrete(item: Screened) -> bool:
+    """Whether an addition is tried as a whole."""
+    return bool(item.hypothesis.parameters[0].discrete_offset)
+
+
+def exclude_each_other(one: Hypothesis, other: Hypothesis) -> bool:
+    """Whether two hypotheses change the same numbers."""
+    keys = {key for parameter in one.parameters for key in parameter.keys}
+    return any(keys.intersection(parameter.keys) for parameter in other.parameters)
 
 
 @frozen
@@ -100,6 +124,19 @@ class _Linear:
         found = solve(evolve(gram, vector=vector), self.base)
         fits = offset * float(gram.vector[row]) - 0.5 * offset**2 * float(gram.matrix[row, row])
         return evolve(found, evidence=found.evidence + fits - 0.5 * offset**2)
+
+    def gain(self, additions: Sequence[Hypothesis], before: float) -> float:
+        """What additions bring together; nothing where a size would be beyond its bounds."""
+        rows = [(row, item) for item in additions for row in self.rows(item)]
+        found = solve(self.gram, [*self.base, *(row for row, _ in rows)])
+        prior = sum(item.log_prior for item in additions)
+        at = len(self.base)
+        for item in additions:
+            first, size = item.parameters[0], found.mean[at] * item.parameters[0].prior_std
+            at += len(self.rows(item))
+            if not first.lower <= size <= first.upper:
+                return -math.inf
+        return found.evidence - before + prior
 
     def starts(self, item: Screened) -> tuple[State, ...]:
         """Where to start with a hypothesis, and with more and more of its joint candidates."""

@@ -15,14 +15,13 @@ from tomr_power_model.estimation.noise import Noise, rows_of
 from tomr_power_model.estimation.parameter import prior_stds
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.simulation import RecordingSimulation, Tick
-from tomr_reality_gap.fit.basis_responses import BasisResponses, own_rows
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection
 from tomr_reality_gap.fit.jacobian import linearise
+from tomr_reality_gap.fit.learnt import motion_in
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.refine import refine
 from tomr_reality_gap.fit.unmodelled import Unmodelled
-from tomr_reality_gap.mismatch.probes import motion_of
 
 Array = NDArray[np.float64]
 Offsets = tuple[tuple[float, ...], ...]  # of each hypothesis' parameters
@@ -73,27 +72,17 @@ class SimulatorBaseline:
             for part, hypothesis in zip(jacobian.own, model.hypotheses, strict=True)
         )
 
-    def shows(self, unmodelled: Unmodelled, model: Model, basis: BasisResponses) -> bool:
+    def shows(self, unmodelled: Unmodelled) -> bool:
         """Whether half of an effect without a name, or more, is in the simulation too."""
-        robot, family = self.described, unmodelled.family
-        motions = [motion_of(item, robot, item.run(robot)) for item in self.dataset.simulations]
-        torques = [family.torques(motion) * basis.size for motion in motions]
-        response = (self.dataset.respond(robot, torques) - self.dataset.predict([robot])[0]).T
-        parts = []
-        for wheel in unmodelled.wheels:
-            rows = own_rows(self.dataset)[wheel]
-            part = np.zeros_like(response)
-            part[rows] = response[rows]
-            parts.append(part)
-        matrix = linearise(self.dataset, model, ()).matrix
-        mean = self._fitted(np.concatenate([matrix, *parts], axis=1))
-        weights = np.split(basis.size * mean[matrix.shape[1] :], len(parts))
-        theirs = evolve(unmodelled, weights=tuple(weights))
-        both = [
-            np.concatenate([item.torque(motion).ravel() for motion in motions])
-            for item in (theirs, unmodelled)
-        ]
-        return float(both[0] @ both[1]) > _HALF * float(both[1] @ both[1])
+        robot, table, term = self.described, unmodelled.table, unmodelled.learnt
+        motions = [motion_in(item, robot) for item in self.dataset.simulations]
+        parts = table.columns(self.dataset, robot, motions)
+        chosen = [parts[number] for number in term.wheels or range(len(parts))]
+        columns = np.concatenate(chosen, axis=1)
+        theirs = columns @ self._fitted(columns) * self.weight
+        units = [np.linalg.solve(table.root, values) for values in term.values]
+        ours = columns @ np.concatenate(units) * self.weight
+        return float(theirs @ ours) > _HALF * float(ours @ ours)
 
     def _fitted(self, columns: Matrix) -> Array:
         gram = Gram.of(columns, self.residual, self.weight)

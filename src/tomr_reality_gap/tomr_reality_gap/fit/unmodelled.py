@@ -1,188 +1,317 @@
-"""What no named effect explains: which variable it depends on, at which wheels, in what shape."""
+"""What no named effect explains: what it acts on, what it depends on, and its table.
 
-from collections.abc import Collection, Sequence
-from types import MappingProxyType
+A family of terms is judged by what it predicts of stretches that it was not fitted to: the share
+of what the named model leaves there. What changes with time alone can predict no stretch; it is
+judged by moments left out between others, and called not repeatable.
+"""
+
+from collections.abc import Sequence
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.estimation.discrepancy import SIMULATOR
-from tomr_power_model.estimation.linear_gaussian import Gram, Solution, solve
-from tomr_power_model.estimation.noise import Noise
+from tomr_power_model.effects.scales import Scales
+from tomr_power_model.estimation.linear_gaussian import Gram, solve
+from tomr_power_model.estimation.noise import rows_of
+from tomr_power_model.estimation.statistics import autocorrelation_time, robust_scale
 from tomr_power_model.robot import WHEELS, Robot
-from tomr_reality_gap.explanation import Shape
-from tomr_reality_gap.fit.basis_responses import BasisResponses
+from tomr_power_model.unmodelled import FAMILIES, Family, LearntTerm, Motion
+from tomr_reality_gap.alignment.channels import DRAWN_KINDS
+from tomr_reality_gap.explanation import FittedLaw, Shape
 from tomr_reality_gap.fit.dataset import Dataset
-from tomr_reality_gap.fit.jacobian import Jacobian
-from tomr_reality_gap.fit.model import Model
-from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
-from tomr_reality_gap.mismatch.probes import Family, Motion
+from tomr_reality_gap.fit.laws import Evidence, laws_of
+from tomr_reality_gap.fit.learnt import Table, motion_in
+from tomr_reality_gap.fit.polish import polished
 
 Array = NDArray[np.float64]
 
-_POINTS = 80
-_NEEDED = 10.0  # log evidence that a named finding must bring beside an unnamed one, and a wheel
-_WHEEL_SHARE = 0.2  # of the log evidence of the wheel that shows most
-# Effects that are one curve of one variable.
-_SHAPED = MappingProxyType({"drivetrain.torque_ripple": "wheel angle [rad]"})
+_STRETCHES = 8  # of a recording, each left out once
+_MOMENT = 0.25  # s: of every four one is left out
+_MOMENTS = 4
+_INEXACT = 0.01  # of a channel's standard deviation, besides its noise
+_SHOWS = 1.0  # eigenvalue of a nuisance's information beyond which it is fitted
+_WHEEL_SHARE = 0.1  # of the wheel that shows most
+_TOLD = 0.3  # share of what is left that a term must predict
+_SMALL = 0.02  # of a channel's standard deviation: less is not worth a word
+_LAGS = 80
+_LAW = 0.8  # of the squares that are left: a law that explains so much is no chance
+_NEAR = 0.35  # of the best share: worth a closer look
+_EVENT = 0.45  # of what a term of time explains: as much of it, and it is repeatable
 
 
 @frozen
 class Remainder:
-    """What a model leaves of the recordings, whitened."""
+    """What a model leaves of the recordings, and what it could still make of it."""
 
     dataset: Dataset
-    residual: Array  # (n,)
-    base: Array  # derivatives by all that the model has, (n, p)
+    residual: Array  # whitened by what differs from sample to sample, (n,)
+    base: Array  # derivatives by what is not exactly known, likewise, (n, q)
     weight: Array  # (n,)
-    gram: Gram  # of the base and the residual
 
     @classmethod
-    def of(
-        cls,
-        dataset: Dataset,
-        value: Array,
-        jacobian: Jacobian,
-        noise: Noise,
-        needed: Sequence[bool] | None = None,
-    ) -> "Remainder":
-        """Of a model with the `needed` of its findings (None: all); `value` as simulated."""
-        rows = list(range(jacobian.sensors.stop))
-        for part, wanted in zip(jacobian.own, needed or [True] * len(jacobian.own), strict=True):
-            rows += range(part.start, part.stop) if wanted else ()
-        residual = (dataset.value - value) * noise.weight
-        base = jacobian.matrix[:, rows] * noise.weight[:, None]
-        return cls(dataset, residual, base, noise.weight, Gram.of(base, residual))
+    def of(cls, dataset: Dataset, value: Array, columns: Array) -> "Remainder":
+        """Of simulated values; `columns` are derivatives in prior standard deviations, (n, p)."""
+        residual = dataset.value - value
+        weight = np.empty_like(residual)
+        for channel, part in zip(dataset.channels, rows_of(dataset.channels), strict=True):
+            weight[part] = 1.0 / _scatter(channel.value, residual[part], channel.quantum)
+        gram = Gram.of(columns, residual, weight)
+        values, vectors = np.linalg.eigh(gram.matrix)
+        shown = (columns @ vectors[:, values > _SHOWS]) * weight[:, None]
+        return cls(dataset, residual * weight, np.asarray(shown, dtype=np.float64), weight)
 
-    def solved(self, parts: Sequence[Array]) -> Solution:
-        """With further whitened columns, (n, k) each; next to nothing but zeros in each of them."""
-        more = np.concatenate([*parts, np.empty((len(self.residual), 0))], axis=1)
-        shown = np.flatnonzero(more.any(axis=1))
-        own, cross = more[shown].T @ more[shown], self.base[shown].T @ more[shown]
-        gram = Gram(
-            np.block([[self.gram.matrix, cross], [cross.T, own]]),
-            np.concatenate([self.gram.vector, more[shown].T @ self.residual[shown]]),
-            self.gram.square,
-        )
-        return solve(gram, range(len(gram.vector)))
+    @property
+    def blocks(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Stretch and moment of each row."""
+        stretch, moment = [], []
+        for simulation in self.dataset.simulations:
+            time = np.concatenate([channel.time for channel in simulation.channels])
+            share = _STRETCHES * time / (time.max() + 1e-9)
+            stretch.append(np.minimum(share.astype(np.intp), _STRETCHES - 1))
+            moment.append((time / _MOMENT).astype(np.intp) % _MOMENTS)
+        return np.concatenate(stretch), np.concatenate(moment)
+
+
+def _scatter(value: Array, residual: Array, quantum: float) -> float:
+    """Noise of a channel from one sample to the next, and what no simulator tells of it."""
+    steps = np.abs(np.diff(residual))
+    noise = max(0.5 * robust_scale(steps) ** 2, 0.5 * float(np.mean(steps**2)) / 4.0)
+    return float(np.sqrt(max(noise, quantum**2 / 12.0) + (_INEXACT * np.std(value)) ** 2)) + 1e-12
 
 
 @frozen
 class Unmodelled:
-    """The family of torques that explains most of what is left."""
+    """A term that explains what is left."""
 
-    family: Family
-    evidence: float  # log, against nothing but the named model, of all wheels that have it
-    wheels: tuple[int, ...]
-    columns: Array  # of its basis functions at those wheels, whitened, (n, k)
-    shape: Shape  # at the first of those wheels
-    weights: tuple[Array, ...]  # of the basis functions at those wheels [N m], (k,) each
+    table: Table
+    learnt: LearntTerm  # the table
+    laws: tuple[FittedLaw, ...]  # that explain about as much, simplest first
+    term: LearntTerm  # what is simulated: the first law, or else the table
+    share: float  # of what is left that it predicts where it was not fitted
+    is_repeatable: bool
+    evidence: float  # log, correlation of what is left accounted for
+    is_large: bool  # in some channel, against what it shows in all
+    change: Array  # what it adds to every value, (n,)
+    explained: float  # of the squares that are left without it, those of noise included
+    sigma: Array  # of the term's values, like them
 
-    def torque(self, motion: Motion) -> Array:
-        """What it amounts to on a drive, at each wheel [N m], (n, 3)."""
-        found = np.zeros_like(motion.speed)
-        basis = self.family.torques(motion)
-        for wheel, weights in zip(self.wheels, self.weights, strict=True):
-            found[:, wheel] = weights @ basis[:, :, wheel]
-        return found
+    @property
+    def family(self) -> type[Family]:
+        """Of the term."""
+        return self.table.family
 
 
-def unmodelled_effects(
-    rest: Remainder, basis: BasisResponses, variables: Collection[str] | None = None
-) -> list[Unmodelled]:
-    """Each family of torques (None: all) with its evidence, best first."""
-    found = [
-        _fitted(rest, basis, family, response)
-        for family, response in zip(basis.families, basis.responses, strict=True)
-        if variables is None or family.variable in variables
+@frozen
+class Tried:
+    """A family and how well it predicts."""
+
+    table: Table
+    share: float
+
+
+def predicted_share(rest: Remainder, columns: Sequence[Array], labels: NDArray[np.intp]) -> float:
+    """Share of what is left, beyond noise, that columns predict of blocks left out one by one."""
+    own = np.concatenate(columns, axis=1) * rest.weight[:, None]
+    joined, q = np.concatenate([rest.base, own], axis=1), rest.base.shape[1]
+    grams = [
+        Gram.of(joined[labels == label], rest.residual[labels == label])
+        for label in np.unique(labels)
     ]
-    return sorted(found, key=lambda item: -item.evidence)
+    matrix = np.sum([gram.matrix for gram in grams], axis=0)
+    vector = np.sum([gram.vector for gram in grams], axis=0)
+    square = float(rest.residual @ rest.residual)
+    left = []
+    for count in (q, joined.shape[1]):
+        error = 0.0
+        for gram in grams:
+            others = Gram(matrix - gram.matrix, vector - gram.vector, square)
+            at = solve(others, range(count)).mean
+            part = gram.matrix[:count, :count]
+            error += gram.square - 2.0 * float(at @ gram.vector[:count]) + float(at @ part @ at)
+        left.append(error)
+    return (left[0] - left[1]) / max(left[0] - len(rest.residual), 1e-9)
 
 
-def _fitted(rest: Remainder, basis: BasisResponses, family: Family, response: Array) -> Unmodelled:
-    count, first = response.shape[1], len(rest.gram.vector)
-    parts = [_only(response * rest.weight[:, None], rows) for rows in basis.rows]
-    alone = rest.solved(()).evidence
-    by_wheel = [rest.solved((part,)).evidence - alone for part in parts]
-    least = max(_WHEEL_SHARE * max(by_wheel), _NEEDED)
-    wheels = tuple(wheel for wheel in range(WHEELS) if by_wheel[wheel] > least)
-    wheels = wheels or (int(np.argmax(by_wheel)),)
-    chosen = [parts[wheel] for wheel in wheels]
-    whole = rest.solved(chosen)
-    weights = tuple(basis.size * part for part in np.split(whole.mean[first:], len(wheels)))
-    rows = slice(first, first + count)
-    name = rest.dataset.simulations[0].robot.wheel_names[wheels[0]]
-    shape = _shape(family, name, weights[0], basis.size**2 * whole.covariance[rows, rows])
-    columns = np.concatenate(chosen, axis=1)
-    return Unmodelled(family, whole.evidence - alone, wheels, columns, shape, weights)
+def unmodelled_effect(
+    rest: Remainder, robot: Robot, scales: Scales, *, is_sure: bool = False
+) -> Unmodelled | None:
+    """The term that predicts most of what is left, if any predicts enough of it.
 
-
-def _only(columns: Array, rows: NDArray[np.intp]) -> Array:
-    kept = np.zeros_like(columns)
-    kept[rows] = columns[rows]
-    return kept
-
-
-def _shape(family: Family, wheel: str, weights: Array, covariance: Array) -> Shape:
-    """The curve of some weights of basis functions [N m], with its interval."""
-    first, last = (0.0, 2.0 * np.pi) if family.is_periodic else family.knots[[0, -1]]
-    at = np.linspace(first, last, _POINTS)
-    basis = family.at(at).T
-    curve = basis @ weights
-    half = 1.96 * np.sqrt(np.einsum("ij,jk,ik->i", basis, covariance, basis))
-    return Shape(family.variable, wheel, at, curve, curve - half, curve + half)
-
-
-def gains(
-    rest: Remainder,
-    jacobian: Jacobian,
-    changes: Sequence[Array],
-    unmodelled: Unmodelled | None = None,
-) -> list[float]:
-    """Log evidence that each named finding brings, all else fitted anew without it.
-
-    Args:
-        rest: what the model with all findings leaves.
-        jacobian: derivatives at it.
-        changes: what each of its findings adds to the values, (n,).
-        unmodelled: an effect without a name whose torques are there as well.
+    `is_sure`: something is there, whatever it is.
     """
-    both = rest.base
-    if unmodelled is not None:
-        both = np.concatenate([both, unmodelled.columns], axis=1)
-    everything = list(range(both.shape[1]))
-    gram = Gram.of(both, rest.residual)
-    whole, found = _likelihood(gram, everything), []
-    for part, change in zip(jacobian.own, changes, strict=True):
-        others = [row for row in everything if not part.start <= row < part.stop]
-        lacking = rest.residual + change * rest.weight
-        other = Gram(gram.matrix, both.T @ lacking, float(lacking @ lacking))
-        found.append(whole - _likelihood(other, others))
+    motions = [motion_in(item, robot) for item in rest.dataset.simulations]
+    tried = families_tried(rest, robot, scales, motions)
+    if not tried:
+        return None
+    lasting = next((item for item in tried if not item.table.family.is_event), None)
+    events = next((item for item in tried if item.table.family.is_event), None)
+    best = lasting or events
+    if lasting and events and lasting.share < max(_EVENT * events.share, _TOLD):
+        best = events
+    if best is None or (best.share < _TOLD and not is_sure):
+        return None
+    if best is events:  # few stretches may not meet again, but a law that holds for all is one
+        for item in [item for item in tried if item.table.family.is_strange]:
+            found = fitted(rest, item, robot, motions)
+            if found.laws and found.explained > _LAW:
+                return found
+    return fitted(rest, best, robot, motions)
+
+
+def families_tried(
+    rest: Remainder, robot: Robot, scales: Scales, motions: Sequence[Motion]
+) -> list[Tried]:
+    """All families that the recordings can show, best first."""
+    stretch, moment = rest.blocks
+    kinds = {channel.kind for channel in rest.dataset.channels}
+    found = []
+    for family in FAMILIES.values():
+        seen = {"driver": "power", "supply": "total"}.get(family.acts)
+        table = Table.over(family, motions, scales)
+        if table is None or (seen is not None and seen not in kinds):
+            continue
+        labels = moment if family.is_event else stretch
+        columns = table.columns(rest.dataset, robot, motions, is_exact=False)
+        found.append(Tried(table, predicted_share(rest, columns, labels)))
+    most = max((item.share for item in found), default=0.0)
+    for number, item in enumerate(found):
+        family = item.table.family
+        if family.acts == "torque" and item.share > most - _NEAR:
+            columns = item.table.columns(rest.dataset, robot, motions)
+            labels = moment if family.is_event else stretch
+            found[number] = evolve(item, share=predicted_share(rest, columns, labels))
+    return sorted(found, key=lambda item: -item.share)
+
+
+def refitted(rest: Remainder, effect: Unmodelled, robot: Robot) -> Unmodelled:
+    """The same term, fitted anew to what another model leaves."""
+    motions, table = [motion_in(item, robot) for item in rest.dataset.simulations], effect.table
+    stretch, moment = rest.blocks
+    columns = table.columns(rest.dataset, robot, motions)
+    share = predicted_share(rest, columns, moment if table.family.is_event else stretch)
+    return fitted(rest, Tried(table, share), robot, motions)
+
+
+def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]) -> Unmodelled:
+    """A family's table, at the wheels that show it."""
+    table = best.table
+    columns = [part * rest.weight[:, None] for part in table.columns(rest.dataset, robot, motions)]
+    numbers, base = list(range(len(columns))), rest.base.shape[1]
+    units, _, _ = _solved(rest, columns)
+    at_wheels = table.family.acts in ("torque", "driver")
+    if at_wheels:
+        energy = [float(((c @ u) ** 2).sum()) for c, u in zip(columns, units, strict=True)]
+        numbers = [n for n in numbers if energy[n] > _WHEEL_SHARE * max(energy)]
+    chosen = [columns[number] for number in numbers]
+    units, covariance, change = _solved(rest, chosen)
+    alone = rest.residual - rest.base @ solve(Gram.of(rest.base, rest.residual), range(base)).mean
+    left = rest.residual - change
+    count = len(units[0])
+    sigma = [
+        np.sqrt(np.einsum("ij,jk,ik->i", table.root, covariance[part, part], table.root))
+        for part in (slice(n * count, (n + 1) * count) for n in range(len(units)))
+    ]
+    joined = np.concatenate(chosen, axis=1)
+    own, term = joined @ np.concatenate(units), table.term(units, tuple(numbers) * at_wheels)
+    equations, change = _normal_equations(rest, joined, left), own / rest.weight
+    laws, simulated = laws_of(table, term, equations), term
+    if laws:
+        first, change = polished(
+            laws[0],
+            rest.dataset,
+            robot,
+            motions,
+            residual=rest.residual,
+            base=rest.base,
+            weight=rest.weight,
+            inflation=equations.inflation,
+        )
+        laws, simulated = [first, *laws[1:]], first.term
+    return Unmodelled(
+        table,
+        term,
+        tuple(law.fitted for law in laws),
+        simulated,
+        best.share,
+        not table.family.is_event or bool(laws),
+        _evidence(rest.dataset, alone, left),
+        _is_large(rest.dataset, change),
+        change,
+        _explained(rest, alone, change),
+        np.stack(sigma),
+    )
+
+
+def _explained(rest: Remainder, alone: Array, change: Array) -> float:
+    lacking, count = rest.residual - change * rest.weight, rest.base.shape[1]
+    lacking = lacking - rest.base @ solve(Gram.of(rest.base, lacking), range(count)).mean
+    return 1.0 - float(lacking @ lacking) / max(float(alone @ alone), 1e-300)
+
+
+def _normal_equations(rest: Remainder, columns: Array, left: Array) -> Evidence:
+    """Of columns, what is not exactly known otherwise eliminated."""
+    base = rest.base
+    inner = base.T @ base + np.eye(base.shape[1])
+    cross = np.linalg.solve(inner, base.T @ np.column_stack([columns, rest.residual]))
+    return Evidence(
+        columns.T @ columns - columns.T @ base @ cross[:, :-1],
+        columns.T @ rest.residual - columns.T @ base @ cross[:, -1],
+        max(float(np.mean([factor for _, factor in _inflations(rest.dataset, left)])), 1.0),
+    )
+
+
+def _inflations(dataset: Dataset, left: Array) -> list[tuple[slice, float]]:
+    """By channel: variance of what is left over that of its noise, times its correlation time."""
+    found = []
+    for part in rows_of(dataset.channels):
+        lags = min(_LAGS, (part.stop - part.start) // 4 + 1)
+        time = autocorrelation_time([left[part]], lags, 0.03)
+        found.append((part, max(float(np.mean(left[part] ** 2)), 1.0) * time))
     return found
 
 
-def still_needed(model: Model, gained: Sequence[float], unmodelled: Unmodelled) -> list[bool]:
-    """Whether each finding of a model is needed, from what it brings beside the unmodelled one."""
-    least = max(_NEEDED, SIMULATOR.beside_unmodelled * unmodelled.evidence)
-    robot = model.described.robot
-    return [
-        gain > least and not _contradicts(unmodelled, hypothesis, robot)
-        for gain, hypothesis in zip(gained, model.hypotheses, strict=True)
-    ]
+def _evidence(dataset: Dataset, before: Array, after: Array) -> float:
+    """Log likelihood gained, each sample counted by what of it is not known from the last ones."""
+    return sum(
+        0.5 * float(before[part] @ before[part] - after[part] @ after[part]) / factor
+        for part, factor in _inflations(dataset, after)
+    )
 
 
-def _contradicts(unmodelled: Unmodelled, hypothesis: Hypothesis, robot: Robot) -> bool:
-    """Whether what is left is of the same variable and wheel: then it is not of the named shape."""
-    if _SHAPED.get(hypothesis.effect) != unmodelled.family.variable:
-        return False
-    wheels = {robot.wheel_names[wheel] for wheel in unmodelled.wheels}
-    return bool(wheels & set(hypothesis.where)) or "all_wheels" in hypothesis.where
+def _is_large(dataset: Dataset, change: Array) -> bool:
+    return any(
+        float(np.std(change[part])) > _SMALL * float(np.std(channel.value))
+        for channel, part in zip(dataset.channels, rows_of(dataset.channels), strict=True)
+        if channel.kind in DRAWN_KINDS
+    )
 
 
-def _likelihood(gram: Gram, chosen: Sequence[int]) -> float:
-    """Log evidence of some columns, up to what all residuals of one weighting share."""
-    return solve(gram, chosen).evidence - 0.5 * gram.square
+def _solved(rest: Remainder, columns: Sequence[Array]) -> tuple[list[Array], Array, Array]:
+    """Units of each block of whitened columns, their covariance, and all that is explained."""
+    joined = np.concatenate([rest.base, *columns], axis=1)
+    found, q = solve(Gram.of(joined, rest.residual), range(joined.shape[1])), rest.base.shape[1]
+    units = np.split(found.mean[q:], len(columns))
+    return units, found.covariance[q:, q:], joined @ found.mean
+
+
+def shape_of(effect: Unmodelled, robot: Robot) -> Shape:
+    """Its curve with an interval; of a table of two variables what it is along the first."""
+    family, term = effect.family, effect.learnt
+    count = len(term.knots[0])
+    values, sigma = (item[0].reshape(count, -1) for item in (term.values, effect.sigma))
+    across = int(np.argmin(sigma.sum(axis=0)))
+    value, half = values[:, across], 1.96 * sigma[:, across]
+    title = " and ".join(axis.title for axis in family.axes)
+    where = robot.wheel_names[term.wheels[0]] if term.wheels else wheels_of(term, robot)[0]
+    return Shape(title, where, term.knots[0], value, value - half, value + half, term.unit)
+
+
+def wheels_of(term: LearntTerm, robot: Robot) -> tuple[str, ...]:
+    """Where a term acts, as a report names it."""
+    if term.family.acts in ("force", "supply"):
+        return ("body",) if term.family.acts == "force" else ("supply",)
+    return names(term.wheels, robot)
 
 
 def names(wheels: Sequence[int], robot: Robot) -> tuple[str, ...]:

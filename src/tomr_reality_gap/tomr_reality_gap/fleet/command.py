@@ -9,6 +9,7 @@ from attrs import evolve
 from tqdm import tqdm
 
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_OK
+from tomr_power_model.files import make_folder, write_together
 from tomr_reality_gap.arguments import add_quiet, add_tolerance, tolerances_of
 from tomr_reality_gap.fleet.cases import Defaults, cases_of
 
@@ -65,7 +66,6 @@ def _fleet(options: argparse.Namespace) -> int:
     from tomr_reality_gap.fleet import overview
     from tomr_reality_gap.fleet.outcome import explain_case
     from tomr_reality_gap.fleet.scheduler import outcomes
-    from tomr_reality_gap.report.write import make_folder, write_text
 
     make_folder(options.out)
     found: list[Outcome] = []
@@ -75,8 +75,12 @@ def _fleet(options: argparse.Namespace) -> int:
             found.append(_kept(outcome, options.out))
             bar.set_postfix_str(f"{outcome.name}: {outcome.verdict}", refresh=False)
             bar.update()
-    write_text(options.out / overview.HTML, overview.overview_page(found))
-    write_text(options.out / overview.JSON, overview.overview_json(found))
+    write_together(
+        {
+            options.out / overview.HTML: overview.overview_page(found),
+            options.out / overview.JSON: overview.overview_json(found),
+        }
+    )
     if not options.quiet:
         print(overview.counted(found))
         for item in overview.in_order(found):
@@ -91,9 +95,9 @@ def _fleet(options: argparse.Namespace) -> int:
 
 def _kept(outcome: "Outcome", out: Path) -> "Outcome":
     """The outcome without its texts, which are written: a fleet's would fill the memory."""
-    from tomr_reality_gap.report.write import make_folder, write_texts
+    from tomr_reality_gap.report.write import write_report
 
     if outcome.texts:
         make_folder(out / outcome.name)
-        write_texts(out / outcome.name, outcome.texts)
+        write_report(out / outcome.name, outcome.texts)
     return evolve(outcome, texts={})

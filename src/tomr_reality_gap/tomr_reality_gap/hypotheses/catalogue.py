@@ -243,7 +243,15 @@ class _Catalogue:
                 Parameter(name, keys, unit, std, step=step, lower=low, upper=high, is_shape=True)
             )
         least = prior.least(self.scales)
-        return Hypothesis(effect_id, where, tuple(found), start=start, least=least)
+        return Hypothesis(
+            effect_id,
+            where,
+            tuple(found),
+            start=start,
+            least=least,
+            log_prior=prior.log_prior,
+            stands_for=prior.stands_for,
+        )
 
     def wrong_parameters(self) -> Iterator[Hypothesis]:
         relatives = dict(_PARAMETERS)

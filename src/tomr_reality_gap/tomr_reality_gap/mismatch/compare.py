@@ -1,6 +1,6 @@
 """Measured against simulated, before and after, and what that amounts to."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -9,31 +9,11 @@ from numpy.typing import NDArray
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.statistics import robust_scale
 from tomr_power_model.model.scores import accuracy
-from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
 from tomr_reality_gap.explanation import Comparison, Score
-from tomr_reality_gap.mismatch.probes import Motion, motion_of
 
 Array = NDArray[np.float64]
-
-
-def simulated(
-    simulation: RecordingSimulation,
-    before: Robot,
-    after: Robot,
-    besides: Callable[[Motion], Array] | None,
-) -> tuple[Array, Run]:
-    """Values before and after, (2, n), and the motion of `RecordingSimulation.run` after.
-
-    `besides` are torques at the wheels that no robot's description holds.
-    """
-    run = simulation.run(after)
-    values = simulation.predict([before, after])
-    if besides is not None:
-        torque = besides(motion_of(simulation, after, run))
-        values[1] = next(simulation.respond(after, torque[None]))
-    return values, run
 
 
 def comparison(

@@ -193,5 +193,5 @@ def shape_picture(shape: Shape) -> str:
         panel.plot(shape.at, shape.value, color=AFTER, lw=_WIDE)
         panel.axhline(0.0, color="black", lw=0.6)
         panel.set_xlabel(shape.variable, fontsize=8)
-        panel.set_ylabel(f"{shape.wheel}\nresisting torque, N m", fontsize=8)
+        panel.set_ylabel(f"{shape.wheel}\n{shape.unit}", fontsize=8)
         return png(page)

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tomr_reality_gap.explanation import Estimate, Explanation, Finding, Score, Shape
+from tomr_reality_gap.explanation import Estimate, Explanation, Finding, Learnt, Score, Shape
+from tomr_reality_gap.fit.laws import words_of
 from tomr_reality_gap.report.words import decimals
 
 Value = object  # what json.dumps takes
@@ -71,7 +72,33 @@ def _finding(finding: Finding) -> dict[str, Value]:
     }
     if finding.shape is not None:
         fields["shape"] = _shape(finding.shape)
+    if finding.learnt is not None:
+        fields["learnt"] = _learnt(finding.learnt)
     return fields
+
+
+def _learnt(learnt: Learnt) -> Mapping[str, Value]:
+    term = learnt.term
+    return {
+        "family": term.family.family_id,
+        "words": term.family.words,
+        "variables": [axis.title for axis in term.family.axes],
+        "repeatable": learnt.is_repeatable,
+        "laws": [
+            {
+                "law": law.name,
+                "words": words_of(law),
+                "parameters": {name: _estimate(item) for name, item in law.parameters.items()},
+                "share_of_table": _number(law.share, 3),
+            }
+            for law in learnt.laws
+        ],
+        "share_predicted": _number(learnt.share, 3),
+        "unit": term.unit,
+        "knots": [[_number(at, 6) for at in points] for points in term.knots],
+        "values": [[_number(value, 6) for value in row] for row in term.values],
+        "sigma": [[_number(value, 6) for value in row] for row in learnt.sigma],
+    }
 
 
 def _estimate(estimate: Estimate) -> Mapping[str, Value]:
@@ -104,6 +131,7 @@ def _shape(shape: Shape) -> Mapping[str, Value]:
     return {
         "variable": shape.variable,
         "wheel": shape.wheel,
+        "unit": shape.unit,
         "at": rounded(shape.at),
         "value": rounded(shape.value),
         "low": rounded(shape.low),

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from tomr_power_model.errors import InputError
+from tomr_power_model.files import write_together
 from tomr_reality_gap.explanation import Explanation
 from tomr_reality_gap.report.html import report_page
 from tomr_reality_gap.report.json import report_json
@@ -21,25 +21,13 @@ def report_files(
     return texts
 
 
-def make_folder(folder: Path) -> None:
-    """Make a folder for results. Raises InputError where that cannot be."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: no folder can be made there ({error.strerror})") from None
+def write_report(
+    folder: Path, texts: Mapping[str, str], others: Mapping[Path, str] | None = None
+) -> None:
+    """Write the files of a report, and others of the same run, together.
 
-
-def write_texts(folder: Path, texts: Mapping[str, str]) -> None:
-    """Write files into a folder, and drop an explained description of an earlier run."""
-    if EXPLAINED not in texts:
-        (folder / EXPLAINED).unlink(missing_ok=True)
-    for name, text in texts.items():
-        write_text(folder / name, text)
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write one file. Raises InputError where that cannot be."""
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}): give another") from None
+    An explained description of an earlier run goes.
+    """
+    files = {folder / name: text for name, text in texts.items()}
+    stale = [] if EXPLAINED in texts else [folder / EXPLAINED]
+    write_together({**files, **(others or {})}, stale)

@@ -86,6 +86,6 @@ def import_robotino(arguments: Sequence[str] | None = None) -> int:
     return EXIT_BAD_INPUT if failed else EXIT_OK
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of the command line."""
-    return run_main(import_robotino)
+    return run_main(import_robotino, arguments)

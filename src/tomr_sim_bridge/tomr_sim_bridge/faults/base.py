@@ -1,13 +1,14 @@
 """What a fault is, and the registry that parameters and mission files are made from."""
 
 from collections.abc import Mapping
-from typing import ClassVar, cast
+from typing import ClassVar, Literal, cast
 
 import numpy as np
-from attrs import define
+from attrs import define, field, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.robot import WHEELS
 from tomr_power_model.robot.parameters import ParameterSpec, Value, check_all
 
 Vector = NDArray[np.float64]
@@ -31,15 +32,64 @@ WHEEL_SPEC = ParameterSpec(
 )
 
 
+def size_spec(name: str, unit: str, default: float, maximum: float, what: str) -> ParameterSpec:
+    """What a fault changes at severity 1; below it is that much less."""
+    return ParameterSpec(
+        name,
+        f"{what}, at severity 1",
+        unit=unit,
+        default=default,
+        minimum=0.0,
+        maximum=maximum,
+        read_only=False,
+    )
+
+
+@frozen
+class BodyMotion:
+    """Where the robot is and how it moves, in the world."""
+
+    time: float  # s
+    mass: float  # kg
+    position: Vector  # m, of base_link, shape (2,)
+    yaw: float  # rad
+    velocity: Vector  # m/s, of base_link, shape (2,)
+    yaw_rate: float  # rad/s
+
+
+def _ones() -> Vector:
+    return np.ones(WHEELS)
+
+
+def _zeros() -> Vector:
+    return np.zeros(WHEELS)
+
+
 @define
 class FaultActions:
     """Where faults take hold of the plant during one stretch. Arrays have shape (3,): per wheel."""
 
     contact: Vector  # m, wheel contacts in the world, shape (3, 2)
-    drive: Vector  # share of the commanded voltage that reaches the bridge
-    connected: NDArray[np.bool_]  # False: the bridge is off and the motor carries no current
-    encoder: Vector  # share of the counts that is reported
     friction: Vector  # traction coefficient under each wheel
+    body: BodyMotion
+    drive: Vector = field(factory=_ones)  # share of the voltage that reaches the bridge
+    connected: NDArray[np.bool_] = field(factory=lambda: np.ones(WHEELS, dtype=bool))  # bridge on
+    encoder: Vector = field(factory=_ones)  # share of the counts that is reported
+    dry: Vector = field(factory=_zeros)  # N m, dry friction added at the axle
+    resistance: Vector = field(factory=_ones)  # of the motor circuit, times that of the winding
+    constant: Vector = field(factory=_ones)  # of torque and back-EMF, times that of the motor
+    obedience: float = 1.0  # share of the commanded twist that the drivers act upon
+    undervoltage: float = 0.0  # V that the supply lacks
+    push: Vector = field(factory=lambda: np.zeros(3))  # N, N in the world; N m upward
+    meter_scale: Vector = field(factory=_ones)  # of measured power
+    meter_bias: Vector = field(factory=_zeros)  # W
+    meter_frozen: Vector = field(factory=_zeros)  # share of an old reading in each new one
+    meter_lost: Vector = field(factory=_zeros)  # share of the readings that never come
+
+
+# What a diagnosis should make of it: a fault that it can know by name, something wrong that is
+# none of these, or nothing wrong at all.
+Nature = Literal["fault", "unknown", "disturbance"]
 
 
 class Fault:
@@ -48,6 +98,7 @@ class Fault:
     fault_id: ClassVar[str]
     description: ClassVar[str]
     parameters: ClassVar[tuple[ParameterSpec, ...]]
+    nature: ClassVar[Nature] = "fault"
 
     def __init__(self, settings: Mapping[str, Value]) -> None:
         self.settings = dict(settings)
@@ -59,6 +110,10 @@ class Fault:
     @property
     def severity(self) -> float:
         return self.number("severity")
+
+    def sized(self, name: str) -> float:
+        """What a setting of the size at severity 1 amounts to, in its unit."""
+        return self.severity * self.number(name)
 
     @property
     def wheel(self) -> int | None:
@@ -104,6 +159,11 @@ def check_settings(fault_id: str, values: Mapping[str, object], place: str) -> d
                 f"{place}: {fault_id} has no setting {name!r}: give {', '.join(known)}"
             )
     return check_all(kind.parameters, values, f"{place}: {fault_id}")
+
+
+def natures() -> dict[str, Nature]:
+    """What a diagnosis should make of each fault, by id."""
+    return {fault_id: _REGISTRY[fault_id].nature for fault_id in fault_ids()}
 
 
 def all_parameters() -> dict[str, ParameterSpec]:

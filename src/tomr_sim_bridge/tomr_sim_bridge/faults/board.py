@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 
-import numpy as np
 from attrs import frozen
 
 from tomr_sim_bridge.faults.base import (
+    BodyMotion,
     Fault,
     FaultActions,
     Vector,
@@ -31,6 +31,7 @@ class FaultBoard:
     def __init__(self) -> None:
         self._faults = {name: self._make(name, {}) for name in fault_ids()}
         self._bearing = dict.fromkeys(self._faults, False)
+        self._on: list[tuple[str, Fault]] = []
 
     def set(self, fault_id: str, values: Mapping[str, object]) -> None:
         """Set a fault; settings not named return to their defaults.
@@ -39,26 +40,18 @@ class FaultBoard:
         """
         self._faults[fault_id] = self._make(fault_id, values)
         self._bearing[fault_id] = False
+        self._on = [(name, fault) for name, fault in self._faults.items() if fault.severity > 0]
 
-    def actions(self, contact: Vector, friction: Vector) -> FaultActions | None:
-        """What the faults do to the plant now, None while all are off.
+    def actions(self, contact: Vector, friction: Vector, body: BodyMotion) -> FaultActions:
+        """What the faults do to the plant now.
 
         Args:
             contact: wheel contacts in the world [m], shape (3, 2).
             friction: traction coefficients of the healthy floor, shape (3,).
+            body: how the robot moves.
         """
-        on = [(name, fault) for name, fault in self._faults.items() if fault.severity > 0]
-        if not on:
-            return None
-        wheels = len(contact)
-        actions = FaultActions(
-            contact=contact,
-            drive=np.ones(wheels),
-            connected=np.ones(wheels, dtype=bool),
-            encoder=np.ones(wheels),
-            friction=friction.copy(),
-        )
-        for name, fault in on:
+        actions = FaultActions(contact, friction.copy(), body)
+        for name, fault in self._on:
             self._bearing[name] = fault.apply(actions)
         return actions
 

@@ -3,16 +3,18 @@
 import csv
 import math
 import os
-import tarfile
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from attrs import asdict, fields, frozen
 
-from tomr_power_model.errors import InputError
+from tomr_power_model.errors import InputError, one_line
+from tomr_power_model.files import make_folder, write_text
+from tomr_sim_bridge.importers.archive import unpack
 from tomr_sim_bridge.importers.robotino import Run, read_run, write_run
 
 ARCHIVES = (".tar.gz", ".tgz", ".tar")
@@ -68,9 +70,9 @@ def open_dataset(dataset: Path) -> Iterator[list[SourceFile]]:
             found = _files(dataset, dataset)
             archives = sorted(path for path in dataset.iterdir() if _is_archive(path))
             if not found and len(archives) == 1:
-                found = _files(_unpack(archives[0], Path(scratch)), archives[0])
+                found = _files(unpack(archives[0], Path(scratch)), archives[0])
         elif _is_archive(dataset):
-            found = _files(_unpack(dataset, Path(scratch)), dataset)
+            found = _files(unpack(dataset, Path(scratch)), dataset)
         else:
             raise InputError(f"{dataset} is neither a folder nor a .tar.gz of the data set")
         if not found:
@@ -97,24 +99,26 @@ def import_files(
     """Write a recording per file and `index.csv`; return how many succeeded and failed.
 
     A file that cannot be read is handed to `report` as one line, and the others are still done.
-    The index gains its line as soon as a recording is complete.
+    The index is written in the end, also where that is an interruption.
     """
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     done = failed = 0
-    with (out / "index.csv").open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.DictWriter(stream, [field.name for field in fields(IndexRow)])
-        writer.writeheader()
+    index = StringIO(newline="")
+    writer = csv.DictWriter(index, [field.name for field in fields(IndexRow)])
+    writer.writeheader()
+    try:
         for file in files:
             try:
                 run = read_run(file.path, file.place)
                 write_run(run, out / file.bag, storage)
             except InputError as error:
-                report(str(error))
+                report(one_line(error))
                 failed += 1
                 continue
             writer.writerow(asdict(index_row(file, run)))
-            stream.flush()
             done += 1
+    finally:
+        write_text(out / "index.csv", index.getvalue())
     return done, failed
 
 
@@ -138,16 +142,6 @@ def index_row(file: SourceFile, run: Run) -> IndexRow:
 
 def _is_archive(path: Path) -> bool:
     return path.is_file() and path.name.endswith(ARCHIVES)
-
-
-def _unpack(archive: Path, folder: Path) -> Path:
-    try:
-        with tarfile.open(archive) as tar:
-            tar.extractall(folder, filter="data")
-    except (tarfile.TarError, EOFError, OSError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"{archive} cannot be unpacked: {reason}; download it again") from error
-    return folder
 
 
 def _files(root: Path, shown_root: Path) -> list[SourceFile]:

@@ -1,7 +1,6 @@
 """Tables of numbers as the Robotino data set keeps them: `;`-separated, three header lines."""
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +8,12 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import read_text
 
 HEADER_LINES = 3  # description, unit, short name
 SEPARATOR = ";"
 TIME = "t"
+_LARGEST = 1e12  # in any unit of the data set
 
 Column = NDArray[np.float64]
 
@@ -74,9 +75,9 @@ def read_table(path: Path, place: str, units: Mapping[str, str], optional: froze
 
 def _lines(path: Path, place: str) -> list[str]:
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{place} cannot be read as text: {error}; download it again") from error
+        lines = read_text(path, "table_bytes", "utf-8-sig").splitlines()
+    except InputError as error:
+        raise InputError(f"{place}: {error}; download it again") from None
     if len(lines) < HEADER_LINES:
         raise InputError(
             f"{place} has {len(lines)} lines; a file of the Robotino data set begins with three "
@@ -103,8 +104,10 @@ def _numbers(line: str, names: Sequence[str], place: str) -> list[float]:
             number = float(cell)
         except ValueError:
             number = float("nan")
-        if not isfinite(number):
-            raise InputError(f"{place}, column {name!r}: {cell!r} is not a finite number")
+        if not abs(number) <= _LARGEST:  # NaN is not
+            raise InputError(
+                f"{place}, column {name!r}: {cell[:40]!r} is not a finite number up to {_LARGEST:g}"
+            )
         numbers.append(number)
     return numbers
 

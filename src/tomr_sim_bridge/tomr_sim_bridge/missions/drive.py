@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.robot import Robot
 from tomr_sim_bridge.missions.mission import Mission
+from tomr_sim_bridge.plant.drivers import COMMAND_TIMEOUT
 from tomr_sim_bridge.plant.samples import Sample, command_sample
 from tomr_sim_bridge.plant.simulation import Simulation
 
@@ -18,6 +19,7 @@ def start_mission(mission: Mission, robot: Robot, seed: int = 0, start_ns: int =
         floor_friction=mission.floor_friction or None,
         payload=mission.payload,
         stamp_jitter=mission.stamp_jitter,
+        command_timeout=COMMAND_TIMEOUT,
     )
 
 

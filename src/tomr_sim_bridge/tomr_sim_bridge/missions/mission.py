@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
-import yaml
 from attrs import frozen
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import load_yaml, read_text
+from tomr_power_model.limits import limits, too_large
 from tomr_power_model.robot import Robot
 from tomr_power_model.robot.parameters import ParameterSpec
 from tomr_sim_bridge.missions.schema import (
@@ -22,6 +23,7 @@ from tomr_sim_bridge.missions.schema import (
     Twist,
     TwistPhase,
     check,
+    longest,
     parse_fault,
     parse_phase,
 )
@@ -32,12 +34,12 @@ _SETTINGS = (
     _S("name", "of the mission", kind="str"),
     _S("description", "one line", kind="str", default=""),
     _S("robot", "shipped name or path", kind="str", default="reference"),
-    _S("command_rate", "of cmd_vel", unit="Hz", default=20.0, above=0.0, maximum=1000.0),
+    _S("command_rate", "of cmd_vel", unit="Hz", default=20.0, minimum=0.1, maximum=1000.0),
     _S("repeat", "times through the phases", kind="int", default=1, minimum=1, maximum=10_000),
-    _S("payload", "on top of the description", unit="kg", default=0.0, minimum=0.0),
+    _S("payload", "on top of the description", unit="kg", default=0.0, minimum=0.0, maximum=1e4),
     _S("floor_friction", "0: that of the robot", default=0.0, minimum=0.0, maximum=10.0),
     _S("stamp_jitter", "of the sampling times", unit="s", default=0.0, minimum=0.0, maximum=1.0),
-    _S("seed", "-1: that of the run", kind="int", default=-1, minimum=-1),
+    _S("seed", "-1: that of the run", kind="int", default=-1, minimum=-1, maximum=2**63 - 1),
 )
 
 
@@ -145,12 +147,10 @@ def load_mission(source: Path | str) -> Mission:
         resource = files("tomr_sim_bridge").joinpath("missions").joinpath(f"{place}.yaml")
         return parse_mission(resource.read_text(encoding="utf-8"), f"{place}.yaml")
     try:
-        text = Path(source).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or error
+        text = read_text(Path(source))
+    except InputError as error:
         raise InputError(
-            f"{place}: cannot be read ({reason}): give a mission file or one of "
-            f"{', '.join(shipped_missions())}"
+            f"{error}: give a mission file or one of {', '.join(shipped_missions())}"
         ) from None
     return parse_mission(text, place)
 
@@ -180,23 +180,27 @@ def parse_mission(text: str, place: str) -> Mission:
         for index, fault in enumerate(_list(faults, f"{place}: faults"))
     )
     _reject_overlap(planned, place)
-    return Mission(
-        phases=tuple(
-            parse_phase(phase, f"{place}: phases[{index}]") for index, phase in enumerate(phases)
-        ),
-        faults=planned,
-        **settings,  # type: ignore[arg-type]
+    parsed = tuple(
+        parse_phase(phase, f"{place}: phases[{index}]") for index, phase in enumerate(phases)
     )
+    mission = Mission(phases=parsed, faults=planned, **settings)  # type: ignore[arg-type]
+    _reject_endless(mission, place)
+    return mission
+
+
+def _reject_endless(mission: Mission, place: str) -> None:
+    pieces = mission.repeat * sum(
+        phase.count if isinstance(phase, RandomPhase) else 1 for phase in mission.phases
+    )
+    seconds = mission.repeat * sum(longest(phase) for phase in mission.phases)
+    if pieces > limits().mission_phases:
+        too_large(place, f"{pieces:,} phases", "mission_phases")
+    if seconds > limits().mission_seconds:
+        too_large(place, f"it may last {seconds:,.0f} s", "mission_seconds")
 
 
 def _document(text: str, place: str) -> Mapping[str, object]:
-    try:
-        document = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f" line {mark.line + 1}:" if mark is not None else ""
-        problem = getattr(error, "problem", None) or "not YAML"
-        raise InputError(f"{place}:{line} {problem}: mend the YAML") from None
+    document = load_yaml(text, place)
     if not isinstance(document, Mapping):
         raise InputError(f"{place}: is no mapping: start with name: and phases:")
     return cast(Mapping[str, object], document)

@@ -80,6 +80,13 @@ class RandomPhase:
 Phase = TwistPhase | MovePhase | CirclePhase | RandomPhase
 
 
+def longest(phase: Phase) -> float:
+    """The longest time that a phase may take [s]."""
+    if isinstance(phase, RandomPhase):
+        return phase.count * (phase.duration[1] + phase.pause)
+    return phase.duration
+
+
 @frozen
 class PlannedFault:
     """A fault with the time it is in force [s from the start], `end` None: to the end."""

@@ -1,7 +1,8 @@
-"""Node `sim_bridge`: the simulated robot on the topics of a real one, with /clock."""
+"""Node `sim_bridge`: the simulated robot on the topics of a real one."""
 
 import time
 from collections.abc import Sequence
+from importlib.util import find_spec
 from typing import Any
 
 import attrs
@@ -9,35 +10,41 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from tomr_power_model.cli import run_main
+from tomr_power_model.errors import InputError
 from tomr_power_model.messages import plain
 from tomr_power_model.messages.intake import Unusable, stamp_of, twist_of
 from tomr_power_model.messages.plain import NANOSECONDS
+from tomr_power_model.messages.types import TEXT
 from tomr_power_model.nodes.command_line import node_arguments
+from tomr_power_model.nodes.command_type import CommandType
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
 from tomr_power_model.nodes.stage_node import (
-    CMD_VEL_TYPE,
     SENSOR_QOS,
     STAGE_QOS,
-    TWIST_TYPES,
     message_class,
     run_node,
     to_ros,
 )
-from tomr_power_model.robot.parameters import ParameterSpec, Value
+from tomr_power_model.robot.parameters import CMD_VEL_TYPE, ParameterSpec, Value
+from tomr_power_model.robot.urdf import urdf_of
 from tomr_sim_bridge.faults import all_parameters, split_name
-from tomr_sim_bridge.plant.samples import Sample
+from tomr_sim_bridge.plant.drivers import COMMAND_TIMEOUT
+from tomr_sim_bridge.plant.samples import Sample, transform_of
 from tomr_sim_bridge.plant.simulation import Simulation
 
 DESCRIPTION = """\
 The simulated robot on the topics of a real one: joint_states, <wheel>/power, battery_state,
-imu/data, odom, ground_truth/odom, ground_truth/faults and /clock. Listens to cmd_vel.
+imu/data, odom, robot_description (URDF), ground_truth/odom, ground_truth/faults, tf where
+tf2_msgs is installed, and /clock where asked. Listens to cmd_vel.
 Takes the parameters below and the robot's description, from a robot.yaml."""
 EPILOG = """\
 examples:
-  sim_bridge --ros-args --params-file robot.yaml
+  sim_bridge --ros-args --params-file robot.yaml -p publish_clock:=true
+  sim_bridge --ros-args --params-file robot.yaml -r __ns:=/robot_2
   sim_bridge --ros-args --params-file robot.yaml -p faults.encoder_lost.severity:=1.0
   ros2 param set /sim_bridge faults.floor_slippery.severity 0.9
 
@@ -47,11 +54,21 @@ LONGEST_RUN_NS = 50_000_000  # of this computer between two looks at commands an
 LONGEST_LEAP_NS = 50_000_000  # of the plant at once at real time; what is more slows the clock
 NOTICEABLE_NS = 500_000_000  # that the clock was slowed by
 FOREIGN_NS = 1_000_000_000  # between a command's stamp and a clock that is not its own
+# A description stays to be had by who comes later.
+LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+ODOMETRY_TOPIC = "odom"
 WARN_PERIOD = 10.0  # s between two warnings of a kind
 
 _S = ParameterSpec
 PARAMETERS = (
     CMD_VEL_TYPE,
+    _S(
+        "publish_clock",
+        "give the time on /clock; one robot can, of several",
+        kind="bool",
+        default=False,
+    ),
+    _S("publish_tf", "base_link in odom, where tf2_msgs is installed", kind="bool", default=True),
     _S(
         "real_time_factor",
         "seconds of the robot per second",
@@ -85,6 +102,14 @@ PARAMETERS = (
         minimum=0.0,
         maximum=10.0,
     ),
+    _S(
+        "command_timeout",
+        "a command this old counts as a stop; 0: it is held",
+        unit="s",
+        default=COMMAND_TIMEOUT,
+        minimum=0.0,
+        maximum=60.0,
+    ),
     _S("stamp_jitter", "of the sampling times", unit="s", default=0.0, minimum=0.0, maximum=1.0),
 )
 FAULT_PARAMETERS = {name: attrs.evolve(spec, name=name) for name, spec in all_parameters().items()}
@@ -105,16 +130,31 @@ class SimBridge(Node):
             floor_friction=_number(values, "floor_friction") or None,
             payload=_number(values, "payload"),
             stamp_jitter=_number(values, "stamp_jitter"),
+            command_timeout=_number(values, "command_timeout"),
         )
         self._factor = _number(values, "real_time_factor")
         self._slowed_ns = 0
+        self.failure: InputError | None = None
         for fault_id in {split_name(name)[0] for name in FAULT_PARAMETERS}:
             self._set_fault(fault_id)
         self.add_post_set_parameters_callback(self._parameters_set)
         self._topics: dict[str, Any] = {}
-        self._clock_outlet = self.create_publisher(ClockMessage, "/clock", STAGE_QOS)
-        kind = TWIST_TYPES[str(values["cmd_vel_type"])]
-        self.create_subscription(message_class(kind), "cmd_vel", self._command, SENSOR_QOS)
+        self._clock_outlet = (
+            self.create_publisher(ClockMessage, "/clock", STAGE_QOS)
+            if values["publish_clock"]
+            else None
+        )
+        self._has_tf = bool(values["publish_tf"]) and find_spec("tf2_msgs") is not None
+        described = self.create_publisher(message_class(TEXT), "robot_description", LATCHED_QOS)
+        described.publish(message_class(TEXT)(data=urdf_of(robot)))
+        CommandType(
+            self,
+            "cmd_vel",
+            str(values["cmd_vel_type"]),
+            lambda name: self.create_subscription(
+                message_class(name), "cmd_vel", self._command, SENSOR_QOS
+            ),
+        )
         self._anchor()
         # A timer on the node's own clock would wait for the /clock that it makes.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -125,6 +165,12 @@ class SimBridge(Node):
         self._wall_ns, self._plant_ns = time.monotonic_ns(), self._simulation.stamp_ns
 
     def _advance(self) -> None:
+        try:
+            self._run()
+        except InputError as error:  # the plant has become unstable
+            self.failure = error
+
+    def _run(self) -> None:
         now = time.monotonic_ns()
         simulation = self._simulation
         target = self._reachable(now)
@@ -134,7 +180,9 @@ class SimBridge(Node):
                 self._publish(sample)
             if reached == target or time.monotonic_ns() - now > LONGEST_RUN_NS:
                 break
-        self._clock_outlet.publish(ClockMessage(clock=to_ros(plain.time(simulation.stamp_ns))))
+        if self._clock_outlet is not None:
+            stamp = to_ros(plain.time(simulation.stamp_ns))
+            self._clock_outlet.publish(ClockMessage(clock=stamp))
 
     def _reachable(self, now: int) -> int:
         """Where the plant is to be, but no long way on: it would pass commands still under way."""
@@ -154,16 +202,21 @@ class SimBridge(Node):
         return most
 
     def _publish(self, sample: Sample) -> None:
-        outlet = self._topics.get(sample.topic)
+        self._outlet(sample.topic, sample.message.type_name).publish(to_ros(sample.message))
+        if sample.topic == ODOMETRY_TOPIC and self._has_tf:
+            moved = transform_of(sample.message)
+            self._outlet("tf", moved.type_name).publish(to_ros(moved))
+
+    def _outlet(self, topic: str, type_name: str) -> Any:
+        outlet = self._topics.get(topic)
         if outlet is None:
-            truth = sample.topic.startswith("ground_truth/")
-            outlet = self.create_publisher(
-                message_class(sample.message.type_name),
-                sample.topic,
-                STAGE_QOS if truth else SENSOR_QOS,
+            # Who navigates asks for reliable odometry; a reliable writer serves the others too.
+            is_reliable = topic.startswith("ground_truth/") or topic in (ODOMETRY_TOPIC, "tf")
+            qos = STAGE_QOS if is_reliable else SENSOR_QOS
+            outlet = self._topics[topic] = self.create_publisher(
+                message_class(type_name), topic, qos
             )
-            self._topics[sample.topic] = outlet
-        outlet.publish(to_ros(sample.message))
+        return outlet
 
     def _command(self, message: Any) -> None:
         try:

@@ -1,6 +1,7 @@
 """Wheel speed loops of the motor drivers.
 
-A command is held until the next. The linear command vector moves towards it by at most
+A command is held until the next, or for as long as a timeout says: then it counts as a stop, as in
+drivers that watch over their master. The linear command vector moves towards it by at most
 acceleration_limit * dt, the yaw rate by acceleration_limit / robot_radius * dt; wheel set speeds
 follow by the nominal kinematics; the speed is that of the quantised encoder over one period; and
 v = kp e + ki sum(e) dt without feed-forward, integration stopped while saturated.
@@ -15,12 +16,16 @@ from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_sim_bridge.plant.wheels import Vector, rolling_rows
 
+COMMAND_TIMEOUT = 0.5  # s, as the diagnosis expects of a robot
+
 
 class WheelDrivers:
     """Three speed loops, ticked at the controller's rate."""
 
-    def __init__(self, robot: Robot, period: float) -> None:
-        """`period` is the control period [s]."""
+    def __init__(self, robot: Robot, period: float, command_timeout: float = 0.0) -> None:
+        """`period` is the control period [s]; a command older than its timeout [s] counts as a
+        stop, 0: it is held.
+        """
         controller = robot.controller
         self._period = period
         self._proportional = controller.proportional
@@ -30,6 +35,9 @@ class WheelDrivers:
         self._delay_ns = round(controller.delay * NANOSECONDS)
         self._full = robot.supply.nominal_voltage
         self._rows = rolling_rows(robot) / robot.wheel_radius
+        self.obedience = 1.0  # share of the commanded twist that is acted upon
+        self._timeout_ns = round(command_timeout * NANOSECONDS)
+        self._given_ns = 0
         self._pending: deque[tuple[int, Vector]] = deque()
         self._wanted = np.zeros(3)
         self._twist = np.zeros(3)
@@ -48,7 +56,9 @@ class WheelDrivers:
             angle: encoder angles [rad], quantised, shape (3,).
         """
         while self._pending and self._pending[0][0] <= now_ns:
-            self._wanted = self._pending.popleft()[1]
+            self._given_ns, self._wanted = self._pending.popleft()
+        if self._timeout_ns and now_ns > self._given_ns + self._timeout_ns:
+            self._wanted = np.zeros(3)
         self._ramp()
         error = self._rows @ self._twist - (angle - self._angle) / self._period
         self._angle = angle
@@ -59,10 +69,11 @@ class WheelDrivers:
         return np.clip(voltage / self._full, -1.0, 1.0)
 
     def _ramp(self) -> None:
+        wanted = self._wanted * self.obedience
         if self._limit == 0.0:
-            self._twist = self._wanted
+            self._twist = wanted
             return
-        step_x, step_y, step_yaw = self._wanted - self._twist
+        step_x, step_y, step_yaw = wanted - self._twist
         length = math.hypot(step_x, step_y)
         share = min(1.0, self._limit * self._period / length) if length > 0 else 1.0
         most = self._yaw_limit * self._period

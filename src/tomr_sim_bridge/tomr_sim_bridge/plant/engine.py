@@ -15,6 +15,8 @@ from tomr_sim_bridge.plant.wheels import Vector, wheel_angles
 
 OPEN_CIRCUIT = 1e9  # ohm: a bridge that is off
 _SETTLING = 0.3  # s for the rollers to find the floor
+_HOLDING = 5.0  # N m: so much dry friction is a brake
+_RIGID = 0.9999  # impedance of a friction constraint that hardly yields
 _NORMAL_SMOOTHING = 0.05  # s: contact forces chatter where one roller hands over to the next
 
 
@@ -39,16 +41,20 @@ class Engine:
         self.model = build_model(robot, design, timestep)
         self.data = mujoco.MjData(self.model)
         self.timestep = timestep
-        self._constant = np.array([motor.wheel_constant for motor in robot.motors])
+        self._healthy_constant = np.array([motor.wheel_constant for motor in robot.motors])
+        self._shaft_constant = np.array([motor.torque_constant for motor in robot.motors])
+        self.set_motors(np.array([motor.resistance for motor in robot.motors]), np.ones(WHEELS))
         self._radius = design.wheel_radius
         angles = wheel_angles(robot)
         self._arms = robot.robot_radius * np.column_stack([np.cos(angles), np.sin(angles)])
         names = [f"wheel_{wheel}" for wheel in range(WHEELS)]
+        self._body = self.model.body("base_link").id
         self._angles = np.array([self.model.joint(name).qposadr[0] for name in names])
         self._speeds = np.array([self.model.joint(name).dofadr[0] for name in names])
         rollers = [
             [f"roller_{wheel}_{number}" for number in range(ROLLERS)] for wheel in range(WHEELS)
         ]
+        self._impedance = self.model.dof_solimp[self._speeds, :2].copy()
         self._roller_speeds = np.array(
             [[self.model.joint(name).dofadr[0] for name in row] for row in rollers]
         )
@@ -59,6 +65,8 @@ class Engine:
         self._wheel_of_geom = np.full(self.model.ngeom, -1)
         self._wheel_of_geom[self._roller_geoms] = np.arange(WHEELS)[:, None]
         self._friction = design.floor_friction.copy()
+        self._base = int(self.model.joint("base").dofadr[0])
+        self._push_height = float(design.mass_center[2])
         self._yaw = 0.0
         self._settle(phase)
         self._zero = self.data.qpos[self._angles].copy()
@@ -143,12 +151,42 @@ class Engine:
     def set_loads(self, loads: WheelLoads) -> None:
         """Set the resistance of the axles and rollers for the next stretch."""
         self.model.dof_frictionloss[self._speeds] = np.maximum(loads.dry, 0.0)
+        # MuJoCo's friction yields a little, in proportion: a wheel that is held must not creep.
+        impedance = np.where((loads.dry > _HOLDING)[:, None], _RIGID, self._impedance)
+        self.model.dof_solimp[self._speeds, :2] = impedance
         self.model.dof_damping[self._speeds] = loads.viscous
         self.data.qfrc_applied[self._speeds] = loads.torque
+        self.data.xfrc_applied[self._body, [0, 1, 5]] = loads.push
         torque = loads.roller_force * self._roller_radius
         self.model.dof_frictionloss[self._roller_speeds] = torque[:, None]
 
-    def advance(self, steps: int, voltage: Vector, resistance: Vector) -> tuple[Vector, Vector]:
+    def set_push(self, push: Vector) -> None:
+        """Set the force on the body [N, N in the world] and the moment about the vertical [N m].
+
+        The force acts above the origin of base_link at the height of the mass centre.
+        """
+        x, y, moment = push
+        cosine, sine = math.cos(self._yaw), math.sin(self._yaw)
+        # A free joint takes forces in the world and moments in its own frame.
+        tilt_x, tilt_y = -self._push_height * y, self._push_height * x
+        self.data.qfrc_applied[self._base : self._base + 6] = [
+            x, y, 0.0,
+            cosine * tilt_x + sine * tilt_y, cosine * tilt_y - sine * tilt_x, moment,
+        ]  # fmt: skip
+
+    def set_motors(self, resistance: Vector, constant: Vector) -> None:
+        """Set the circuits of the motors for the next stretch.
+
+        Args:
+            resistance: [ohm], shape (3,); OPEN_CIRCUIT for a bridge that is off.
+            constant: torque and back-EMF, times the motor's own [-], shape (3,).
+        """
+        self._resistance = resistance
+        self._constant = self._healthy_constant * constant
+        self.model.actuator_gainprm[:, 0] = resistance
+        self.model.actuator_gainprm[:, 1] = self._shaft_constant * constant
+
+    def advance(self, steps: int, voltage: Vector) -> tuple[Vector, Vector]:
         """Integrate; return the mean motor currents [A] and the turn of the wheels [rad].
 
         Raises InputError when the plant has blown up.
@@ -156,9 +194,7 @@ class Engine:
         Args:
             steps: number of integration steps.
             voltage: at the motor terminals, held [V], shape (3,).
-            resistance: of the windings [ohm], shape (3,); OPEN_CIRCUIT for a bridge that is off.
         """
-        self.model.actuator_gainprm[:, 0] = resistance
         self.data.ctrl[:] = voltage
         before = self.data.qpos[self._angles].copy()
         mujoco.mj_step(self.model, self.data, steps)
@@ -169,4 +205,4 @@ class Engine:
                 "step of 1 ms cannot follow; check resistance, gains and inertias"
             )
         mean_speed = turned / (steps * self.timestep)
-        return (voltage - self._constant * mean_speed) / resistance, turned
+        return (voltage - self._constant * mean_speed) / self._resistance, turned

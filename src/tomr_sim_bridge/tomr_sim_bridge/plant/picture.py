@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from io import BytesIO
 from pathlib import Path
 
 import mujoco
@@ -11,6 +12,7 @@ from matplotlib.image import imsave
 from numpy.typing import NDArray
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import write_bytes
 from tomr_power_model.robot import Robot, load_robot
 from tomr_sim_bridge.plant import scenery
 from tomr_sim_bridge.plant.design import PlantDesign
@@ -68,7 +70,9 @@ def render(robot: Robot) -> NDArray[np.uint8]:
 def main(arguments: list[str]) -> int:
     """Write the picture of robot `arguments[0]` to the file `arguments[1]`."""
     robot, path = arguments
-    imsave(path, render(load_robot(robot)))
+    picture = BytesIO()
+    imsave(picture, render(load_robot(robot)), format="png")
+    write_bytes(Path(path), picture.getvalue())
     return 0
 
 

@@ -12,6 +12,7 @@ from attrs import frozen
 
 from tomr_power_model.messages.plain import NANOSECONDS, battery_state
 from tomr_power_model.robot import WHEELS, Robot
+from tomr_sim_bridge.faults import FaultActions
 from tomr_sim_bridge.plant import moments, samples
 from tomr_sim_bridge.plant.design import PlantDesign
 from tomr_sim_bridge.plant.moments import Memory
@@ -25,10 +26,11 @@ _TOTAL_NOISE = 2.0  # the battery's monitor is that much noisier than a driver's
 
 @frozen
 class Reading:
-    """Measured voltage [V] and current drawn [A] of one supply, or of one motor."""
+    """Measured voltage [V] and current drawn [A] of one supply, or of one motor; NaN: unknown."""
 
     voltage: float
     drawn: float
+    is_lost: bool = False  # it never comes
 
 
 class PowerMonitor:
@@ -46,6 +48,8 @@ class PowerMonitor:
         self._lagged = np.full(WHEELS, math.nan)
         self._publish = _SOURCES[robot.measurement.source]
         self.efforts: list[float] = []  # A, latest currents for JointState.effort
+        self.actions: FaultActions | None = None  # what faults do now
+        self._held: list[Reading | None] = [None] * WHEELS  # of frozen sensors
 
     def samples(self, stamp: int) -> list[Sample]:
         """Measure at a stamp [ns]."""
@@ -74,13 +78,32 @@ class PowerMonitor:
             last = float(self._lagged[wheel])
             drawn = drawn if math.isnan(last) else last + share * (drawn - last)
             self._lagged[wheel] = drawn
-        drawn = drawn * float(design.power_scale[wheel])
-        drawn += float(design.power_bias[wheel]) / voltage
+        scale, bias = float(design.power_scale[wheel]), float(design.power_bias[wheel])
+        if self.actions is not None:
+            scale *= float(self.actions.meter_scale[wheel])
+            bias += float(self.actions.meter_bias[wheel])
+        drawn = drawn * scale + bias / voltage
         reading = self._digitise(voltage, drawn, 1.0)
-        return Reading(
+        reading = Reading(
             voltage=reading.voltage if measurement.quantity == "power" else math.nan,
             drawn=reading.drawn if measurement.signed else abs(reading.drawn),
         )
+        return self._spoilt(wheel, reading)
+
+    def _spoilt(self, wheel: int, reading: Reading) -> Reading:
+        """What a sensor makes of a reading that is frozen or dead."""
+        frozen, lost = 0.0, 0.0
+        if self.actions is not None:
+            frozen = float(self.actions.meter_frozen[wheel])
+            lost = float(self.actions.meter_lost[wheel])
+        held = self._held[wheel]
+        if frozen == 0.0 or held is None:
+            self._held[wheel] = held = reading
+        if frozen > 0.0:
+            reading = Reading(held.voltage, frozen * held.drawn + (1.0 - frozen) * reading.drawn)
+        if lost > 0.0 and self._random.random() < lost:
+            return Reading(math.nan, math.nan, is_lost=True)
+        return reading
 
     def _digitise(self, voltage: float, drawn: float, noise: float) -> Reading:
         given = self._robot.sensors
@@ -99,6 +122,7 @@ class PowerMonitor:
                 battery_state(stamp, reading.voltage, -reading.drawn, topic),
             )
             for topic, reading in zip(self._robot.wheel_topics, readings, strict=True)
+            if not reading.is_lost
         ]
 
     def _multi_array(self, stamp: int, readings: list[Reading]) -> list[Sample]:

@@ -13,7 +13,7 @@ from tomr_power_model.messages.plain import (
     joint_state,
 )
 from tomr_power_model.robot import WHEELS, Robot
-from tomr_sim_bridge.faults import FaultState
+from tomr_sim_bridge.faults import FaultActions, FaultBoard, FaultState
 from tomr_sim_bridge.plant import moments, samples
 from tomr_sim_bridge.plant.design import PlantDesign
 from tomr_sim_bridge.plant.moments import Memory
@@ -22,6 +22,9 @@ from tomr_sim_bridge.plant.samples import Sample
 from tomr_sim_bridge.plant.wheels import Vector, rolling_rows
 
 FAULT_RATE = 20.0  # Hz of ground_truth/faults
+_SLIPPING = "floor_slippery"  # the fault whose truth tells how fast wheels slip
+# Of wheel odometry, as drivers state it: x, y, z [m^2], roll, pitch, yaw [rad^2].
+ODOMETRY_VARIANCES = (1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-2)
 
 
 def quantise(values: Vector, quantum: float) -> Vector:
@@ -89,8 +92,9 @@ class Sensors:
         self._odometry_pose = (0.0, 0.0, 0.0)
         self._odometry_stamp = start
 
-    def read(self, faults: list[FaultState]) -> list[Sample]:
+    def read(self, faults: FaultBoard, actions: FaultActions) -> list[Sample]:
         """Return the samples that have fallen due, in the order of their stamps."""
+        self._power.actions = actions
         now = self._memory.latest.stamp_ns
         found: list[Sample] = []
         for clock, read in self._streams:
@@ -98,7 +102,7 @@ class Sensors:
                 for stamp in clock.due(now):
                     found.extend(read(stamp))
         for stamp in self._fault_clock.due(now):
-            found.append(self._faults(stamp, faults))
+            found.append(self._faults(stamp, faults.states()))
         found.sort(key=lambda sample: sample.stamp_ns)
         return found
 
@@ -146,7 +150,8 @@ class Sensors:
         elapsed = (stamp - self._odometry_stamp) / NANOSECONDS
         speed = step / elapsed if elapsed > 0 else np.zeros(3)
         self._odometry_angle, self._odometry_stamp = angle, stamp
-        measured = samples.odometry(stamp, "odom", self._odometry_pose, speed.tolist())
+        pose = self._odometry_pose
+        measured = samples.odometry(stamp, "odom", pose, speed.tolist(), ODOMETRY_VARIANCES)
         state = self._memory.at(stamp)
         place = (*state[moments.POSITION].tolist(), float(state[moments.YAW]))
         velocity = _into_body(state[moments.VELOCITY], state[moments.YAW])
@@ -169,8 +174,10 @@ class Sensors:
             values = {"active": float(fault.active), "severity": fault.severity}
             if fault.wheel is not None:
                 values["wheel"] = fault.wheel + 1.0
+            if fault.fault_id == _SLIPPING:
+                values |= slipping
             message = "in force" if fault.active else "not in force"
-            texts = tuple((key, f"{value:.6g}") for key, value in (values | slipping).items())
+            texts = tuple((key, f"{value:.6g}") for key, value in values.items())
             statuses.append(Status(fault.fault_id, Level.OK, message, texts, "simulator"))
         return Sample("ground_truth/faults", stamp, diagnostics(stamp, statuses))
 

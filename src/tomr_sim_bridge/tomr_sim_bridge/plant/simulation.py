@@ -8,7 +8,7 @@ from attrs import define, frozen
 
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.robot import WHEELS, Robot
-from tomr_sim_bridge.faults import FaultActions, FaultBoard
+from tomr_sim_bridge.faults import BodyMotion, FaultActions, FaultBoard
 from tomr_sim_bridge.plant import moments
 from tomr_sim_bridge.plant.design import PlantDesign
 from tomr_sim_bridge.plant.drivers import WheelDrivers
@@ -22,6 +22,7 @@ from tomr_sim_bridge.plant.wheels import Vector, rolling_rows
 
 LONGEST_STRETCH = 0.005  # s between two looks at friction, faults and supply
 LONGEST_TIMESTEP = 0.001  # s
+_LEAST_VOLTAGE = 1.0  # V that a flat battery keeps
 
 
 @frozen
@@ -79,6 +80,7 @@ class Simulation:
         floor_friction: float | None = None,
         payload: float = 0.0,
         stamp_jitter: float = 0.0,
+        command_timeout: float = 0.0,
         further_effects: Sequence[PlantEffect] = (),
     ) -> None:
         """Build the plant at rest.
@@ -90,6 +92,7 @@ class Simulation:
             floor_friction: traction coefficient, None for that of the description.
             payload: mass on top of the description [kg].
             stamp_jitter: standard deviation of the sampling times [s].
+            command_timeout: a command this old counts as a stop [s]; 0: it is held.
             further_effects: physics that no description can name, on top of those in it.
 
         Raises:
@@ -110,7 +113,7 @@ class Simulation:
         random = np.random.default_rng(seed)
         phase = random.uniform(0.0, 2.0 * math.pi, WHEELS)
         self.engine = Engine(robot, design, self._grid.timestep, phase)
-        self._drivers = WheelDrivers(robot, self._grid.control_period)
+        self._drivers = WheelDrivers(robot, self._grid.control_period, command_timeout)
         self._start_ns = start_ns
         self._count = 0
         self._prepare_state()
@@ -167,7 +170,7 @@ class Simulation:
         return self._start_ns + round(count * self._grid.stretch * NANOSECONDS)
 
     def command(self, v_x: float, v_y: float, omega_z: float, stamp_ns: int | None = None) -> None:
-        """Command a body twist [m/s, rad/s], held until the next; in force from its stamp on."""
+        """Command a body twist [m/s, rad/s], until the next or its timeout, from its stamp on."""
         stamp = self.stamp_ns if stamp_ns is None else stamp_ns
         self._drivers.command(stamp, np.array([v_x, v_y, omega_z]))
 
@@ -192,44 +195,55 @@ class Simulation:
     def _stretch(self) -> list[Sample]:
         engine = self.engine
         contact = engine.contacts(self._yaw)
-        actions = self.faults.actions(contact, self._design.floor_friction)
-        engine.set_friction(self._design.floor_friction if actions is None else actions.friction)
-        bus = self._bus_voltage()
+        actions = self._actions(contact)
+        engine.set_friction(actions.friction)
+        engine.set_push(actions.push)
+        bus = self._bus_voltage(actions.undervoltage)
         angle, speed = engine.angle, engine.speed
-        loads = self._loads(angle, speed, contact)
+        loads = self._loads(angle, speed, actions)
         current, motor_power = self._run(bus, actions)
         turned = engine.angle - angle
         power = self._settle_power(current, motor_power, loads, turned)
         rotor_acceleration = (engine.speed - speed) / self._grid.stretch
-        self._transmitted = self._constant * current - self._rotor * rotor_acceleration
+        constant = self._constant * actions.constant
+        self._transmitted = constant * current - self._rotor * rotor_acceleration
         self._count += 1
         self._remember(bus, current, power, turned)
-        return self._sensors.read(self.faults.states())
+        return self._sensors.read(self.faults, actions)
 
-    def _run(self, bus: float, actions: FaultActions | None) -> tuple[Vector, Vector]:
+    def _actions(self, contact: Vector) -> FaultActions:
+        """What faults do during the coming stretch."""
+        velocity = self.engine.velocity[:2]
+        body = BodyMotion(
+            time=(self.stamp_ns - self._start_ns) / NANOSECONDS,
+            mass=self._design.mass,
+            position=self._position[:2],
+            yaw=self._yaw,
+            velocity=velocity,
+            yaw_rate=float(self.engine.angular_velocity[2]),
+        )
+        return self.faults.actions(contact, self._design.floor_friction, body)
+
+    def _run(self, bus: float, actions: FaultActions) -> tuple[Vector, Vector]:
         """Mean motor currents [A] and terminal powers [W] of a stretch, each of shape (3,)."""
         engine, grid = self.engine, self._grid
         quantum = self.robot.sensors.encoder_resolution
-        resistance = self._resistance
-        if actions is not None:
-            resistance = np.where(actions.connected, resistance, OPEN_CIRCUIT)
+        resistance = self._resistance * actions.resistance
+        engine.set_motors(np.where(actions.connected, resistance, OPEN_CIRCUIT), actions.constant)
+        self._drivers.obedience = actions.obedience
         mean_current, mean_power = np.zeros(WHEELS), np.zeros(WHEELS)
         for run in range(grid.runs):
             if self._count % grid.stretches_per_tick == 0:
                 now = self.stamp_ns + round(run * grid.control_period * NANOSECONDS)
                 self._duty = self._drivers.tick(now, quantise(self._encoder, quantum))
-            voltage = self._duty * bus
-            if actions is not None:
-                voltage = np.where(actions.connected, voltage * actions.drive, 0.0)
-            current, turned = engine.advance(grid.steps, voltage, resistance)
-            self._encoder = self._encoder + (
-                turned if actions is None else turned * actions.encoder
-            )
+            voltage = np.where(actions.connected, self._duty * bus * actions.drive, 0.0)
+            current, turned = engine.advance(grid.steps, voltage)
+            self._encoder = self._encoder + turned * actions.encoder
             mean_current += current
             mean_power += voltage * current
         return mean_current / grid.runs, mean_power / grid.runs
 
-    def _loads(self, angle: Vector, speed: Vector, contact: Vector) -> WheelLoads:
+    def _loads(self, angle: Vector, speed: Vector, actions: FaultActions) -> WheelLoads:
         loads = WheelLoads(
             speed=speed,
             angle=angle,
@@ -239,8 +253,8 @@ class Simulation:
                 if self._needs_normal
                 else np.zeros(WHEELS)
             ),
-            contact=contact,
-            dry=np.zeros(WHEELS),
+            contact=actions.contact,
+            dry=actions.dry.copy(),
             viscous=np.zeros(WHEELS),
             torque=np.zeros(WHEELS),
             roller_force=np.zeros(WHEELS),
@@ -261,7 +275,8 @@ class Simulation:
             effect.bill(drivers)
         copper = current**2 * self._resistance
         self._resistance = drivers.resistance
-        self._total_power = float(drivers.power.sum()) + self.robot.supply.auxiliary_power
+        others = drivers.other + self.robot.supply.auxiliary_power
+        self._total_power = float(drivers.power.sum()) + others
         resisted = loads.dry * np.abs(turned) + loads.viscous * turned**2 / self._grid.stretch
         self.ledger.motors += float(motor_power.sum()) * self._grid.stretch
         self.ledger.drivers += float(drivers.power.sum()) * self._grid.stretch
@@ -269,9 +284,9 @@ class Simulation:
         self.ledger.axles += float(resisted.sum())
         return drivers.power
 
-    def _bus_voltage(self) -> float:
+    def _bus_voltage(self, undervoltage: float = 0.0) -> float:
         """Voltage behind the battery's internal resistance at the power drawn last [V]."""
-        open_voltage = self.robot.supply.nominal_voltage
+        open_voltage = max(self.robot.supply.nominal_voltage - undervoltage, _LEAST_VOLTAGE)
         room = open_voltage**2 - 4.0 * self._design.supply_resistance * self._total_power
         return (open_voltage + math.sqrt(max(room, 0.0))) / 2.0
 

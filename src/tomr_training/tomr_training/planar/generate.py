@@ -1,32 +1,38 @@
 """Drives by the thousand: what the classifiers learn from."""
 
+import math
 import os
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from tomr_fault_diag.classifier.belief import CONTROLS, ENCODERS, HYPOTHESES, six_of
+from tomr_fault_diag.classifier.belief import EXTERNAL, OTHER, STATE_OF
+from tomr_fault_diag.classifier.states import STATES
+from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.robot import Robot, shipped_robot
-from tomr_sim_bridge.missions.schema import PlannedFault
-from tomr_training.drives import Drive, wheel_of
+from tomr_training.drives import Drive
 from tomr_training.labels import SLIPPING, Flags, GroundTruth, Noise, deviates
+from tomr_training.planar.faults import class_of
 from tomr_training.planar.plant import run_plant
-from tomr_training.planar.population import training_drive
+from tomr_training.planar.population import PER_ROBOT, bands_of, training_drive
 from tomr_training.planar.residuals import Compared, compare
-from tomr_training.planar.schedule import faulty_ticks
+from tomr_training.planar.schedule import TICK, faulty_ticks
 from tomr_training.planar.sensors import Signals
 
-# True states are the hypotheses, finer than what is named: the wheel of a lost signal is known.
-NORMAL, SLIP, CONTROL, MOTOR = 0, 1, CONTROLS.start, ENCODERS.start
-STATE_OF = six_of(np.eye(HYPOTHESES)).argmax(axis=1).astype(np.int8)  # that each is to be named
+# Which of the paper's six each hypothesis belongs to, BEYOND them if to none.
+BEYOND = len(STATES)
+PAPER_OF = np.array(
+    [BEYOND if state.paper is None else state.paper for state in STATE_OF], dtype=np.int8
+)
 IGNORED = -1  # aftermath of a fault, a healthy robot that slips
 
 _SETTLED = 10  # ticks without a difference after which a robot is as good as healthy
+_LASTING = 60  # ticks after a push in which what it did is the push's
 _CHUNK = 20  # drives that a process takes at a time
 
 Labels = NDArray[np.int8]
@@ -37,7 +43,8 @@ class LabelledTicks:
     """One drive tick by tick."""
 
     compared: Compared
-    labels: Labels  # (ticks,)
+    labels: Labels  # (ticks,), hypotheses
+    bands: BandSettings
 
 
 def generate(seeds: range) -> Iterator[LabelledTicks]:
@@ -49,7 +56,12 @@ def generate(seeds: range) -> Iterator[LabelledTicks]:
 
 
 def _simulated(seed: int) -> LabelledTicks:
-    return simulate(training_drive(_reference(), seed))
+    return simulate(training_drive(_reference(), seed), _bands(seed // PER_ROBOT))
+
+
+@lru_cache(maxsize=2)
+def _bands(number: int) -> BandSettings:
+    return bands_of(_reference(), number)
 
 
 @cache
@@ -57,35 +69,43 @@ def _reference() -> Robot:
     return shipped_robot("reference")
 
 
-def simulate(drive: Drive) -> LabelledTicks:
+def simulate(drive: Drive, bands: BandSettings | None = None) -> LabelledTicks:
     """Drive, measure and label."""
     motion = run_plant(drive)
     compared = compare(drive, Signals.of(drive, motion))
-    return LabelledTicks(compared, _labels(drive, motion.truth))
+    return LabelledTicks(compared, _labels(drive, motion.truth), bands or BandSettings())
 
 
 def _labels(drive: Drive, truth: GroundTruth) -> Labels:
     """True states, whether they show or not: what cannot be told apart has even odds."""
     labels = np.zeros(len(truth.slip), dtype=np.int8)
     labels[truth.slip.max(axis=1) > SLIPPING] = IGNORED
+    if drive.bumps:
+        calm = run_plant(drive.undisturbed).truth
+        pushed = deviates(truth, calm, Noise.of(drive.plant))
+        labels[_recently(_started(drive, len(labels)), _LASTING) & pushed] = EXTERNAL
     if not drive.mission.faults:
         return labels
     twin = run_plant(drive.healthy).truth
     shown = deviates(truth, twin, Noise.of(drive.plant))
-    now = faulty_ticks(drive)
+    ever = np.zeros(len(labels), dtype=np.int64)
     for fault in drive.mission.faults:
+        now = faulty_ticks(drive, fault)
         labels[now] = class_of(fault)
-        after = ~now & (np.cumsum(now) == now.sum())
-        labels[after & _recently(shown | now, _SETTLED)] = IGNORED
+        ever += now
+    labels[ever > 1] = OTHER
+    after = (ever == 0) & (np.cumsum(ever > 0) == (ever > 0).sum())
+    labels[after & _recently(shown | (ever > 0), _SETTLED)] = IGNORED
     return labels
 
 
-def class_of(fault: PlannedFault) -> int:
-    """True state while a fault is in force."""
-    wheel = wheel_of(fault)
-    if wheel is None:
-        return SLIP
-    return (CONTROL if fault.fault_id == "control_signal_lost" else MOTOR) + wheel
+def _started(drive: Drive, ticks: int) -> Flags:
+    """Ticks in which something pushes the robot, (ticks,)."""
+    found = np.zeros(ticks, dtype=bool)
+    for bump in drive.bumps:
+        end = math.ceil((bump.start + bump.duration) / TICK)
+        found[math.floor(bump.start / TICK) : end] = True
+    return found
 
 
 def _recently(flags: Flags, ticks: int) -> Flags:

@@ -1,25 +1,35 @@
 """A robot in a training drive: the planar dynamics of the power model, disturbed and on a floor."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.dynamics import batch
+from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.numbers import laid_out, timing_of
 from tomr_power_model.dynamics.simulation import Excitation, Readout, Steps, Variant, drive, shown
 from tomr_power_model.dynamics.vehicle import Vehicle, vehicle_of
+from tomr_power_model.geometry.kinematics import wheels_to_twist
 from tomr_power_model.robot import WHEELS, Robot
+from tomr_sim_bridge.missions.schema import PlannedFault
 from tomr_training.drives import Drive
 from tomr_training.labels import GroundTruth
+from tomr_training.planar.faults import CHANGES, number
 from tomr_training.planar.schedule import (
     TICK,
     commanded,
     counted_shares,
     disturbed,
+    end_of,
+    period_at,
     tick_count,
 )
 
 Array = NDArray[np.float64]
+
+_CREEP = 0.05  # m/s: slower motion is resisted by less than the whole drag of a load
 
 
 @frozen
@@ -74,13 +84,52 @@ class Motion:
 
 def run_plant(chosen: Drive) -> Motion:
     """Drive the robot as it really is, with all that befalls it."""
-    return _run(_on_its_floor(chosen), disturbed(chosen, chosen.plant), chosen.plant, chosen)
+    inputs = disturbed(chosen, chosen.plant)
+    for fault in chosen.mission.faults:
+        if fault.fault_id == "load_towed":
+            inputs[:, at.PUSH : at.PUSH + 2] += _towed(chosen, fault)
+    return _run(_on_its_floor(chosen), inputs, chosen.plant, chosen, _changes(chosen))
 
 
 def run_believed(chosen: Drive) -> Motion:
     """Drive the robot as it is described, with the commands and nothing else."""
     robot = chosen.believed
     return _run(vehicle_of(robot), commanded(chosen, robot), robot, chosen)
+
+
+def _changes(chosen: Drive) -> list[tuple[int, Array]]:
+    """Periods from which on faults make another robot of it, and that robot's numbers."""
+    faults = [fault for fault in chosen.mission.faults if fault.fault_id in CHANGES]
+    edges = {edge for fault in faults for edge in (fault.start, end_of(fault, chosen))}
+    period = timing_of(chosen.plant.controller.rate).period
+    found = []
+    for edge in sorted(edge for edge in edges if edge < chosen.length - period):
+        robot = chosen.plant
+        for fault in faults:
+            if fault.start <= edge < end_of(fault, chosen):
+                robot = CHANGES[fault.fault_id](robot, fault)
+        changed = laid_out(_on_its_floor(evolve(chosen, plant=robot)))
+        found.append((period_at(edge, period), changed))
+    return found
+
+
+def _towed(chosen: Drive, fault: PlannedFault) -> Array:
+    """Dry drag of a cart against the motion that there would be without it [N], (periods, 2)."""
+    mission = evolve(chosen.mission, faults=())
+    free = run_plant(evolve(chosen, mission=mission))
+    twist = free.steps.speed @ wheels_to_twist(chosen.plant).T
+    heading = integral(free.steps.yaw_rate[:, None], free.step)[:-1, 0]
+    cos, sin = np.cos(heading), np.sin(heading)
+    velocity = np.stack(
+        [cos * twist[:, 0] - sin * twist[:, 1], sin * twist[:, 0] + cos * twist[:, 1]], axis=1
+    )
+    speed = np.hypot(np.hypot(*velocity.T), _CREEP)
+    force = -number(fault, "drag") * velocity / speed[:, None]
+    start, end = fault.start, end_of(fault, chosen)
+    time = free.step * np.arange(len(force))
+    force[(time < start) | (time >= end)] = 0.0
+    per_period = len(force) // len(free.excitation.inputs)
+    return np.asarray(force.reshape(-1, per_period, 2).mean(axis=1))
 
 
 def _on_its_floor(chosen: Drive) -> Vehicle:
@@ -91,11 +140,17 @@ def _on_its_floor(chosen: Drive) -> Vehicle:
     return evolve(vehicle_of(loaded), encoder_quantum=robot.sensors.encoder_resolution)
 
 
-def _run(vehicle: Vehicle, inputs: Array, robot: Robot, chosen: Drive) -> Motion:
+def _run(
+    vehicle: Vehicle,
+    inputs: Array,
+    robot: Robot,
+    chosen: Drive,
+    changes: Sequence[tuple[int, Array]] = (),
+) -> Motion:
     nothing = np.zeros(3)
     excitation = Excitation(0.0, inputs, nothing, nothing, 0.0, np.zeros(WHEELS))
     variant = Variant(laid_out(vehicle))
-    steps = drive(variant, excitation)
+    steps = drive(variant, excitation, changes=changes)
     step = timing_of(robot.controller.rate).step
     return Motion(variant, excitation, steps, step, tick_count(chosen))
 

@@ -1,6 +1,7 @@
 """What befalls a drive, driver period by driver period: commands, faults, bumps."""
 
 import math
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,9 @@ from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.numbers import no_input, timing_of
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_sim_bridge.faults.floor_slippery import SLIPPERIEST
+from tomr_sim_bridge.missions.schema import PlannedFault
 from tomr_training.drives import Drive, severity_of, wheel_of
+from tomr_training.planar.faults import number
 
 Array = NDArray[np.float64]
 
@@ -40,21 +43,38 @@ def disturbed(drive: Drive, robot: Robot) -> Array:
     period = timing_of(robot.controller.rate).period
 
     def rows(start: float, end: float) -> slice:
-        return slice(_period_at(start, period), _period_at(end, period))
+        return slice(period_at(start, period), period_at(end, period))
 
-    for bump in drive.bumps:
+    for bump in (*drive.bumps, *drive.gusts):
         push = slice(at.PUSH, at.PUSH + 3)
         inputs[rows(bump.start, bump.start + bump.duration), push] += [*bump.force, bump.moment]
     for fault in drive.mission.faults:
-        severity, wheel = severity_of(fault), wheel_of(fault)
-        when = rows(fault.start, drive.length if fault.end is None else fault.end)
-        if wheel is None:
-            fall = min(SLIPPERIEST / drive.mission.floor_friction, 1.0) ** severity
-            inputs[when, _column(at.FLOOR)] *= fall
-            continue
-        what = at.CONNECTED if fault.fault_id == "control_signal_lost" else at.COUNTS
-        inputs[when, _column(what)[wheel]] *= 1.0 - severity
+        when = rows(fault.start, end_of(fault, drive))
+        if fault.fault_id in _SHARES:
+            field, share = _SHARES[fault.fault_id](fault, drive)
+            wheel = wheel_of(fault)
+            columns = _column(field) if wheel is None else [_column(field)[wheel]]
+            inputs[when, columns] *= share
     return inputs
+
+
+def _floor_left(fault: PlannedFault, drive: Drive) -> tuple[int, float]:
+    fall = min(SLIPPERIEST / drive.mission.floor_friction, 1.0)
+    return at.FLOOR, float(fall ** severity_of(fault))
+
+
+def _voltage_left(fault: PlannedFault, drive: Drive) -> tuple[int, float]:
+    missing = number(fault, "undervoltage")
+    return at.CONNECTED, 1.0 - missing / drive.plant.supply.nominal_voltage
+
+
+# Faults that leave a share of an input: of which, and how much.
+_SHARES: Mapping[str, Callable[[PlannedFault, Drive], tuple[int, float]]] = {
+    "floor_slippery": _floor_left,
+    "supply_low": _voltage_left,
+    "control_signal_lost": lambda fault, drive: (at.CONNECTED, 1.0 - severity_of(fault)),
+    "encoder_lost": lambda fault, drive: (at.COUNTS, 1.0 - severity_of(fault)),
+}
 
 
 def counted_shares(inputs: Array) -> Array:
@@ -62,13 +82,16 @@ def counted_shares(inputs: Array) -> Array:
     return np.asarray(inputs[:, _column(at.COUNTS)])
 
 
-def faulty_ticks(drive: Drive) -> NDArray[np.bool_]:
-    """Whether the fault is in force, (ticks,)."""
+def faulty_ticks(drive: Drive, fault: PlannedFault) -> NDArray[np.bool_]:
+    """Whether a fault is in force, (ticks,)."""
     faulty = np.zeros(tick_count(drive), dtype=bool)
-    for fault in drive.mission.faults:
-        end = drive.length if fault.end is None else fault.end
-        faulty[math.floor(fault.start / TICK) : math.ceil(end / TICK)] = True
+    faulty[math.floor(fault.start / TICK) : math.ceil(end_of(fault, drive) / TICK)] = True
     return faulty
+
+
+def end_of(fault: PlannedFault, drive: Drive) -> float:
+    """When a fault ends [s]."""
+    return drive.length if fault.end is None else fault.end
 
 
 def _column(field: int) -> list[int]:
@@ -76,6 +99,6 @@ def _column(field: int) -> list[int]:
     return [at.INPUT_HEADER + wheel * at.INPUT_WHEEL + field for wheel in range(WHEELS)]
 
 
-def _period_at(time: float, period: float) -> int:
+def period_at(time: float, period: float) -> int:
     """First period that does not begin before a time [s]."""
     return math.ceil(time / period - 1e-6)

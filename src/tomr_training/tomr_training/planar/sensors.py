@@ -9,14 +9,16 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_training.drives import Drive
+from tomr_training.drives import Drive, wheel_of
+from tomr_training.planar.faults import READINGS
 from tomr_training.planar.plant import Motion, at_times
-from tomr_training.planar.schedule import TICK
+from tomr_training.planar.schedule import TICK, end_of
 
 Array = NDArray[np.float64]
 
 ENCODER_RATE = 100.0  # Hz
 POWER_RATE = 50.0  # Hz
+BATTERY = 3  # channel of the whole robot, after those of the motors
 _SPAN = 0.005  # s, that a power sample is the mean of
 _TOTAL_NOISE = 2.0  # the battery's monitor is that much noisier than a driver's
 _RESOLUTION = 1.25e-3  # A and V
@@ -71,7 +73,20 @@ def _power(
     noise = random.standard_normal((2, *power.shape))
     seen = voltage[:, None] + scale * robot.sensors.voltage_noise * noise[0]
     drawn = power / voltage[:, None] + scale * robot.sensors.current_noise * noise[1]
-    return _rounded(seen), _rounded(drawn)
+    return _rounded(seen), _misread(drive, time, _rounded(seen), _rounded(drawn))
+
+
+def _misread(drive: Drive, time: Array, voltage: Array, drawn: Array) -> Array:
+    """Currents [A], (k, 4), as faulty sensors tell them."""
+    for fault in drive.mission.faults:
+        if fault.fault_id in READINGS:
+            wheel = wheel_of(fault)
+            column = BATTERY if wheel is None else wheel
+            when = (time >= fault.start) & (time < end_of(fault, drive))
+            power = voltage[when, column] * drawn[when, column]
+            wrong = READINGS[fault.fault_id](power, fault)
+            drawn[when, column] = wrong / voltage[when, column]
+    return drawn
 
 
 def _rounded(values: Array) -> Array:

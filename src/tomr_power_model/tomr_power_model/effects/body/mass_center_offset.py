@@ -1,6 +1,5 @@
 """Displaced mass centre."""
 
-import math
 from types import MappingProxyType
 
 from tomr_power_model.effects.base import (
@@ -22,8 +21,8 @@ class MassCenterOffset(Effect):
     label = "The mass centre is displaced"
     parameters = MappingProxyType(
         {
-            "x": EffectParameter("m", -math.inf, prior_std=0.02),
-            "y": EffectParameter("m", -math.inf, prior_std=0.02),
+            "x": EffectParameter("m", -10.0, 10.0, prior_std=0.02),
+            "y": EffectParameter("m", -10.0, 10.0, prior_std=0.02),
         }
     )
     prior = HypothesisPrior(

@@ -1,6 +1,5 @@
 """Payload."""
 
-import math
 from types import MappingProxyType
 
 from tomr_power_model.effects.base import (
@@ -20,7 +19,7 @@ class PayloadMass(Effect):
     effect_id = "body.payload_mass"
     place = "body"
     label = "The robot carries a payload"
-    parameters = MappingProxyType({"mass": EffectParameter("kg", -math.inf, prior_std=5.0)})
+    parameters = MappingProxyType({"mass": EffectParameter("kg", -1e4, 1e4, prior_std=5.0)})
     prior = HypothesisPrior({"mass": lambda scales: 0.2 * scales.mass})
     shown_by = "circles and spins while driving, at several headings"
     mission = HEADINGS

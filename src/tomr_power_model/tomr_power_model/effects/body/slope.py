@@ -26,7 +26,7 @@ class Slope(Effect):
     parameters = MappingProxyType(
         {
             "angle": EffectParameter("rad", maximum=1.0, prior_std=0.05),
-            "azimuth": EffectParameter("rad", -math.inf),
+            "azimuth": EffectParameter("rad", -1e2, 1e2),
         }
     )
     prior = HypothesisPrior(

@@ -19,7 +19,7 @@ class Slip(Effect):
     effect_id = "contact.slip"
     label = "Wheels slip"
     parameters = MappingProxyType(
-        {"friction": EffectParameter("", above=0.0, neutral=NEVER_SLIDES, start=1.0)}
+        {"friction": EffectParameter("", 1e-3, neutral=NEVER_SLIDES, start=1.0)}
     )
     mission = VARIED
     needs_load = True

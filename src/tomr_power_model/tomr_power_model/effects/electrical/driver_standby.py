@@ -12,7 +12,7 @@ class DriverStandby(Effect):
 
     effect_id = "electrical.driver_standby"
     label = "The drivers draw standby power"
-    parameters = MappingProxyType({"power": EffectParameter("W", prior_std=3.0)})
+    parameters = MappingProxyType({"power": EffectParameter("W", maximum=1e4, prior_std=3.0)})
     prior = HypothesisPrior({"power": lambda scales: 0.5 * scales.power})
     shown_by = "standing still for ten seconds"
     mission = STAND

@@ -1,6 +1,5 @@
 """Friction that differs with direction."""
 
-import math
 from types import MappingProxyType
 
 from tomr_power_model.effects.base import Effect, EffectParameter, HypothesisPrior, Wheel, effect
@@ -13,7 +12,7 @@ class Asymmetric(Effect):
 
     effect_id = "friction.asymmetric"
     label = "Friction differs with the direction of turning"
-    parameters = MappingProxyType({"torque": EffectParameter("N m", -math.inf, prior_std=0.1)})
+    parameters = MappingProxyType({"torque": EffectParameter("N m", -1e3, prior_std=0.1)})
     prior = HypothesisPrior({"torque": lambda scales: 0.3 * scales.torque}, sign=0)
     shown_by = "the same straight both ways, at several headings"
     mission = BOTH_WAYS

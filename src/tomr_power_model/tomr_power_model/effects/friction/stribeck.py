@@ -16,7 +16,7 @@ class Stribeck(Effect):
     parameters = MappingProxyType(
         {
             "torque": EffectParameter("N m", prior_std=0.2),
-            "speed": EffectParameter("rad/s", above=0.0, neutral=1.0, start=1.0, prior_std=1.0),
+            "speed": EffectParameter("rad/s", 1e-4, neutral=1.0, start=1.0, prior_std=1.0),
         }
     )
     prior = HypothesisPrior(

@@ -18,7 +18,7 @@ class WheelRadius(Effect):
 
     effect_id = "kinematic.wheel_radius"
     label = "A wheel's effective radius differs"
-    parameters = MappingProxyType({"scale": EffectParameter("", above=0.0, neutral=1.0, start=1.0)})
+    parameters = MappingProxyType({"scale": EffectParameter("", 0.1, 10.0, neutral=1.0, start=1.0)})
     prior = HypothesisPrior({"scale": lambda scales: 0.03}, sign=0)
     mission = VARIED
 

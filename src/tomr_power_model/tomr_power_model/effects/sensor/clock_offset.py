@@ -1,6 +1,5 @@
 """A power sensor's clock is off."""
 
-import math
 from types import MappingProxyType
 
 from tomr_power_model.effects.base import (
@@ -19,7 +18,7 @@ class ClockOffset(Effect):
 
     effect_id = "sensor.clock_offset"
     label = "A power sensor's clock is off"
-    parameters = MappingProxyType({"delay": EffectParameter("s", -math.inf, prior_std=0.05)})
+    parameters = MappingProxyType({"delay": EffectParameter("s", -10.0, 10.0, prior_std=0.05)})
     prior = HypothesisPrior(
         {"delay": lambda scales: 0.03},
         sign=0,

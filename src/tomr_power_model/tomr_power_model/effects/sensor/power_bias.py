@@ -1,6 +1,5 @@
 """A power sensor has an offset."""
 
-import math
 from types import MappingProxyType
 
 from tomr_power_model.effects.base import (
@@ -19,7 +18,7 @@ class PowerBias(Effect):
 
     effect_id = "sensor.power_bias"
     label = "A power sensor has an offset"
-    parameters = MappingProxyType({"power": EffectParameter("W", -math.inf, prior_std=3.0)})
+    parameters = MappingProxyType({"power": EffectParameter("W", -1e4, 1e4, prior_std=3.0)})
     prior = HypothesisPrior({"power": lambda scales: 0.3 * scales.power}, sign=0)
     mission = STAND
     in_currents = False

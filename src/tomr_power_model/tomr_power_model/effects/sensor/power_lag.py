@@ -18,7 +18,7 @@ class PowerLag(Effect):
 
     effect_id = "sensor.power_lag"
     label = "A power sensor lags"
-    parameters = MappingProxyType({"time_constant": EffectParameter("s", prior_std=0.1)})
+    parameters = MappingProxyType({"time_constant": EffectParameter("s", 0.0, 1e2, prior_std=0.1)})
     prior = HypothesisPrior(
         {"time_constant": lambda scales: 0.05},
         # Within a driver's period power is a sawtooth: timing finer than that is not known.

@@ -19,7 +19,7 @@ class PowerScale(Effect):
     effect_id = "sensor.power_scale"
     label = "A power sensor's scale is off"
     parameters = MappingProxyType(
-        {"scale": EffectParameter("", above=0.0, neutral=1.0, start=1.0, prior_std=0.1)}
+        {"scale": EffectParameter("", 1e-2, 1e2, neutral=1.0, start=1.0, prior_std=0.1)}
     )
     prior = HypothesisPrior({"scale": lambda scales: 0.1}, sign=0)
     mission = VARIED

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
-from attrs import define
+from attrs import define, field
 
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import Robot
@@ -25,6 +25,8 @@ class WheelLoads:
     viscous: Vector  # N m s/rad, to be filled
     torque: Vector  # N m, to be filled: added to the axle
     roller_force: Vector  # N, to be filled: against the sliding along the axle
+    # N, N, N m, to be filled: force in the world and moment on the body, at its mass centre
+    push: Vector = field(factory=lambda: np.zeros(3))
 
 
 @define
@@ -36,6 +38,7 @@ class DriverPower:
     motor_power: Vector  # W, mean terminal power of the motors
     power: Vector  # W, to be filled: mean power drawn by the drivers
     resistance: Vector  # ohm, to be filled: of the windings during the next stretch
+    other: float = 0.0  # W, to be filled: drawn from the supply by what is no driver
 
 
 class PlantEffect:

@@ -1,0 +1,1 @@
+"""Hostile input for every command, made at random and judged: see attack.py."""

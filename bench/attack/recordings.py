@@ -1,0 +1,281 @@
+"""Attacks on recordings: their bytes, their messages, their time."""
+
+import math
+import random
+import shutil
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from attrs import evolve
+
+from attack.case import HEALTHY, Attack, Base, Raw, attack, reading
+from tomr_power_model.messages.bag import jazzy_typestore
+from tomr_power_model.recordings import RecordingWriter, open_recording
+
+Raws = Iterable[Raw]
+SECOND = 1_000_000_000
+EXTREMES = (math.nan, math.inf, -math.inf, 1e308, -1e308, 1e30, -1e30, 1e6, 0.0, 5e-324)
+_SENSORS = ("/joint_states", "/wheel_1/power", "/wheel_2/power", "/wheel_3/power")
+
+
+def write(path: Path, raws: Raws, storage: str = "mcap") -> Path:
+    """Write messages in the order of their receive stamps."""
+    with RecordingWriter(path, storage) as writer:
+        for raw in sorted(raws, key=lambda item: item.stamp_ns):
+            writer.write_raw(raw.topic, raw.type_name, raw.data, max(0, raw.stamp_ns))
+    return path
+
+
+def changed(raw: Raw, change: Callable[[Any], None]) -> Raw:
+    """A message decoded, changed and encoded again; as it was where it cannot be encoded."""
+    store = jazzy_typestore()
+    message = store.deserialize_cdr(raw.data, raw.type_name)
+    change(message)
+    try:
+        return evolve(raw, data=bytes(store.serialize_cdr(message, raw.type_name)))
+    except Exception:  # noqa: BLE001 rosbags' serialisers raise what struct and numpy do
+        return raw
+
+
+def restamped(raw: Raw, stamp_ns: int) -> Raw:
+    """A message with another stamp in its header, if it has one."""
+
+    def change(message: Any) -> None:
+        if hasattr(message, "header"):
+            stamp = message.header.stamp
+            stamp.sec, stamp.nanosec = divmod(max(-(2**31) * SECOND, stamp_ns), SECOND)
+            stamp.sec = min(stamp.sec, 2**31 - 1)
+
+    return changed(raw, change)
+
+
+@attack("bytes of a file")
+def damaged_file(dice: random.Random, folder: Path, base: Base) -> Attack:
+    raws, names = base.some(dice)
+    storage = dice.choice(("mcap", "sqlite3"))
+    bag = write(folder / "bag", raws, storage)
+    victims = sorted(bag.iterdir(), key=lambda item: item.name == "metadata.yaml")
+    victim = dice.choices(victims, (4, 1))[0]
+    data = bytearray(victim.read_bytes())
+    kind = dice.choice(("flip", "flip", "cut", "zeros", "splice", "insert", "repeat", "random"))
+    at, length = dice.randrange(len(data)), dice.choice((1, 8, 64, 1000, 30_000))
+    if kind == "flip":
+        for _ in range(dice.choice((1, 1, 3, 30, 300))):
+            data[dice.randrange(len(data))] ^= 1 << dice.randrange(8)
+    elif kind == "cut":
+        del data[at:]
+    elif kind == "zeros":
+        data[at : at + length] = bytes(len(data[at : at + length]))
+    elif kind == "random":
+        data[at : at + length] = dice.randbytes(len(data[at : at + length]))
+    else:
+        piece = data[(start := dice.randrange(len(data))) : start + length]
+        data[at : at + (length if kind == "splice" else 0)] = piece * (5 if kind == "repeat" else 1)
+    victim.write_bytes(data)
+    if dice.random() < 0.3:
+        (bag / "metadata.yaml").unlink()
+    tool, arguments = reading(dice, bag)
+    # A flipped bit of sqlite3 may be a plausible value: there is nothing to know it by.
+    known = None if storage == "sqlite3" or victim.name == "metadata.yaml" else names
+    return Attack(tool, arguments, f"{kind} in {victim.suffix} of {storage}", known)
+
+
+def _numbers(message: Any, dice: random.Random) -> str:
+    """Set one number of a message to something no sensor gives."""
+    holders = [message]
+    for name in ("twist", "linear", "angular", "angular_velocity", "linear_acceleration"):
+        holders += [getattr(item, name) for item in holders if hasattr(item, name)]
+    holder = dice.choice(holders)
+    fields = [
+        name
+        for name in holder.__dataclass_fields__
+        if isinstance(getattr(holder, name), float | np.ndarray)
+    ]
+    if not fields:
+        return "nothing"
+    name, value = dice.choice(fields), dice.choice(EXTREMES)
+    old = getattr(holder, name)
+    if isinstance(old, float):
+        setattr(holder, name, value)
+    elif len(old):
+        new = np.array(old)
+        new[dice.randrange(len(new))] = value
+        setattr(holder, name, new)
+    return f"{name} = {value}"
+
+
+def _shapes(message: Any, dice: random.Random) -> str:
+    """Give a message wrong lengths or names."""
+    if not hasattr(message, "name"):
+        return _numbers(message, dice)
+    kind = dice.choice(("shorter", "longer", "names", "twice", "odd names", "empty"))
+    if kind in ("shorter", "longer"):
+        name = dice.choice(("position", "velocity", "effort"))
+        setattr(message, name, np.zeros(dice.choice((0, 1, 2, 4, 5000))))
+    elif kind == "names":
+        message.name = message.name[:-1]
+    elif kind == "twice":
+        message.name = [message.name[0]] * len(message.name)
+    elif kind == "odd names":
+        message.name = [dice.choice(("\x00", "a\nb", "{}", "x" * 70_000)) for _ in message.name]
+    else:
+        message.name = []
+    return kind
+
+
+@attack("fields of messages")
+def odd_messages(dice: random.Random, folder: Path, base: Base) -> Attack:
+    raws, names = base.some(dice)
+    topics = sorted({raw.topic for raw in raws})
+    topic, share = dice.choice(topics), dice.choice((0.002, 0.02, 0.2, 1.0))
+    change = dice.choice((_numbers, _numbers, _shapes))
+    said: set[str] = set()
+
+    def made(raw: Raw) -> Raw:
+        if raw.topic != topic or dice.random() > share:
+            return raw
+        return changed(raw, lambda message: said.add(change(message, dice)))
+
+    bag = write(folder / "bag", [made(raw) for raw in raws])
+    tool, arguments = reading(dice, bag)
+    what = f"{topic}: {', '.join(sorted(said)[:3])} in {share:.1%}"
+    # What a sensor could have measured is data: zeros and a million are.
+    plausible = any(text.endswith(("= 0.0", "= 5e-324", "= 1000000.0")) for text in said)
+    return Attack(tool, arguments, what, None if plausible else names)
+
+
+@attack("encoded messages")
+def odd_encodings(dice: random.Random, folder: Path, base: Base) -> Attack:
+    raws, _ = base.some(dice)
+    topic, kind = dice.choice(_SENSORS), dice.choice(("flip", "cut", "claim", "type", "append"))
+    share = dice.choice((0.01, 0.3))
+
+    def made(raw: Raw) -> Raw:
+        if raw.topic != topic or dice.random() > share:
+            return raw
+        data = bytearray(raw.data)
+        at = dice.randrange(len(data))
+        if kind == "flip":
+            data[at] ^= 1 << dice.randrange(8)
+        elif kind == "cut":
+            del data[at:]
+        elif kind == "claim":
+            at = 4 * (at // 4)
+            data[at : at + 4] = dice.choice((2**31 - 1, 2**32 - 1, 2**20)).to_bytes(4, "little")
+        elif kind == "append":
+            data += bytes(dice.choice((1, 8, 100_000)))
+        else:
+            return evolve(
+                raw, type_name=dice.choice(("std_msgs/msg/String", "sensor_msgs/msg/Imu"))
+            )
+        return evolve(raw, data=bytes(data))
+
+    bag = write(folder / "bag", [made(raw) for raw in raws], dice.choice(("mcap", "sqlite3")))
+    tool, arguments = reading(dice, bag)
+    return Attack(tool, arguments, f"{kind} on {topic} in {share:.0%}")
+
+
+@attack("stamps")
+def odd_stamps(dice: random.Random, folder: Path, base: Base) -> Attack:
+    raws, names = base.some(dice)
+    topics = {raw.topic for raw in raws}
+    chosen = topics if dice.random() < 0.5 else {dice.choice(sorted(topics))}
+    middle = raws[dice.randrange(len(raws))].stamp_ns
+    kind = dice.choice(("jump", "stray", "reverse", "zero", "epoch", "repeat", "shuffle", "far"))
+    by = dice.choice((-1, 1)) * dice.choice((0.3, 1.5, 20.0, 3600.0, 3.2e7)) * SECOND
+    also_received = dice.random() < 0.5
+
+    def made(raw: Raw) -> Raw:
+        if raw.topic not in chosen:
+            return raw
+        stamp = raw.stamp_ns
+        if (kind == "jump" and stamp > middle) or (kind == "stray" and dice.random() < 0.01):
+            stamp += round(by)
+        elif kind == "reverse":
+            stamp = 2 * middle - stamp
+        elif kind == "zero" and dice.random() < 0.5:
+            return restamped(raw, 0)
+        elif kind == "epoch":
+            stamp -= raws[0].stamp_ns
+        elif kind == "repeat" and dice.random() < 0.5:
+            stamp = middle
+        elif kind == "shuffle":
+            stamp += round(dice.gauss(0.0, 0.2) * SECOND)
+        elif kind == "far" and dice.random() < 0.02:
+            stamp = dice.choice((2**31 * SECOND - 1, 1, -5 * SECOND))
+        received = evolve(raw, stamp_ns=stamp) if also_received else raw
+        return restamped(received, stamp)
+
+    bag = write(folder / "bag", [made(raw) for raw in raws])
+    tool, arguments = reading(dice, bag)
+    return Attack(tool, arguments, f"{kind} by {by / SECOND:g} s on {len(chosen)} topics", names)
+
+
+@attack("gaps and losses")
+def missing(dice: random.Random, folder: Path, base: Base) -> Attack:
+    raws, names = base.some(dice)
+    topics = {raw.topic for raw in raws}
+    chosen = topics if dice.random() < 0.5 else {dice.choice(sorted(topics))}
+    kind = dice.choice(("gap", "gap", "loss", "bursts", "late", "all"))
+    begin = raws[dice.randrange(len(raws))].stamp_ns
+    length = dice.choice((0.05, 0.2, 0.3, 0.5, 0.9, 2.0)) * SECOND
+    share = dice.choice((0.05, 0.3, 0.5, 0.67, 0.9, 0.99))
+
+    def lost(raw: Raw) -> bool:
+        if raw.topic not in chosen:
+            return False
+        if kind == "gap":
+            return begin < raw.stamp_ns < begin + length
+        if kind == "loss":
+            return dice.random() < share
+        if kind == "bursts":
+            return (raw.stamp_ns // 200_000_000) % 3 == 0
+        return kind == "all" or raw.stamp_ns < begin
+
+    bag = write(folder / "bag", [raw for raw in raws if not lost(raw)])
+    tool, arguments = reading(dice, bag)
+    what = f"{kind} of {length / SECOND:g} s, {share:.0%} on {len(chosen)} topics"
+    return Attack(tool, arguments, what, names)
+
+
+@attack("several recordings")
+def folders(dice: random.Random, folder: Path, base: Base) -> Attack:
+    raws, _ = base.some(dice)
+    kind = dice.choice(("name", "link loop", "device", "empty", "mixed", "twice", "nested"))
+    bag = write(folder / "bag", raws)
+    if kind == "name":
+        name = dice.choice(
+            ("a\nb", "\x1b[31m", "$x_$", "<script>", "-x", "#: {", "ü" * 60, "a?b%41")
+        )
+        bag = bag.rename(folder / name)
+    elif kind == "link loop":
+        (bag / "loop.mcap").symlink_to(bag / "loop.mcap")
+    elif kind == "device":
+        (bag / "bag.mcap").unlink()
+        (bag / "bag.mcap").symlink_to(dice.choice(("/dev/zero", "/dev/full", "/dev/tty", "/")))
+    elif kind == "empty":
+        (bag / "bag.mcap").write_bytes(b"")
+    elif kind == "mixed":
+        write(folder / "other", raws, "sqlite3")
+        shutil.copy(folder / "other" / "other.db3", bag)
+        (bag / "metadata.yaml").unlink()
+    elif kind == "twice":
+        shutil.copy(bag / "bag.mcap", bag / "copy.mcap")
+        (bag / "metadata.yaml").unlink()
+    else:
+        shutil.copytree(bag, bag / "bag.db3")
+    tool, arguments = reading(dice, bag)
+    return Attack(tool, arguments, kind)
+
+
+@attack("a recorder that is killed")
+def unclosed(dice: random.Random, folder: Path, base: Base) -> Attack:
+    with open_recording(HEALTHY):
+        pass
+    data = (HEALTHY / "square.mcap").read_bytes()
+    path = folder / "cut.mcap"
+    path.write_bytes(data[: dice.randrange(len(data))])
+    tool, arguments = reading(dice, path)
+    return Attack(tool, arguments, "cut", frozenset())

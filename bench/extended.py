@@ -1,0 +1,320 @@
+"""Faults beyond the paper's in MuJoCo, kinds that nobody knows, and pushes, scored with intervals.
+
+    .venv/bin/python bench/extended.py [--drives 20] [--healthy-hours 0.5] [--json report.json]
+
+So many drives of each kind of fault in docs/faults.md: robots, deviations of 5 % from their
+description, payloads, floors, bumps, missions and sensor noise as in bench/diagnosis.py, wheels,
+sizes and onsets at random, from seeds that nothing else uses. Healthy drives are shoved (up to
+3 N/kg for 0.2 s) and leaned on (up to 1 N/kg for seconds) as well.
+
+A fault counts while it shows: power or speeds differ measurably from those of a twin of the same
+robot in the same drive without the fault (`tomr_training/labels.py`); one of a power sensor, while
+its wheel turns. Decisions count from 1 s after it first shows. Figures are those of
+`tomr_diagnose --labels`. Four drives take about a minute of one core.
+"""
+
+import argparse
+import json
+import math
+import os
+import sys
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from attrs import evolve, frozen
+from tqdm import tqdm
+
+from tomr_fault_diag.classifier.judges import make_judge
+from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.classifier.stage import FaultClassifier
+from tomr_fault_diag.diagnosis.labels import Label, simulated
+from tomr_fault_diag.diagnosis.score import (
+    MISSED,
+    RIGHT,
+    WRONG,
+    Scores,
+    Seen,
+    binomial_interval,
+    seen,
+)
+from tomr_fault_diag.diagnosis.track import Track, Tracker
+from tomr_power_model.cli import run_main
+from tomr_power_model.robot import Robot, shipped_robot
+from tomr_sim_bridge.faults import check_settings
+from tomr_sim_bridge.missions.schema import PlannedFault
+from tomr_training.drives import Drive, random_drive
+from tomr_training.labels import Flags, GroundTruth, Noise, deviates, lasting
+from tomr_training.simulated_drive import (
+    PERIOD_NS,
+    START_NS,
+    LabelledDrive,
+    healthy_twin,
+    simulated_drive,
+)
+
+FIRST_SEED = 3_000_000  # of faulty drives; healthy ones follow a million later
+_HEALTHY = 1_000_000
+_PERIOD = PERIOD_NS * 1e-9  # s
+_DRIVE_SECONDS = 18.0  # mean length of a drive, at least
+_TURNING = 0.5  # rad/s: a slower wheel may hide what its power sensor does
+_JOINED = 1.0  # s between two shows that make one
+
+Random = np.random.Generator
+Sized = tuple[dict[str, object], float]  # settings at severity 1, and the size to be scored by
+
+
+@frozen
+class Kind:
+    """A fault to draw: its settings and the size by which it is scored."""
+
+    fault_id: str
+    draw: Callable[[Random, Robot], Sized]
+    is_known: bool = True  # False: nobody has trained on it
+    also: str = ""  # a second fault, of another kind, at once
+
+
+def _plain(random: Random, robot: Robot) -> Sized:
+    return {}, 1.0
+
+
+def _uniform(setting: str, low: float, high: float) -> Callable[[Random, Robot], Sized]:
+    def draw(random: Random, robot: Robot) -> Sized:
+        value = float(random.uniform(low, high))
+        return {setting: value}, value
+
+    return draw
+
+
+def _drag(random: Random, robot: Robot) -> Sized:
+    """In parts of the wheel's own dry friction."""
+    own = robot.everywhere("friction.coulomb", "torque", 0.0)[0]
+    share = float(random.uniform(0.3, 6.0))
+    return {"torque": share * own}, share
+
+
+def _scale(random: Random, robot: Robot) -> Sized:
+    off = float(random.uniform(0.15, 0.7))
+    return {"factor": 1.0 + off * float(random.choice([-1.0, 1.0]))}, off
+
+
+def _bias(random: Random, robot: Robot) -> Sized:
+    off = float(random.uniform(0.5, 6.0))
+    return {"bias": off * float(random.choice([-1.0, 1.0]))}, off
+
+
+def _towed(random: Random, robot: Robot) -> Sized:
+    share = float(random.uniform(0.4, 1.5))  # N/kg
+    return {"drag": share * robot.mass}, share
+
+
+def _wind(random: Random, robot: Robot) -> Sized:
+    speed = float(random.uniform(8.0, 16.0))
+    return {"speed": speed, "azimuth": float(random.uniform(-math.pi, math.pi))}, speed
+
+
+KINDS: Mapping[str, Kind] = {
+    kind.fault_id + ("" if not kind.also else f" and {kind.also}"): kind
+    for kind in (
+        Kind("drivers_off", _plain),
+        Kind("commands_ignored", _plain),
+        Kind("wheel_stuck", _plain),
+        Kind("bearing_dragging", _drag),
+        Kind("motor_resistance_high", _uniform("rise", 0.1, 2.0)),
+        Kind("motor_torque_weak", _uniform("loss", 0.1, 0.6)),
+        Kind("power_sensor_dead", _plain),
+        Kind("power_sensor_frozen", _plain),
+        Kind("power_sensor_scaled", _scale),
+        Kind("power_sensor_biased", _bias),
+        Kind("supply_low", _uniform("undervoltage", 2.0, 8.0)),
+        Kind("control_signal_lost", _plain, also="floor_slippery"),
+        Kind("load_towed", _towed, is_known=False),
+        Kind("tethered", _uniform("stiffness", 10.0, 40.0), is_known=False),
+        Kind("windy", _wind, is_known=False),
+    )
+}
+
+
+def faulty_drive(seed: int, name: str) -> tuple[Drive, float]:
+    """A drive with a fault of a kind, and the size of the fault."""
+    kind = KINDS[name]
+    drive = random_drive(shipped_robot("reference"), seed, None)
+    random = np.random.default_rng([seed, 1])
+    settings, size = kind.draw(random, drive.plant)
+    start = float(random.uniform(0.2, 0.5) * drive.length)
+    end = float(random.uniform(0.7, 1.0) * drive.length)
+    wheel = int(random.integers(1, 4))
+    faults = [_planned(kind.fault_id, start, end, wheel, settings)]
+    if kind.also:
+        faults.append(_planned(kind.also, start, end, wheel, {"severity": 0.8}))
+    return evolve(drive, mission=evolve(drive.mission, faults=tuple(faults))), size
+
+
+def _planned(
+    fault_id: str, start: float, end: float, wheel: int, given: Mapping[str, object]
+) -> PlannedFault:
+    settings = {"severity": 1.0, **given}
+    if "wheel" in check_settings(fault_id, {}, fault_id):
+        settings["wheel"] = wheel
+    return PlannedFault(fault_id, start, end, check_settings(fault_id, settings, fault_id))
+
+
+def pushed_drive(seed: int) -> Drive:
+    """A healthy drive with two shoves and a lean, beside the bumps that all drives have."""
+    drive = random_drive(shipped_robot("reference"), seed, None)
+    random = np.random.default_rng([seed, 2])
+    begins = np.sort(random.uniform(1.0, drive.length - 1.0, 3))
+    pushes = []
+    for begin, until in pairwise([*begins, drive.length]):
+        is_lean = random.random() < 0.3
+        length = min(random.uniform(2.0, 6.0) if is_lean else 0.2, until - begin)
+        if length <= 0.0:
+            continue
+        settings = {
+            "force": float(random.uniform(0.3, 1.0) if is_lean else random.uniform(0.5, 3.0)),
+            "azimuth": float(random.uniform(-math.pi, math.pi)),
+            "lever": float(random.uniform(-0.5, 0.5) * drive.plant.robot_radius),
+            "rise": length / 2.0 if is_lean else 0.0,
+        }
+        pushes.append(_planned("pushed", float(begin), float(begin + length), 1, settings))
+    return evolve(drive, mission=evolve(drive.mission, faults=tuple(pushes)))
+
+
+def said_of(labelled: LabelledDrive) -> Track:
+    """What the classifier as shipped says of each tick."""
+    classifier, tracker = FaultClassifier(make_judge(ClassifierSettings())), Tracker(False)
+    for frame in labelled.frames:
+        diagnosis = classifier.classify(frame)
+        if diagnosis is not None:
+            tracker.diagnosis(diagnosis, math.nan)
+        tracker.frame(frame)
+    return tracker.track()
+
+
+def shows(drive: Drive, labelled: LabelledDrive, twin: GroundTruth) -> Flags:
+    """Ticks in which the fault can be seen, (n,)."""
+    fault = drive.mission.faults[0]
+    if fault.fault_id.startswith("power_sensor"):
+        wheel = int(str(fault.settings["wheel"])) - 1
+        seen_now = np.abs(twin.speed[:, wheel]) > _TURNING
+    else:
+        seen_now = deviates(labelled.truth, twin, Noise.of(drive.plant))
+    return lasting(np.asarray(seen_now & labelled.faulty))
+
+
+def spans(flags: Flags, first: int) -> tuple[tuple[float, float], ...]:
+    """Times [s] of runs of ticks, the first of which is `first`; short gaps are closed."""
+    ticks = np.flatnonzero(flags)
+    if not len(ticks):
+        return ()
+    cuts = np.flatnonzero(np.diff(ticks) * _PERIOD > _JOINED)
+    starts, ends = [ticks[0], *ticks[cuts + 1]], [*ticks[cuts], ticks[-1]]
+    return tuple(
+        (float(first + a) * _PERIOD, float(first + b + 1) * _PERIOD)
+        for a, b in zip(starts, ends, strict=True)
+    )
+
+
+def score_fault(seed: int, name: str) -> Seen | None:
+    """A faulty drive against its label; None where the fault never shows."""
+    drive, size = faulty_drive(seed, name)
+    labelled = simulated_drive(drive)
+    twin = healthy_twin(drive).of_ticks(labelled.first - 1 + np.arange(len(labelled.frames)))
+    observable = spans(shows(drive, labelled, twin), labelled.first)
+    if not observable:
+        return None
+    label = _label(drive, name, size)
+    # The onset is when it first shows: what comes before, nobody could tell.
+    label = evolve(label, onset=observable[0][0] - 4 * _PERIOD, observable=observable)
+    return seen(said_of(labelled), START_NS, [label], (0, 1))
+
+
+def _label(drive: Drive, name: str, size: float) -> Label:
+    first, *more = drive.mission.faults
+    values = {"onset": first.start, "severity": size, "end": first.end or drive.length}
+    if "wheel" in first.settings:
+        values["wheel"] = float(str(first.settings["wheel"]))
+    label = evolve(simulated(name, first.fault_id, values), kind=name)
+    others = [simulated(name, fault.fault_id, {}).state for fault in more]
+    return evolve(label, accept=(*label.accept, *others, *(["unknown"] if more else [])))
+
+
+def score_healthy(seed: int) -> Seen:
+    """A healthy drive with pushes: whatever is named is an alarm."""
+    labelled = simulated_drive(pushed_drive(seed))
+    return seen(said_of(labelled), START_NS, [], (0, 1))
+
+
+def _work(task: tuple[int, str]) -> Seen | None:
+    seed, name = task
+    return score_fault(seed, name) if name else score_healthy(seed)
+
+
+def targets(found: Sequence[Seen]) -> dict[str, object]:
+    """What each group of faults was called for most of the time, with exact intervals."""
+    groups: dict[str, Counter[str]] = {"extended states": Counter(), "unknown kinds": Counter()}
+    for case in (case for item in found for case in item.cases):
+        name = "extended states" if KINDS[case.kind].is_known else "unknown kinds"
+        groups[name][case.verdicts.most_common(1)[0][0] if case.verdicts else MISSED] += 1
+    report: dict[str, object] = {}
+    for name, counts in groups.items():
+        total = counts.total()
+        told = {
+            "right": counts[RIGHT],
+            "right or unknown": total - counts[WRONG] - counts[MISSED],
+            "unknown or a fault": total - counts[MISSED],
+            "a wrong fault": counts[WRONG],
+        }
+        report[name] = {"faults": total} | {
+            words: _with_interval(part, total) for words, part in told.items()
+        }
+    return report
+
+
+def _with_interval(part: int, whole: int) -> dict[str, object]:
+    if not whole:
+        return {"share": None, "ci95": None}
+    low, high = binomial_interval(part, whole)
+    return {"share": round(part / whole, 4), "ci95": [round(low, 4), round(high, 4)]}
+
+
+def _main(arguments: Sequence[str] | None) -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--drives", type=int, default=20, help="of each kind (default 20)")
+    parser.add_argument("--healthy-hours", type=float, default=0.5, help="(default 0.5)")
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="of the test set")
+    parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--json", type=Path, help="write the report to this file as well")
+    options = parser.parse_args(arguments)
+    places = {name: number for number, name in enumerate(KINDS)}
+    tasks = [
+        (options.first_seed + 1000 * places[name] + drive, name)
+        for name in options.kinds
+        for drive in range(options.drives)
+    ]
+    healthy = round(options.healthy_hours * 3600.0 / _DRIVE_SECONDS)
+    tasks += [(options.first_seed + _HEALTHY + drive, "") for drive in range(healthy)]
+    with ProcessPoolExecutor(options.jobs) as pool:
+        played = pool.map(_work, tasks)
+        found = list(tqdm(played, total=len(tasks), unit="drive", disable=None))
+    scored = [item for item in found if item is not None]
+    report = {
+        "never_showed": len(found) - len(scored),
+        "targets": targets(scored),
+        **Scores(tuple(scored)).as_dict(),
+    }
+    text = json.dumps(report, indent=2)
+    print(text)
+    if options.json:
+        options.json.write_text(text + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(run_main(_main))

@@ -1,0 +1,340 @@
+"""Healthy and faulty drives in which data are missing or bad: nothing may be concluded from that.
+
+    .venv/bin/python bench/interrupted.py [--placements 24] [--seeds 2] [--only WORD] [--json OUT]
+
+Drives in MuJoCo with the reference robot, in whose recordings streams pause, stamps leap and
+scatter, samples are lost, sensors die, freeze or send what no sensor measures. Counted are the
+drives in which a fault is named that the undisturbed drive does not name, and, of faulty drives,
+those in which the fault is not named (again) within 2 s of what it needs being back.
+"""
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from copy import copy
+from functools import cache, partial
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from attrs import frozen
+from tqdm import tqdm
+
+from tomr_fault_diag.classifier.stage import Diagnosis
+from tomr_fault_diag.classifier.states import FAULTLESS, POWER_SENSOR
+from tomr_fault_diag.diagnosis.pipeline import Pipeline
+from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
+from tomr_power_model.cli import EXIT_OK, run_main
+from tomr_power_model.messages.bag import to_bag
+from tomr_power_model.model.ticks import NANOSECONDS, to_ns
+from tomr_power_model.robot import shipped_robot
+from tomr_sim_bridge.missions.drive import drive, start_mission
+from tomr_sim_bridge.missions.mission import load_mission
+
+_START = 1_700_000_000 * NANOSECONDS
+_AGAIN = 2.0  # s in which a fault must be named again
+FAULTY = ("circle_encoder_lost", "circle_control_signal_lost", "square_encoder_lost")
+_LATEST = 26.0  # s of a drive that is played
+POWER = ("wheel_1/power", "wheel_2/power", "wheel_3/power")
+STREAMS: dict[str, tuple[str, ...]] = {
+    "all": ("cmd_vel", "joint_states", *POWER, "battery_state"),
+    "cmd_vel": ("cmd_vel",),
+    "joint_states": ("joint_states",),
+    "one motor": (POWER[1],),
+    "motors": POWER,
+}
+
+
+@frozen
+class Item:
+    """One message of a drive."""
+
+    stamp_ns: int
+    topic: str
+    message: Any
+
+
+Drive = tuple[Item, ...]
+Change = Callable[[Drive, np.random.Generator], Drive]
+
+
+@cache
+def recorded(mission: str, seed: int) -> Drive:
+    """A mission of the simulated reference robot."""
+    robot, plan = shipped_robot("reference"), load_mission(mission)
+    topics = set(STREAMS["all"])
+    simulation = start_mission(plan, robot, seed, _START)
+    return tuple(
+        Item(sample.stamp_ns, sample.topic, to_bag(sample.message))
+        for samples in drive(plan, simulation, seed)
+        for sample in samples
+        if sample.topic in topics and sample.stamp_ns < _START + to_ns(_LATEST)
+    )
+
+
+def stamped(item: Item, stamp_ns: int) -> Item:
+    """The same message with another stamp."""
+    message, header = copy(item.message), copy(item.message.header)
+    time = copy(header.stamp)
+    time.sec, time.nanosec = divmod(stamp_ns, NANOSECONDS)
+    header.stamp, message.header = time, header
+    return Item(stamp_ns, item.topic, message)
+
+
+def pause(streams: str, at: float, length: float) -> Change:
+    """Nothing comes on some streams for a while [s]."""
+    first, last = _START + to_ns(at), _START + to_ns(at + length)
+    topics = STREAMS[streams]
+    return lambda items, _: tuple(
+        item for item in items if item.topic not in topics or not first <= item.stamp_ns < last
+    )
+
+
+def leap(at: float, by: float) -> Change:
+    """All stamps leap [s]."""
+    first = _START + to_ns(at)
+    return lambda items, _: tuple(
+        stamped(item, item.stamp_ns + to_ns(by)) if item.stamp_ns >= first else item
+        for item in items
+    )
+
+
+def loss(share: float, streams: str = "all") -> Change:
+    """A share of the samples is lost."""
+    topics = STREAMS[streams]
+    return lambda items, random: tuple(
+        item for item in items if item.topic not in topics or random.random() >= share
+    )
+
+
+def scatter(std: float, streams: str = "all") -> Change:
+    """Stamps scatter around when samples were taken [s]; each stream stays in order."""
+    topics = STREAMS[streams]
+
+    def change(items: Drive, random: np.random.Generator) -> Drive:
+        newest = dict.fromkeys(topics, 0)
+        found = []
+        for item in items:
+            if item.topic in topics:
+                stamp = item.stamp_ns + round(1e9 * random.normal(0.0, std))
+                newest[item.topic] = stamp = max(stamp, newest[item.topic] + 1000)
+                item = stamped(item, stamp)
+            found.append(item)
+        return tuple(found)
+
+    return change
+
+
+def power(wheel: int, at: float, make: Callable[[Any, Any], Any], length: float = 1e9) -> Change:
+    """A motor's power as another sensor would give it: from its message and the one at `at`."""
+    first, last = _START + to_ns(at), _START + to_ns(min(at + length, 1e6))
+
+    def change(items: Drive, _: np.random.Generator) -> Drive:
+        held, found = None, []
+        for item in items:
+            if item.topic == POWER[wheel] and first <= item.stamp_ns < last:
+                held = held or item.message
+                item = Item(item.stamp_ns, item.topic, make(copy(item.message), held))
+            found.append(item)
+        return tuple(found)
+
+    return change
+
+
+def frozen_sensor(message: Any, held: Any) -> Any:
+    """A sensor that repeats what it said at first."""
+    message.voltage, message.current = held.voltage, held.current
+    return message
+
+
+def absurd(message: Any, _: Any) -> Any:
+    """What no sensor measures."""
+    message.voltage = 1e30
+    return message
+
+
+def dead(message: Any, _: Any) -> Any:
+    """A bus that answers with zeros."""
+    message.voltage, message.current = 0.0, 0.0
+    return message
+
+
+def both(*changes: Change) -> Change:
+    """Several disturbances one after the other."""
+
+    def change(items: Drive, random: np.random.Generator) -> Drive:
+        for one in changes:
+            items = one(items, random)
+        return items
+
+    return change
+
+
+@frozen
+class Case:
+    """A disturbance of a drive, when what it takes away is back [s], and the seed of its chance."""
+
+    kind: str
+    change: Change
+    back: float = 0.0
+    seed: int = 0
+
+
+def gaps(places: Sequence[float]) -> Iterator[Case]:
+    """Pauses and leaps at some times [s]."""
+    for streams in STREAMS:
+        for length in (0.2, 0.3, 0.5, 1.5):
+            for at in places:
+                yield Case(f"pause {length} s, {streams}", pause(streams, at, length), at + length)
+    for by in (0.3, -0.3):
+        for at in places:
+            yield Case(f"stamps leap {by:+} s", leap(at, by), at + abs(by))
+
+
+def cases(placements: int) -> Iterator[Case]:
+    """All disturbances, those in one place at many."""
+    places = np.linspace(2.0, 20.0, placements).tolist()
+    yield from gaps(places)
+    for seed in range(placements // 2):
+        for share in (0.02, 0.2, 0.5, 0.67, 0.9):
+            yield Case(f"{share:.0%} lost", loss(share), seed=seed)
+        for std in (0.002, 0.005, 0.01):
+            yield Case(f"stamps scatter {1e3 * std:g} ms", scatter(std), seed=seed)
+        worn = both(loss(0.02), scatter(0.005), pause("motors", 4.0 + 2 * seed, 1.0))
+        yield Case("2 % lost, 5 ms, 1 s without power", worn, seed=seed)
+    for at in places[::3]:
+        for wheel in range(3):
+            yield Case("power frozen", power(wheel, at, frozen_sensor))
+            yield Case("power reads zero", power(wheel, at, dead))
+            yield Case("one sample of 1e30 V", power(wheel, at, absurd, 0.015))
+            yield Case("1e30 V for good", power(wheel, at, absurd))
+            yield Case("unplugged", unplugged(wheel, at))
+
+
+def unplugged(wheel: int, at: float) -> Change:
+    """Nothing comes from a motor's power sensor any more."""
+    first = _START + to_ns(at)
+    return lambda items, _: tuple(
+        item for item in items if item.topic != POWER[wheel] or item.stamp_ns < first
+    )
+
+
+def states(items: Drive) -> list[Diagnosis]:
+    """What is published of a drive."""
+    pipeline = Pipeline(shipped_robot("reference"), DiagnosisSettings.of({}, "defaults"))
+    return [
+        diagnosis
+        for item in items
+        for diagnosis in pipeline.take(item.topic, item.message, item.stamp_ns).diagnoses
+    ]
+
+
+def accused(found: Sequence[Diagnosis]) -> list[str]:
+    """Faults in the order in which they were named, those of power sensors aside."""
+    names = [d.state.name for d in found if d.changed and d.state not in POWER_SENSOR]
+    return [name for name in names if name not in FAULTLESS]
+
+
+def healthy(case: Case, mission: str, seed: int) -> tuple[str, list[str], float]:
+    """The kind of a case, what it made to be named, and the share of time that was decided."""
+    found = states(case.change(recorded(mission, seed), np.random.default_rng(case.seed)))
+    periodic = [d for d in found if not d.changed]
+    decided = [d for d in periodic if d.state.name == "normal" or d.state.name not in FAULTLESS]
+    return case.kind, accused(found), len(decided) / max(len(periodic), 1)
+
+
+def faulty(case: Case, mission: str, seed: int) -> tuple[str, list[str], float]:
+    """As `healthy` of a drive with a fault: what became of the fault's name, if not what should."""
+    usual = usually(mission, seed)
+    found = states(case.change(recorded(mission, seed), np.random.default_rng(case.seed)))
+    wrong = [f"{name} for {usual}" for name in accused(found) if name != usual]
+    first, last = fault_times(mission)
+    until = max(case.back, first) + _AGAIN
+    named = [d.state.name for d in found if d.stamp_ns <= _START + to_ns(until)]
+    if until < last and named[-1] != usual:
+        wrong.append(f"{usual} not found again")
+    inside = [d.state.name for d in found if first < 1e-9 * (d.stamp_ns - _START) < last]
+    after = inside[inside.index(usual) :] if usual in inside else []
+    if any(name != usual for name in after):
+        wrong.append(f"{usual} cleared")
+    return f"faulty: {case.kind}", wrong, 1.0
+
+
+@cache
+def usually(mission: str, seed: int) -> str:
+    """The fault that is named where nothing is disturbed."""
+    return (accused(states(recorded(mission, seed))) or ["nothing"])[0]
+
+
+def fault_times(mission: str) -> tuple[float, float]:
+    """When the fault of a mission begins and ends [s]."""
+    (fault,) = load_mission(mission).faults
+    return fault.start, fault.end or _LATEST
+
+
+def table(results: Sequence[tuple[str, list[str], float]]) -> dict[str, dict[str, Any]]:
+    """Drives, accusations and shares decided by kind."""
+    found: dict[str, dict[str, Any]] = {}
+    for kind, names, decided in results:
+        row = found.setdefault(kind, {"drives": 0, "wrong": 0, "decided": [], "names": {}})
+        row["drives"] += 1
+        row["wrong"] += bool(names)
+        row["decided"].append(decided)
+        for name in names:
+            row["names"][name] = row["names"].get(name, 0) + 1
+    for row in found.values():
+        row["decided"] = round(float(np.mean(row["decided"])), 3)
+    return found
+
+
+Play = tuple[Callable[[Case, str, int], tuple[str, list[str], float]], Case, str, int]
+
+
+def plays(placements: int, seeds: int) -> Iterator[Play]:
+    """All drives to play: healthy ones, and those with a fault."""
+    for seed in range(seeds):
+        for case in cases(placements):
+            yield healthy, case, "random_tour", 100 + seed
+        for mission in FAULTY:
+            first, _ = fault_times(mission)
+            for case in gaps([first - 0.2, first + 1.0, first + 1.7]):
+                yield faulty, case, mission, 100 + seed
+
+
+def _play(index: int, placements: int, seeds: int) -> tuple[str, list[str], float]:
+    judge, case, mission, seed = next(islice(plays(placements, seeds), index, None))
+    return judge(case, mission, seed)
+
+
+def main(arguments: Sequence[str] | None) -> int:
+    """Play all cases; a table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--placements", type=int, default=24)
+    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--only", default="", help="cases whose kind holds this word")
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)))
+    options = parser.parse_args(arguments)
+    amount = options.placements, options.seeds
+    told = list(plays(*amount))
+    chosen = [k for k, (_, case, *_) in enumerate(told) if options.only in case.kind]
+    for mission, seed in sorted({(told[k][2], told[k][3]) for k in chosen}):
+        usually(mission, seed)  # the workers inherit it, and the drive
+    play = partial(_play, placements=amount[0], seeds=amount[1])
+    with ProcessPoolExecutor(options.jobs) as pool:
+        results = list(tqdm(pool.map(play, chosen), total=len(chosen), disable=None))
+    found = table(results)
+    for kind, row in found.items():
+        print(f"{kind:40} {row['wrong']:3} of {row['drives']:3} wrong, "
+              f"{row['decided']:.0%} decided  {row['names'] or ''}")  # fmt: skip
+    if options.json:
+        options.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    return EXIT_OK
+
+
+if __name__ == "__main__":
+    sys.exit(run_main(main))

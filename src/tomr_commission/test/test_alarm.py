@@ -1,0 +1,57 @@
+"""The level that gives a rate of false alarms."""
+
+import numpy as np
+import pytest
+
+from tomr_commission.alarm import Tail, alarm_level, block_peaks
+from tomr_commission.evidence import MOST_CAUTION, SURE
+from tomr_commission.request import AlarmChoice
+
+CHOICE = AlarmChoice()
+
+
+def exponential(scale: float, count: int = 4000, seed: int = 2) -> np.ndarray:
+    return np.random.default_rng(seed).exponential(scale, count)
+
+
+def test_exponential_peaks_give_the_level_that_their_law_has() -> None:
+    tail = Tail.of("shoves", exponential(2.0), 10.0, CHOICE)
+    level = alarm_level([tail], 0.01, 11.0, CHOICE)
+    # 10 an hour, exp(-x / 2) of them beyond x: 0.01 an hour beyond 2 ln 1000 = 13.8 decades.
+    assert level.needed + SURE == pytest.approx(13.8, rel=0.1)
+    assert level.low < level.expected <= 0.0101
+    assert level.high > 0.01
+    assert level.is_enough
+
+
+def test_rarer_alarms_ask_for_more_caution() -> None:
+    tail = Tail.of("shoves", exponential(2.0, 300), 10.0, CHOICE)
+    needed = [alarm_level([tail], rate, 11.0, CHOICE).needed for rate in (1.0, 0.1, 0.01)]
+    assert needed == sorted(needed)
+    assert needed[0] < needed[2]
+
+
+def test_fewer_peaks_make_it_more_careful() -> None:
+    many, few = (Tail.of("", exponential(2.0, count), 10.0, CHOICE) for count in (4000, 60))
+    spread = [np.quantile(tail.draws(15.0), 0.8) / tail.rate(15.0) for tail in (many, few)]
+    assert 1.0 < spread[0] < spread[1]
+
+
+def test_without_evidence_the_level_is_the_shipped_one_less_the_bound() -> None:
+    tail = Tail.of("driving", [0.0] * 50, 360.0, CHOICE)
+    level = alarm_level([tail], 0.05, 11.0, CHOICE)
+    assert level.caution == 11.0 - CHOICE.below_shipped
+    assert level.expected == 0.0
+
+
+def test_peaks_at_the_cap_are_longer_than_is_known() -> None:
+    """A tenth of the peaks beyond all caution: no level helps, and that is said."""
+    peaks = [*exponential(1.0, 90), *[40.0] * 10]
+    level = alarm_level([Tail.of("shoves", peaks, 30.0, CHOICE)], 0.05, 11.0, CHOICE)
+    assert level.caution == MOST_CAUTION
+    assert not level.is_enough
+    assert level.expected > 0.05
+
+
+def test_block_peaks() -> None:
+    assert block_peaks(np.array([1.0, 3.0, 2.0, 0.0, 5.0]), 2) == [3.0, 2.0, 5.0]

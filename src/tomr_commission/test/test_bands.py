@@ -1,0 +1,57 @@
+"""Bands of one robot, and what each drive asks of them."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from tomr_commission.bands import bands_of, outside, regime_table, regimes, steady_drag
+from tomr_commission.observed import Observed
+from tomr_commission.request import BandChoice
+
+Steady = Callable[..., Observed]
+
+
+def test_margin_multiplies_the_bands(steady: Steady) -> None:
+    plain = bands_of([steady()], BandChoice(margin=1.0, speed_factor=1.0))
+    wide = bands_of([steady()], BandChoice(margin=2.0, speed_factor=1.5))
+    assert wide.power == pytest.approx(2.0 * plain.power, rel=1e-3)
+    assert wide.speed == pytest.approx(3.0 * plain.speed, rel=1e-3)
+    assert wide.total_factor == pytest.approx(plain.total_factor, rel=1e-3)
+
+
+def test_bands_hold_the_share_that_was_asked_for(steady: Steady) -> None:
+    drive = steady(ticks=8000)
+    shares = outside(drive, bands_of([drive], BandChoice(0.99, 1.0, 1.0)))
+    assert all(0.002 < share < 0.03 for share in shares.values())
+
+
+def test_regimes_of_a_start_and_a_reversal(steady: Steady) -> None:
+    drive = steady(ticks=60)
+    modelled = drive.modelled.copy()
+    modelled[:20, 4], modelled[20:40, 4], modelled[40:, 4] = 0.0, 5.0, -5.0
+    found = regimes(evolve(drive, modelled=modelled))
+    assert found["at rest"][:20, 0].all()
+    assert found["starts and stops"][20, 0]
+    assert found["steady"][35, 0]
+    assert found["reversals"][41, 0]
+    assert sum(mask.astype(int) for mask in found.values()).max() == 1
+
+
+def test_table_shows_the_scatter(steady: Steady) -> None:
+    drive = steady(sigma=0.1)
+    lines = regime_table([drive], bands_of([drive], BandChoice()))
+    line = next(one for one in lines if one.kind == "motor power, command path")
+    assert line.regime == "steady"
+    assert line.rms == pytest.approx(0.1, rel=0.05)
+    assert line.high == pytest.approx(0.329, rel=0.1)  # 99.9 % of |normal|: 3.29 sigma
+
+
+def test_drag_is_power_over_speed(steady: Steady) -> None:
+    drive = steady(sigma=0.0)
+    residual = drive.residual.copy()
+    residual[:, 2] = 1.0  # W more at 5 rad/s: 0.2 N m, a quarter of the 0.8 N m that are usual
+    drag = steady_drag(evolve(drive, residual=residual))
+    assert np.allclose(drag.added, [0.0, 0.2, 0.0])
+    assert np.allclose(drag.usual, 0.8)

@@ -1,0 +1,58 @@
+"""A drive in arrays makes the very frames that the residual stage publishes."""
+
+from pathlib import Path
+
+import numpy as np
+from attrs import evolve
+
+from tomr_commission.observed import Observed, band_of, frames_of
+from tomr_fault_diag.diagnosis.offline import diagnose
+from tomr_fault_diag.diagnosis.pipeline import Pipeline
+from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
+from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_power_model.recordings import open_recording
+from tomr_power_model.robot import shipped_robot
+
+BAG = Path(__file__).resolve().parents[3] / "bags" / "square"
+
+
+def test_frames_with_other_bands_are_those_of_a_pipeline_that_has_them(healthy: Observed) -> None:
+    bands = {"band.power": 0.7, "band.relative": 0.05, "band.speed": 0.03, "band.transient": 0.2}
+    pipeline = Pipeline(shipped_robot("reference"), DiagnosisSettings.of(bands, ""))
+    with open_recording(BAG) as recording:
+        frames = [frame for _, step in diagnose(recording, pipeline) for frame in step.frames]
+    own = BandSettings(power=0.7, relative=0.05, speed=0.03, transient=0.2)
+    made = frames_of(healthy, own)
+    assert len(made) == len(frames) > 300
+    for ours, theirs in zip(made, frames, strict=True):
+        assert ours.stamp_ns == theirs.stamp_ns
+        for one, other in zip(ours.residuals, theirs.residuals, strict=True):
+            assert one.stale == other.stale
+            if not other.stale:
+                assert (one.residual, one.modelled, one.unit) == (
+                    other.residual,
+                    other.modelled,
+                    other.unit,
+                )
+                assert np.isclose(one.band, other.band, rtol=1e-4)
+
+
+def test_band_is_the_larger_of_least_and_share_and_grows_with_change(healthy: Observed) -> None:
+    bands = BandSettings(power=1.0, relative=0.5, transient=0.1, total_factor=2.0)
+    modelled = np.zeros((3, 10))
+    modelled[:, 1] = [4.0, 4.0, 6.0]
+    drive = evolve(
+        healthy,
+        stamp_ns=healthy.stamp_ns[:3],
+        residual=np.zeros((3, 10)),
+        modelled=modelled,
+        missing=np.full((3, 10), ""),
+    )
+    # 0.5 * 6 W + 0.1 * (6 - 4) W; the total, at 0 W, twice the least.
+    assert np.allclose(band_of(drive, bands)[2, :2], [2.0, 3.2])
+
+
+def test_what_is_left_out_is_left_out(healthy: Observed) -> None:
+    kept = healthy.without([(2.0, 5.0)])
+    assert len(healthy.stamp_ns) - len(kept.stamp_ns) == 61
+    assert not ((kept.seconds > 2.0) & (kept.seconds < 5.0)).any()

@@ -1,0 +1,64 @@
+"""Simulated healthy hours and simulated faults of a robot."""
+
+import math
+
+import numpy as np
+
+from tomr_commission.rehearsal import Rehearsal, Usage, observed_of, rehearse, shoved_drive
+from tomr_commission.simulated import KINDS, cases, simulated_fault
+from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.residuals.frame import MOTORS
+from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_power_model.robot import shipped_robot
+
+ROBOT = shipped_robot("reference")
+USAGE = Usage((0.1, 0.4), 0.5)
+
+
+def test_usage_is_what_the_commands_ask_for() -> None:
+    commands = np.zeros((1000, 3))
+    commands[:500, 0], commands[500:, 1] = 0.2, -0.4
+    commands[:, 2] = np.linspace(-1.0, 1.0, 1000)
+    usage = Usage.of(commands)
+    assert usage.speed == (0.2, 0.4)
+    assert math.isclose(usage.yaw_rate, 0.98, rel_tol=0.01)
+
+
+def test_shoves_show_in_the_residuals_and_only_there() -> None:
+    drive = shoved_drive(
+        ROBOT, USAGE, Rehearsal(off=0.0, payload=0.0, force=(3.0, 3.0)), 80_000_001
+    )
+    seen = observed_of(drive)
+    size = np.abs(seen.residual[:, list(MOTORS)]).max(axis=1)
+    near = np.zeros(len(size), dtype=bool)
+    for bump in drive.bumps:
+        near |= (seen.seconds > bump.start - 0.1) & (seen.seconds < bump.start + 2.0)
+    assert len(drive.bumps) == 3
+    assert size[near].max() > 3.0 * size[~near].max()
+
+
+def test_rehearsal_depends_on_its_arguments_alone() -> None:
+    plan = Rehearsal(shoves=3)
+    one, other = (
+        rehearse("reference", BandSettings(), ClassifierSettings(), USAGE, plan) for _ in range(2)
+    )
+    assert one == other
+    assert len(one.peaks) == 3
+
+
+def test_cases_are_those_that_the_simulator_can_do() -> None:
+    found = cases()
+    assert {case.kind.fault for case in found} >= {"control_signal_lost", "encoder_lost"}
+    assert [case.wheel for case in found if case.kind.fault == "encoder_lost"] == [1, 2, 3]
+    assert len({case.seed for case in found}) == len(found)
+    assert all(list(kind.sizes) == sorted(kind.sizes, reverse=True) for kind in KINDS)
+
+
+def test_fault_comes_on_under_way_and_stays() -> None:
+    case = cases()[0]
+    drive = simulated_fault("reference", USAGE, case, 0.4)
+    (fault,) = drive.mission.faults
+    assert fault.start == 3.0
+    assert fault.end is None
+    assert fault.settings["severity"] == 0.4
+    assert drive.length > 8.0

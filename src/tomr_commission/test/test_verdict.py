@@ -1,0 +1,116 @@
+"""Go or no-go: each thing that speaks against it is named with its drive and a remedy."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from tomr_commission.alarm import AlarmLevel
+from tomr_commission.bands import bands_of
+from tomr_commission.evidence import Decided, Episode
+from tomr_commission.observed import Observed
+from tomr_commission.request import BandChoice, CommissionRequest
+from tomr_commission.verdict import Outcome, reasons
+
+Steady = Callable[..., Observed]
+QUIET = Decided(1000, 0, ())
+LEVEL = AlarmLevel(11.0, 0.05, 9.0, 0.02, 0.01, 0.04, ())
+
+
+@pytest.fixture
+def outcome(steady: Steady) -> Outcome:
+    """A robot about which all is well."""
+    fitted = tuple(steady(f"tour{k}", seed=k) for k in (1, 2, 3))
+    report = {"holdout": {"nrmse_after": 0.02}, "unexplained_share": 0.0}
+    levels = [{"channel": "wheel_1/power", "unit": "W", "held_out": True, "rms": 0.1, "level": 1.1}]
+    return Outcome(
+        CommissionRequest("reference", (), Path()),
+        {"report": report, "levels": levels},
+        fitted,
+        steady("held", seed=4),
+        bands_of(fitted, BandChoice()),
+        LEVEL,
+        QUIET,
+        (QUIET,) * 3,
+    )
+
+
+def said(outcome: Outcome) -> list[str]:
+    return [reason.what for reason in reasons(outcome)]
+
+
+def added(drive: Observed, channel: int, power: float) -> Observed:
+    residual = drive.residual.copy()
+    residual[:, channel] += power
+    return evolve(drive, residual=residual)
+
+
+def test_nothing_speaks_against_a_good_commissioning(outcome: Outcome) -> None:
+    assert said(outcome) == []
+
+
+def test_another_floor_in_one_drive(outcome: Outcome) -> None:
+    """0.8 W more at 5 rad/s and 4 W: a fifth of the usual torque at every wheel."""
+    first, second, third = outcome.fitted
+    for channel in (1, 2, 3):
+        second = added(second, channel, 0.8)
+    found = said(evolve(outcome, fitted=(first, second, third)))
+    assert any(
+        line.startswith("tour2: every wheel needs +20 % of the usual torque") for line in found
+    )
+
+
+def test_one_wheel_that_drags_in_one_drive(outcome: Outcome) -> None:
+    first, second, third = outcome.fitted
+    found = said(evolve(outcome, fitted=(added(first, 3, 1.2), second, third)))
+    assert any(line.startswith("tour1: wheel 3 needs +30 %") for line in found)
+
+
+def test_drive_that_scatters_more_than_the_rest(outcome: Outcome, steady: Steady) -> None:
+    first, second, _ = outcome.fitted
+    wild = evolve(outcome, fitted=(first, second, steady("tour3", sigma=0.5)))
+    assert any("tour3 needs bands" in line for line in said(wild))
+
+
+def test_alarm_in_a_healthy_drive(outcome: Outcome) -> None:
+    alarmed = Decided(1000, 0, (Episode("slip", None, 12.0, 13.5),))
+    found = said(evolve(outcome, fitted_said=(QUIET, alarmed, QUIET)))
+    assert found == [
+        "tour2: slip is named from 12.0 s to 13.5 s (1 in all) in a drive taken for healthy"
+    ]
+
+
+def test_held_out_drive_outside_of_the_bands(outcome: Outcome, steady: Steady) -> None:
+    wild = evolve(outcome, held=steady("held", sigma=0.25, seed=9))
+    assert any("of the held-out residuals of" in line for line in said(wild))
+
+
+@pytest.mark.parametrize(
+    ("level", "nrmse", "is_named"), [(1.5, 0.02, False), (9.0, 0.4, True), (9.0, 0.05, False)]
+)
+def test_what_is_left_over(outcome: Outcome, level: float, nrmse: float, is_named: bool) -> None:
+    """Far above the noise and far off: either alone may be a very quiet sensor, or a rough one."""
+    explained: dict[str, Any] = {
+        "report": {**outcome.explained["report"], "holdout": {"nrmse_after": nrmse}},
+        "levels": [{**outcome.explained["levels"][0], "level": level}],
+    }
+    found = said(evolve(outcome, explained=explained))
+    assert bool(found) == is_named
+    assert not found or "9.0 times the sensors' noise" in found[0]
+
+
+def test_rate_that_no_caution_reaches(outcome: Outcome) -> None:
+    level = evolve(LEVEL, needed=44.0, caution=30.0, expected=0.4, low=0.2, high=0.8)
+    (reason,) = reasons(evolve(outcome, level=level))
+    assert "0.4 false alarms per hour are expected" in reason.what
+    assert "--false-alarms-per-hour 0.8" in reason.remedy
+
+
+def test_too_little_driving(outcome: Outcome) -> None:
+    short = tuple(drive.part(slice(0, 200), drive.name) for drive in outcome.fitted)
+    (reason,) = reasons(evolve(outcome, fitted=short))
+    assert "minutes to fit to" in reason.what
+    assert np.isclose(60.0 * sum(drive.hours for drive in short), 0.5, atol=0.01)

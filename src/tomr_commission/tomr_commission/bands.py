@@ -1,0 +1,166 @@
+"""Bands of one robot: how its residuals scatter in healthy driving, and in which regime."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from attrs import asdict, evolve, frozen
+from numpy.typing import NDArray
+
+from tomr_commission.observed import Observed, band_of
+from tomr_commission.request import BandChoice
+from tomr_fault_diag.residuals.calibrated import fit_bands
+from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL
+from tomr_fault_diag.residuals.settings import BandSettings
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_REST = 0.1  # rad/s: a slower wheel stands
+_STEADY = 0.3  # rad/s over three ticks
+_LATELY = 10  # ticks
+KINDS: Mapping[str, Sequence[int]] = {
+    "total power": [TOTAL],
+    "motor power, command path": list(MOTORS),
+    "motor power, encoder path": list(ENCODERS),
+    "wheel speed": list(SPEEDS),
+}
+_MARGINED = ("relative", "power", "current", "transient", "total_relative")
+
+
+def bands_of(drives: Sequence[Observed], choice: BandChoice) -> BandSettings:
+    """Bands that the healthy residuals of drives stay within, with a margin.
+
+    Raises InputError where they are too few to tell.
+    """
+    fitted = fit_bands(
+        np.concatenate([drive.residual for drive in drives]),
+        np.concatenate([drive.modelled for drive in drives]),
+        np.concatenate([drive.change for drive in drives]),
+        str(drives[0].units[MOTORS.start]),
+        choice.within,
+    )
+    values = asdict(fitted)
+    for name in values:
+        if name in _MARGINED:
+            values[name] *= choice.margin
+        elif name.startswith("speed"):
+            values[name] *= choice.speed_factor * choice.margin
+    return evolve(fitted, **{name: float(f"{value:.4g}") for name, value in values.items()})
+
+
+def regimes(drive: Observed) -> Mapping[str, Mask]:
+    """What each wheel does at each tick, (n, 3)."""
+    speed = np.nan_to_num(drive.modelled[:, list(SPEEDS)])
+    change = drive.change[:, list(SPEEDS)]
+    way = np.sign(np.where(np.abs(speed) > _REST, speed, 0.0))
+    highest, lowest = way.copy(), way.copy()
+    for back in range(1, _LATELY):
+        highest[back:] = np.maximum(highest[back:], way[:-back])
+        lowest[back:] = np.minimum(lowest[back:], way[:-back])
+    rest = (way == 0.0) & (highest == lowest)
+    reversing = (highest > 0.0) & (lowest < 0.0)
+    starting = ~rest & ~reversing & (highest != lowest)
+    steady = ~rest & ~reversing & ~starting & (change < _STEADY)
+    return {
+        "at rest": rest,
+        "starts and stops": starting,
+        "reversals": reversing,
+        "steady": steady,
+        "other changes of speed": ~(rest | reversing | starting | steady),
+    }
+
+
+@frozen
+class RegimeLine:
+    """How one kind of residual scatters in one regime."""
+
+    regime: str
+    kind: str
+    unit: str
+    count: int
+    rms: float  # in the unit
+    high: float  # 99.9 % of |residual|, in the unit
+    outside: float  # share outside of the band
+
+
+def regime_table(drives: Sequence[Observed], bands: BandSettings) -> list[RegimeLine]:
+    """Residuals of drives by regime and kind."""
+    masks = [regimes(drive) for drive in drives]
+    widths = [band_of(drive, bands) for drive in drives]
+    lines = []
+    for regime in masks[0]:
+        for kind, channels in KINDS.items():
+            sizes, ratios = [], []
+            for drive, mask, width in zip(drives, masks, widths, strict=True):
+                rows = mask[regime] if len(channels) > 1 else _any_or_all(mask, regime)
+                known = rows & np.isfinite(drive.residual[:, channels])
+                size = np.abs(drive.residual[:, channels])[known]
+                sizes.append(size)
+                ratios.append(size / width[:, channels][known])
+            size, ratio = np.concatenate(sizes), np.concatenate(ratios)
+            if len(size):
+                lines.append(
+                    RegimeLine(
+                        regime,
+                        kind,
+                        str(drives[0].units[channels[0]]),
+                        len(size),
+                        float(np.sqrt(np.mean(size**2))),
+                        float(np.quantile(size, 0.999)),
+                        float(np.mean(ratio > 1.0)),
+                    )
+                )
+    return lines
+
+
+def _any_or_all(mask: Mapping[str, Mask], regime: str) -> Mask:
+    """Of the whole robot: it rests or is steady where all wheels are, else where any wheel is."""
+    quiet = regime in ("at rest", "steady")
+    return np.asarray(mask[regime].all(axis=1) if quiet else mask[regime].any(axis=1))[:, None]
+
+
+def outside(drive: Observed, bands: BandSettings) -> dict[str, float]:
+    """Share of a drive's residuals outside of the bands, by kind."""
+    ratio = np.abs(drive.residual) / band_of(drive, bands)
+    shares = {}
+    for kind, channels in KINDS.items():
+        known = ratio[:, list(channels)][np.isfinite(ratio[:, list(channels)])]
+        if len(known):
+            shares[kind] = float(np.mean(known > 1.0))
+    return shares
+
+
+def needed(drive: Observed, bands: BandSettings, within: float) -> dict[str, float]:
+    """How wide bands a drive's residuals ask for, in bands, by kind."""
+    ratio = np.abs(drive.residual) / band_of(drive, bands)
+    found = {}
+    for kind, channels in KINDS.items():
+        known = ratio[:, list(channels)][np.isfinite(ratio[:, list(channels)])]
+        if len(known):
+            found[kind] = float(np.quantile(known, within))
+    return found
+
+
+@frozen
+class Drag:
+    """Torque that wheels need in steady motion, as their power tells it."""
+
+    added: Array  # N m beyond the modelled, (3,)
+    usual: Array  # N m, (3,)
+
+
+def steady_drag(drive: Observed) -> Drag:
+    """What the residuals of power amount to as a torque that resists each wheel.
+
+    Where no wheel is ever steady it is nothing. Currents count as powers: shares are the same.
+    """
+    speed = np.abs(np.nan_to_num(drive.modelled[:, list(SPEEDS)]))
+    residual, modelled = drive.residual[:, list(MOTORS)], drive.modelled[:, list(MOTORS)]
+    rows = regimes(drive)["steady"] & np.isfinite(residual) & np.isfinite(modelled)
+    weight = np.where(rows, speed, 0.0)
+    total = np.maximum((weight**2).sum(axis=0), 1e-9)
+
+    def torque(power: Array) -> Array:
+        return np.asarray((weight * np.where(rows, power, 0.0)).sum(axis=0) / total)
+
+    return Drag(torque(residual), np.maximum(np.abs(torque(modelled)), 1e-9))

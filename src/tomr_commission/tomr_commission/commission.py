@@ -1,0 +1,372 @@
+"""The steps of a commissioning, in their order; each keeps its result, so that a rerun resumes."""
+
+import datetime
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from attrs import asdict, evolve, frozen
+
+from tomr_commission.alarm import AlarmLevel, Tail, alarm_level, block_peaks
+from tomr_commission.bands import RegimeLine, bands_of, regime_table
+from tomr_commission.commissioned import (
+    CLASSIFIER,
+    FILE,
+    RESIDUALS,
+    Record,
+    base_sections,
+    commissioned_text,
+    suite_version,
+)
+from tomr_commission.evidence import decisions, evidence_in
+from tomr_commission.explained import EXPLAINED, FOLDER, Split, explain_drives
+from tomr_commission.injected import try_injected
+from tomr_commission.observed import Observed, frames_of, observe, tells_currents
+from tomr_commission.parallel import on_all_cores
+from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse
+from tomr_commission.request import CommissionRequest
+from tomr_commission.simulated import try_simulated
+from tomr_commission.store import Store, digest, fingerprint, write_atomically
+from tomr_commission.suspects import check_values, check_wheels
+from tomr_commission.trials import Floor, Trial, floors_of
+from tomr_commission.verdict import Outcome, Reason, reasons
+from tomr_fault_diag.classifier.commissioned import stamp_of
+from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
+from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_power_model.drive.cut import names_of
+from tomr_power_model.drive.read import read_drive
+from tomr_power_model.drive.record import Drive
+from tomr_power_model.errors import InputError
+from tomr_power_model.robot import load_robot, read_description, read_node_sections
+
+Progress = Callable[[str, float], None]
+
+STEPS = "steps"
+_BLOCK_TICKS = 200
+_CURRENTS = "neither shoves nor faults were simulated: the robot tells currents, not powers"
+_HOPELESS = 1.5  # times the caution that may be needed: more shoves will not bring it down
+
+
+@frozen
+class Commissioned:
+    """All that a commissioning found."""
+
+    request: CommissionRequest
+    outcome: Outcome
+    reasons: tuple[Reason, ...]
+    regimes: tuple[RegimeLine, ...]
+    margin: float  # of the bands
+    shoved: Shoved
+    plan: Rehearsal
+    trials: tuple[Trial, ...]
+    floors: tuple[Floor, ...]
+    text: str  # of commissioned.yaml
+    date: str
+    notes: tuple[str, ...] = ()
+
+    @property
+    def is_go(self) -> bool:
+        """Whether nothing speaks against switching the diagnosis on."""
+        return not self.reasons
+
+    @property
+    def verdict(self) -> str:
+        """go or no-go."""
+        return "go" if self.is_go else "no-go"
+
+
+@frozen
+class Tuned:
+    """Bands, and the alarm level that they ask for."""
+
+    margin: float
+    bands: BandSettings
+    shoved: Shoved
+    level: AlarmLevel
+
+
+def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
+    """Run all steps that are not done yet. Raises InputError for what cannot be used."""
+    work = _Work.begin(request, progress)
+    explained = work.explained()
+    described = work.description(explained)
+    drives = work.observed(described)
+    fitted, held = work.divided(drives)
+    classifier, plan = work.classifier(described), Rehearsal()
+    tuned = work.tuned(described, fitted, classifier, plan)
+    bands, level = tuned.bands, tuned.level
+    chosen = evolve(classifier, caution=level.caution)
+    progress("validating", 0.85)
+    said = [decisions(frames_of(drive, bands), chosen) for drive in (*fitted, held)]
+    trials = try_injected(held, bands, chosen)
+    notes = [note for drive in work.drives for note in drive.notes]
+    if tells_currents(held):
+        notes.append(_CURRENTS)
+    else:
+        simulated, note = work.simulated(described, bands, chosen)
+        trials += simulated
+        notes += [note] if note else []
+    floors = floors_of(trials)
+    outcome = Outcome(
+        request, explained, tuple(fitted), held, bands, level, said[-1], tuple(said[:-1])
+    )
+    against = tuple(reasons(outcome))
+    date = datetime.datetime.now(datetime.UTC).date().isoformat()
+    text = _text(work, described, outcome, (against, floors, date))
+    progress("done", 1.0)
+    return Commissioned(
+        request=request,
+        outcome=outcome,
+        reasons=against,
+        regimes=tuple(regime_table(fitted, bands)),
+        margin=tuned.margin,
+        shoved=tuned.shoved,
+        notes=tuple(notes),
+        plan=plan,
+        trials=tuple(trials),
+        floors=tuple(floors),
+        text=text,
+        date=date,
+    )
+
+
+@frozen
+class _Work:
+    """One commissioning under way."""
+
+    request: CommissionRequest
+    progress: Progress
+    store: Store
+    key: str  # of the recordings and the description
+    split: Split
+    names: tuple[str, ...]  # of the recordings
+    drives: tuple[Drive, ...]  # as recorded
+
+    @classmethod
+    def begin(cls, request: CommissionRequest, progress: Progress) -> "_Work":
+        progress("checking", 0.0)
+        values = read_description(request.robot)
+        robot = load_robot(request.robot)
+        prints = [fingerprint(bag) for bag in request.bags]
+        skips = repr(sorted(request.skips.items()))
+        key = digest([suite_version(), repr(sorted(values.items())), skips, *prints])
+        drives = tuple(read_drive(bag, robot) for bag in request.bags)
+        for bag, drive in zip(request.bags, drives, strict=True):
+            if not len(drive.command_time):
+                raise InputError(f"{bag}: no cmd_vel: record it too, the simulation needs it")
+        check_wheels(drives, robot, str(request.robot))
+        check_values(drives[0], values, str(request.robot))
+        split = Split.of(request.bags, drives[0].duration)
+        names = tuple(names_of(request.bags))
+        store = Store(request.out / STEPS)
+        return cls(request, progress, store, key, split, names, drives)
+
+    def explained(self) -> Any:
+        """What the search found, its files in a folder of their own."""
+        request = self.request
+
+        def make() -> Any:
+            return explain_drives(
+                request,
+                self.split,
+                lambda stage, part: self.progress(f"explaining: {stage}", 0.02 + 0.4 * part),
+            )
+
+        key = digest([self.key, repr(request.tolerance)])
+        found = self.store.values("explained", key, make)
+        (request.out / FOLDER / EXPLAINED).unlink(missing_ok=True)  # of an earlier run
+        for name, text in found["files"].items():
+            write_atomically(request.out / FOLDER / name, text)
+        return found
+
+    def description(self, explained: Any) -> Path | None:
+        """The explained description; None: nothing was missing."""
+        if not explained["explained"]:
+            return None
+        return self.request.out / FOLDER / EXPLAINED
+
+    def source(self, described: Path | None) -> str | Path:
+        """What the rest is done with."""
+        return self.request.robot if described is None else described
+
+    def observed(self, described: Path | None) -> list[Observed]:
+        """All recordings as the residual stage sees them."""
+        self.progress("running the diagnosis", 0.45)
+        source = self.source(described)
+        key = digest([self.key, repr(sorted(read_description(source).items()))])
+        kept = [self.store.observed(f"drive_{name}", key) for name in self.names]
+        jobs = [
+            (bag, name, str(source))
+            for bag, name, one in zip(self.request.bags, self.names, kept, strict=True)
+            if one is None
+        ]
+        if jobs:
+            made = {drive.name: drive for drive in on_all_cores(_observe, jobs)}
+            for name, drive in made.items():
+                self.store.keep(f"drive_{name}", key, drive)
+            kept = [
+                made[name] if one is None else one
+                for name, one in zip(self.names, kept, strict=True)
+            ]
+        skips = self.request.skips
+        return [drive.without(skips.get(drive.name, ())) for drive in kept if drive is not None]
+
+    def divided(self, drives: Sequence[Observed]) -> tuple[list[Observed], Observed]:
+        """Fitted drives, and the one held out."""
+        if self.split.cut is None:
+            return list(drives[:-1]), drives[-1]
+        at = int(np.searchsorted(drives[0].seconds, self.split.cut))
+        name = drives[0].name
+        return [drives[0].part(slice(0, at), f"{name} (first two thirds)")], drives[0].part(
+            slice(at, None), f"{name} (last third)"
+        )
+
+    def classifier(self, described: Path | None) -> ClassifierSettings:
+        """Settings of the classifier as the description has them."""
+        given = read_node_sections(self.source(described), (CLASSIFIER,))
+        settings = DiagnosisSettings.of(given, self.request.robot).classifier
+        return evolve(settings, classifier="window", caution=ClassifierSettings().caution)
+
+    def tuned(
+        self,
+        described: Path | None,
+        fitted: Sequence[Observed],
+        settings: ClassifierSettings,
+        plan: Rehearsal,
+    ) -> Tuned:
+        """The narrowest bands with which false alarms can be as rare as wanted."""
+        choice, share = self.request.bands, 0.55
+        first = evolve(plan, shoves=plan.first)
+        while True:
+            self.progress("simulating healthy hours", share)
+            bands = bands_of(fitted, choice)
+            evidence = _real_peaks(fitted, bands, settings)
+            wider = choice.wider * choice.margin
+            # A few shoves tell where many are not worth while.
+            for asked, most in (
+                (first, _HOPELESS * choice.most_caution),
+                (plan, choice.most_caution),
+            ):
+                shoved = (
+                    Shoved((), (), 0.0)
+                    if tells_currents(fitted[0])
+                    else self.rehearsed(described, bands, settings, asked)
+                )
+                level = _level(self.request, evidence, shoved, plan)
+                if level.needed > most and wider <= choice.widest:
+                    break
+            else:
+                return Tuned(choice.margin, bands, shoved, level)
+            choice, share = evolve(choice, margin=wider), min(share + 0.07, 0.8)
+
+    def rehearsed(
+        self,
+        described: Path | None,
+        bands: BandSettings,
+        settings: ClassifierSettings,
+        plan: Rehearsal,
+    ) -> Shoved:
+        """Simulated shoves."""
+        source, usage = str(self.source(described)), self.usage()
+        parts = (*self._parts(source, settings), bands, usage, plan)
+        key = digest(map(repr, parts))
+        held = self.store.values(
+            f"rehearsed_{key}",
+            key,
+            lambda: asdict(rehearse(source, bands, settings, usage, plan)),
+        )
+        return Shoved(tuple(held["peaks"]), tuple(held["between"]), held["hours"])
+
+    def usage(self) -> Usage:
+        """How the robot is driven."""
+        return Usage.of(np.concatenate([drive.command for drive in self.drives]))
+
+    def simulated(
+        self, described: Path | None, bands: BandSettings, settings: ClassifierSettings
+    ) -> tuple[list[Trial], str]:
+        """Simulated faults, and a note where the simulator cannot do the robot."""
+        self.progress("simulating faults", 0.9)
+        source, usage = str(self.source(described)), self.usage()
+
+        def make() -> dict[str, Any]:
+            try:
+                trials = try_simulated(source, bands, settings, usage)
+            except InputError as error:
+                return {"trials": [], "note": f"no faults were simulated: {error}"}
+            return {"trials": [asdict(trial) for trial in trials], "note": ""}
+
+        key = digest(map(repr, (*self._parts(source, settings), bands, usage)))
+        found = self.store.values("simulated", key, make)
+        return [Trial(**values) for values in found["trials"]], found["note"]
+
+    def _parts(self, source: str, settings: ClassifierSettings) -> tuple[object, ...]:
+        """What everything simulated hangs on, weights of the classifier included."""
+        described = sorted(read_description(source).items())
+        return self.key, described, settings, stamp_of("", settings)
+
+
+def _observe(job: tuple[Path, str, str]) -> Observed:
+    bag, name, source = job
+    given = read_node_sections(source, (RESIDUALS, "power_model"))
+    return observe(bag, name, load_robot(source), DiagnosisSettings.of(given, source))
+
+
+@frozen
+class _Real:
+    """Peaks of evidence in real driving, block by block."""
+
+    peaks: tuple[float, ...]
+    hours: float
+
+
+def _real_peaks(
+    fitted: Sequence[Observed], bands: BandSettings, settings: ClassifierSettings
+) -> _Real:
+    peaks: list[float] = []
+    for drive in fitted:
+        peaks += block_peaks(evidence_in(frames_of(drive, bands), settings), _BLOCK_TICKS)
+    return _Real(tuple(peaks), sum(drive.hours for drive in fitted))
+
+
+def _level(request: CommissionRequest, real: _Real, shoved: Shoved, plan: Rehearsal) -> AlarmLevel:
+    """From real driving and from simulated shoves."""
+    tails = (
+        Tail.of("healthy driving", real.peaks, len(real.peaks) / real.hours, request.alarm),
+        Tail.of("simulated shoves", shoved.peaks, plan.shoves_per_hour, request.alarm),
+    )
+    shipped = ClassifierSettings().caution
+    return alarm_level(tails, request.false_alarms_per_hour, shipped, request.alarm)
+
+
+def _text(
+    work: _Work,
+    described: Path | None,
+    outcome: Outcome,
+    rest: tuple[Sequence[Reason], Sequence[Floor], str],
+) -> str:
+    against, floors, date = rest
+    request = work.request
+    record = Record(
+        date=date,
+        drives=tuple(drive.name for drive in outcome.fitted),
+        held_out=outcome.held.name,
+        method="exponential tails of the classifier's evidence, real driving and simulated shoves",
+        level=outcome.level,
+        floors={floor.kind: floor.words for floor in floors},
+        verdict="no-go" if against else "go",
+        stamp="" if against else stamp_of(date, work.classifier(described)),
+    )
+    sections = base_sections(request.robot, described)
+    return commissioned_text(sections, outcome.bands, record, Path(request.robot).name)
+
+
+def write_results(found: Commissioned, texts: dict[str, str]) -> list[Path]:
+    """Write commissioned.yaml and the reports; returns what was written."""
+    folder = found.request.out
+    written = []
+    for name, text in {FILE: found.text, **texts}.items():
+        write_atomically(folder / name, text)
+        written.append(folder / name)
+    return written

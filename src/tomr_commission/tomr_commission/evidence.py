@@ -1,0 +1,118 @@
+"""What the classifier itself holds against a healthy robot, tick by tick, in decades.
+
+The evidence is the log odds of the likeliest fault against normal without the prior: how many
+decades of `caution` a tick would have overcome. It is read off the classifier in use, run with the
+most caution there is, so that it follows whatever the classifier becomes. It counts only where a
+classifier with hardly any caution would name a fault: whatever else that asks for besides is then
+given, too.
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from tomr_fault_diag.classifier.judges import Judge, Opinion, make_judge
+from tomr_fault_diag.classifier.observability import Unseen
+from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
+from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
+from tomr_fault_diag.classifier.states import FAULTLESS, NORMAL
+from tomr_fault_diag.residuals.frame import ResidualFrame
+from tomr_power_model.model.ticks import NANOSECONDS
+
+Array = NDArray[np.float64]
+
+MOST_CAUTION = next(spec.maximum for spec in CLASSIFIER_PARAMETERS if spec.name == "caution")
+SURE = 2.0  # decades beyond the caution at which a fault is named: odds of a hundred to one
+_LEAST = 1e-300
+_HARDLY_ANY = 2.0  # decades of caution
+
+
+class _Witness:
+    """Two judges, of most and of hardly any caution, that see the same; remembers what they say."""
+
+    def __init__(self, settings: ClassifierSettings) -> None:
+        self.settings = settings
+        self._judges: tuple[Judge, ...] = tuple(
+            make_judge(evolve(settings, caution=caution)) for caution in (MOST_CAUTION, _HARDLY_ANY)
+        )
+        self.decades = 0.0
+
+    def clear(self) -> None:
+        for judge in self._judges:
+            judge.clear()
+        self.decades = 0.0
+
+    def interrupt(self) -> None:
+        for judge in self._judges:
+            judge.interrupt()
+
+    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+        careful, hasty = (judge.judge(frame, elapsed_ns, unseen) for judge in self._judges)
+        named = hasty.sure and int(np.argmax(hasty.probabilities)) != NORMAL
+        self.decades = _decades(careful.probabilities) if named else 0.0
+        return careful
+
+
+def evidence_in(frames: Iterable[ResidualFrame], settings: ClassifierSettings) -> Array:
+    """Decades of evidence for a fault at each tick, 0 where nothing could be decided, (n,)."""
+    witness = _Witness(settings)
+    classifier = FaultClassifier(witness)
+    found = []
+    for frame in frames:
+        classifier.classify(frame)
+        found.append(witness.decades)
+    return np.maximum(found, 0.0)
+
+
+def _decades(shares: Array) -> float:
+    faults = np.delete(shares, NORMAL)
+    odds = max(float(faults.max()), _LEAST) / max(float(shares[NORMAL]), _LEAST)
+    return float(np.log10(odds)) + MOST_CAUTION
+
+
+@frozen
+class Episode:
+    """A stretch of one state that is not faultless; times in s after the first frame."""
+
+    state: str
+    wheel: int | None  # 0..2
+    begin: float
+    end: float
+
+
+@frozen
+class Decided:
+    """What a diagnosis says of a drive."""
+
+    ticks: int
+    undecided: int  # ticks that are stale or not observable
+    alarms: tuple[Episode, ...]
+
+
+def decisions(frames: list[ResidualFrame], settings: ClassifierSettings) -> Decided:
+    """Diagnose frames with a classifier of given settings."""
+    classifier = FaultClassifier(make_judge(settings))
+    alarms: list[Episode] = []
+    current: Diagnosis | None = None
+    undecided = 0
+    start = frames[0].stamp_ns if frames else 0
+    for frame in frames:
+        said = classifier.classify(frame)
+        if said is not None and (
+            current is None or (said.state, said.wheel) != (current.state, current.wheel)
+        ):
+            current = said
+            if said.state.name not in FAULTLESS:
+                at = (frame.stamp_ns - start) / NANOSECONDS
+                alarms.append(Episode(said.state.name, said.wheel, at, at))
+        if current is None or current.state.name in _QUIET:
+            undecided += 1
+        elif current.state.name not in FAULTLESS:
+            last = alarms[-1]
+            alarms[-1] = evolve(last, end=(frame.stamp_ns - start) / NANOSECONDS)
+    return Decided(len(frames), undecided, tuple(alarms))
+
+
+_QUIET = FAULTLESS - {"normal"}

@@ -1,0 +1,101 @@
+"""Faults put into real recordings, where that is honest: what a power sensor or a motor would show.
+
+Powers are put off as the sensor would tell them, tick by tick; motion, commands and everything else
+stay as recorded. What a fault does to the motion is not in it: such faults are simulated.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from tomr_commission.evidence import decisions
+from tomr_commission.observed import Observed, frames_of
+from tomr_commission.trials import Trial, first_alarm, smallest_found
+from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, TOTAL
+from tomr_fault_diag.residuals.settings import BandSettings
+
+Array = NDArray[np.float64]
+
+_HEALTHY = 100  # ticks before the fault
+_SHOWN = 900  # ticks: what is not found in 40 s is not found
+
+
+@frozen
+class InjectedKind:
+    """One kind of fault: what becomes of the power of a motor, and whether the total shows it."""
+
+    name: str
+    sizes: tuple[float, ...]  # to try, the largest first; in the unit
+    unit: str
+    change: Callable[[Array, float], Array]  # measured power (n,), size -> what is told (n,)
+    in_total: bool = False
+
+
+def _scaled(power: Array, size: float) -> Array:
+    return power * (1.0 + size)
+
+
+def _held(power: Array, size: float) -> Array:
+    return np.full_like(power, power[0])
+
+
+KINDS: tuple[InjectedKind, ...] = (
+    InjectedKind("power sensor dead", (1.0,), "", lambda power, size: np.zeros_like(power)),
+    InjectedKind("power sensor frozen", (1.0,), "", _held),
+    InjectedKind("power sensor scaled", (1.0, 0.5, 0.3, 0.2, 0.1, 0.05), "of the power", _scaled),
+    InjectedKind(
+        "power sensor biased",
+        (20.0, 10.0, 5.0, 3.0, 2.0, 1.0, 0.5),
+        "W",
+        lambda power, size: power + size,
+    ),
+    InjectedKind(
+        "motor draws more", (1.0, 0.5, 0.3, 0.2, 0.1, 0.05), "of its power", _scaled, in_total=True
+    ),
+)
+
+
+def injected(drive: Observed, kind: InjectedKind, size: float, wheel: int) -> Observed:
+    """A drive in which a fault begins after some healthy seconds."""
+    residual = drive.residual.copy()
+    channel = MOTORS[wheel]
+    rows = slice(_HEALTHY, None)
+    measured = (drive.residual + drive.modelled)[rows, channel]
+    known = np.isfinite(measured)
+    told = measured.copy()
+    told[known] = kind.change(measured[known], size) if known.any() else measured[known]
+    added = np.where(known, told - measured, 0.0)
+    residual[rows, channel] += added
+    residual[rows, ENCODERS[wheel]] += added
+    if kind.in_total:
+        residual[rows, TOTAL] += added
+    return evolve(drive, residual=residual)
+
+
+def try_injected(
+    drive: Observed,
+    bands: BandSettings,
+    settings: ClassifierSettings,
+    kinds: Sequence[InjectedKind] = KINDS,
+) -> list[Trial]:
+    """Each kind at each wheel, down to the smallest size that is found."""
+    shown = drive.part(slice(0, _SHOWN), drive.name)
+
+    def attempt(kind: InjectedKind, wheel: int, size: float) -> Trial:
+        frames = frames_of(injected(shown, kind, size, wheel), bands)
+        begin = float(shown.seconds[min(_HEALTHY, len(frames) - 1)])
+        found = first_alarm(decisions(frames, settings).alarms, begin)
+        delay = None if found is None else found.begin - begin
+        name = "" if found is None else found.state
+        return Trial(kind.name, size, kind.unit, wheel, delay, name)
+
+    return [
+        trial
+        for kind in kinds
+        for wheel in range(len(MOTORS))
+        for trial in smallest_found(kind.sizes, partial(attempt, kind, wheel))
+    ]

@@ -1,0 +1,167 @@
+"""A drive as the residual stage of the diagnosis sees it: tick by tick, in arrays.
+
+Bands are no part of it: the model and the measurements are run through once, and frames with any
+bands are made of them afterwards.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_fault_diag.diagnosis.offline import diagnose
+from tomr_fault_diag.diagnosis.pipeline import Pipeline
+from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
+from tomr_fault_diag.residuals.frame import (
+    ENCODERS,
+    MOTORS,
+    RESIDUALS,
+    SPEEDS,
+    TOTAL,
+    UNITS,
+    Residual,
+    ResidualFrame,
+    rounded,
+)
+from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_power_model.model.ticks import NANOSECONDS
+from tomr_power_model.recordings import open_recording
+from tomr_power_model.robot import Robot
+
+Array = NDArray[np.float64]
+
+_TRANSIENT_TICKS = 3  # over which a band grows with the model's change: as in the residual stage
+POWERS = [*MOTORS, *ENCODERS]
+
+
+@frozen
+class Observed:
+    """One drive of n ticks."""
+
+    name: str
+    stamp_ns: NDArray[np.int64]  # (n,)
+    residual: Array  # measured - modelled; speeds along the expected direction; (n, 10)
+    modelled: Array  # (n, 10)
+    missing: NDArray[np.str_]  # why a residual is unknown, empty where it is known, (n, 10)
+    units: NDArray[np.str_]  # of the residuals, (10,)
+
+    @classmethod
+    def of(cls, name: str, frames: list[ResidualFrame]) -> Self:
+        """From what the residual stage said."""
+        rows = [frame.residuals for frame in frames]
+        units = [
+            next(
+                (row[channel].unit for row in rows if not row[channel].stale), rows[0][channel].unit
+            )
+            for channel in range(RESIDUALS)
+        ]
+        return cls(
+            name,
+            np.array([frame.stamp_ns for frame in frames], dtype=np.int64),
+            np.array([[item.residual for item in row] for row in rows]),
+            np.array([[item.modelled for item in row] for row in rows]),
+            np.array([[item.missing for item in row] for row in rows], dtype=np.str_),
+            np.array(units),
+        )
+
+    @property
+    def change(self) -> Array:
+        """How far each modelled value moved over three ticks, (n, 10); 0 where it is not known."""
+        low, high = self.modelled.copy(), self.modelled.copy()
+        for back in range(1, _TRANSIENT_TICKS):
+            low[back:] = np.fmin(low[back:], self.modelled[:-back])
+            high[back:] = np.fmax(high[back:], self.modelled[:-back])
+        return np.nan_to_num(high - low)
+
+    @property
+    def hours(self) -> float:
+        """That its ticks cover."""
+        steps = np.diff(self.stamp_ns)
+        return float(np.minimum(steps, NANOSECONDS).sum()) / NANOSECONDS / 3600.0
+
+    @property
+    def seconds(self) -> Array:
+        """Of each tick since the first, (n,)."""
+        return np.asarray((self.stamp_ns - self.stamp_ns[0]) / NANOSECONDS)
+
+    def without(self, spans: Sequence[tuple[float, float]]) -> "Observed":
+        """The drive without some intervals [s]."""
+        keep = np.ones(len(self.stamp_ns), dtype=bool)
+        for start, end in spans:
+            keep &= (self.seconds < start) | (self.seconds > end)
+        return self._of(keep, self.name)
+
+    def part(self, rows: slice, name: str) -> "Observed":
+        """Some of its ticks under another name."""
+        return self._of(rows, name)
+
+    def _of(self, rows: slice | NDArray[np.bool_], name: str) -> "Observed":
+        return Observed(
+            name,
+            self.stamp_ns[rows],
+            self.residual[rows],
+            self.modelled[rows],
+            self.missing[rows],
+            self.units,
+        )
+
+
+def observe(bag: Path, name: str, robot: Robot, settings: DiagnosisSettings) -> Observed:
+    """Run a recording through the pipeline of the diagnosis.
+
+    Raises InputError for a recording that nothing can be compared in.
+    """
+    pipeline = Pipeline(robot, settings)
+    with open_recording(bag) as recording:
+        frames = [frame for _, step in diagnose(recording, pipeline) for frame in step.frames]
+    return Observed.of(name, frames)
+
+
+def tells_currents(drive: Observed) -> bool:
+    """Whether motors are compared by their currents."""
+    return str(drive.units[MOTORS.start]) == "A"
+
+
+def band_of(observed: Observed, bands: BandSettings) -> Array:
+    """Half widths of the bands, (n, 10): those of the residual stage."""
+    least, relative, transient = (np.empty(RESIDUALS) for _ in range(3))
+    for channel in range(RESIDUALS):
+        floor = bands.power if observed.units[channel] == "W" else bands.current
+        if channel in SPEEDS:
+            row = bands.speed, bands.speed_relative, bands.speed_transient
+        elif channel == TOTAL:
+            row = floor * bands.total_factor, bands.total_relative, bands.transient
+        else:
+            row = floor, bands.relative, bands.transient
+        least[channel], relative[channel], transient[channel] = row
+    width = np.maximum(least, relative * np.abs(np.nan_to_num(observed.modelled)))
+    return np.asarray(width + transient * observed.change)
+
+
+def frames_of(observed: Observed, bands: BandSettings) -> list[ResidualFrame]:
+    """The frames that the residual stage publishes with some bands."""
+    width = band_of(observed, bands)
+    units = [UNITS[str(unit)] for unit in observed.units]
+    rows = zip(
+        observed.stamp_ns.tolist(),
+        observed.residual.tolist(),
+        width.tolist(),
+        observed.modelled.tolist(),
+        observed.missing.tolist(),
+        strict=True,
+    )
+    return [
+        ResidualFrame(
+            stamp,
+            tuple(
+                Residual(residual, rounded(band), modelled, unit, missing)
+                for residual, band, modelled, unit, missing in zip(
+                    residuals, widths, models, units, absent, strict=True
+                )
+            ),
+        )
+        for stamp, residuals, widths, models, absent in rows
+    ]

@@ -1,0 +1,189 @@
+"""Go or no-go, and why."""
+
+from typing import Any
+
+import numpy as np
+from attrs import frozen
+
+from tomr_commission.alarm import AlarmLevel
+from tomr_commission.bands import needed, outside, steady_drag
+from tomr_commission.evidence import MOST_CAUTION, Decided
+from tomr_commission.observed import Observed
+from tomr_commission.request import CommissionRequest, Limits
+from tomr_fault_diag.residuals.settings import BandSettings
+
+DRAWN = ("W", "A")
+_WITHIN = 0.999
+
+
+@frozen
+class Reason:
+    """One thing that speaks against switching the diagnosis on, and what to do."""
+
+    what: str
+    remedy: str
+
+
+@frozen
+class Outcome:
+    """All that the verdict rests on."""
+
+    request: CommissionRequest
+    explained: Any  # of `explain_drives`
+    fitted: tuple[Observed, ...]
+    held: Observed
+    bands: BandSettings
+    level: AlarmLevel
+    held_said: Decided
+    fitted_said: tuple[Decided, ...]
+
+
+def reasons(outcome: Outcome) -> list[Reason]:
+    """Everything that makes a no-go; empty: go."""
+    limits = outcome.request.limits
+    return [
+        *_too_short(outcome, limits),
+        *_left_over(outcome, limits),
+        *_apart(outcome, limits),
+        *_floors(outcome, limits),
+        *_held_out(outcome, limits),
+        *_alarm_rate(outcome),
+    ]
+
+
+def _too_short(outcome: Outcome, limits: Limits) -> list[Reason]:
+    minutes = 60.0 * sum(drive.hours for drive in outcome.fitted)
+    held = 60.0 * outcome.held.hours
+    if minutes >= limits.minutes and held >= limits.held_minutes:
+        return []
+    return [
+        Reason(
+            f"{minutes:.1f} minutes to fit to and {held:.1f} held out are too few: "
+            f"{limits.minutes:g} and {limits.held_minutes:g} are needed",
+            "record the drive of tomr_commission plan, and give it as well",
+        )
+    ]
+
+
+def _left_over(outcome: Outcome, limits: Limits) -> list[Reason]:
+    found = []
+    report = outcome.explained["report"]
+    levels = [line for line in outcome.explained["levels"] if line["unit"] in DRAWN]
+    shown = [line for line in levels if line["held_out"]] or levels
+    worst = max(shown, key=lambda line: line["level"] or 0.0) if shown else {"level": 0.0}
+    score = report["holdout"]
+    nrmse = None if score is None else score["nrmse_after"]
+    is_far = (worst["level"] or 0.0) > limits.level
+    if is_far and (nrmse is None or nrmse > limits.nrmse):
+        found.append(
+            Reason(
+                f"what the explained robot leaves of {worst['channel']} is {worst['level']:.1f} "
+                f"times the sensors' noise ({worst['rms']:.3g} {worst['unit']} RMS)",
+                "read gap/report.html: it says what was not explained; mend the description or "
+                "run tomr_gap explain with a larger --tolerance and all drives",
+            )
+        )
+    if report["unexplained_share"] > limits.unexplained:
+        found.append(
+            Reason(
+                f"{100 * report['unexplained_share']:.0f} % of the mismatch of robot.yaml is not "
+                "explained",
+                "read gap/report.html, record the drive that it suggests, and commission again",
+            )
+        )
+    return found
+
+
+def _apart(outcome: Outcome, limits: Limits) -> list[Reason]:
+    """A drive among the fitted ones that scatters otherwise than the rest."""
+    drives = outcome.fitted
+    if len(drives) < 2:
+        return []
+    wide = [max(needed(drive, outcome.bands, _WITHIN).values()) for drive in drives]
+    found = []
+    for index, drive in enumerate(drives):
+        others = float(np.median([value for k, value in enumerate(wide) if k != index]))
+        if wide[index] > limits.drives_apart * others and wide[index] > 1.0:
+            found.append(
+                Reason(
+                    f"{drive.name} needs bands {wide[index] / others:.1f} times as wide as the "
+                    "other drives: a fault, another floor or another load in it",
+                    "look at it with tomr_diagnose and leave it out, or record it again",
+                )
+            )
+    return found
+
+
+def _floors(outcome: Outcome, limits: Limits) -> list[Reason]:
+    """A drive in which the wheels need another torque than in the rest."""
+    drives = (*outcome.fitted, outcome.held)
+    if len(drives) < 2:
+        return []
+    drags = [steady_drag(drive) for drive in drives]
+    found = []
+    for index, drive in enumerate(drives):
+        rest = np.median([drag.added for k, drag in enumerate(drags) if k != index], axis=0)
+        share = (drags[index].added - rest) / drags[index].usual
+        if np.abs(share).max() > limits.drag_apart:
+            alike = np.ptp(share) < 0.5 * np.abs(share).max()
+            wheel = int(np.argmax(np.abs(share)))
+            what = "every wheel needs" if alike else f"wheel {wheel + 1} needs"
+            size = float(np.mean(share)) if alike else float(share[wheel])
+            found.append(
+                Reason(
+                    f"{drive.name}: {what} {100 * size:+.0f} % of the usual torque beside the "
+                    f"other drives: {'another floor or load' if alike else 'a wheel that drags'}",
+                    "commission each floor by itself, or give drives of both to fit"
+                    if alike
+                    else "look after that wheel, and leave the drive out",
+                )
+            )
+    return found
+
+
+def _held_out(outcome: Outcome, limits: Limits) -> list[Reason]:
+    found = []
+    for said, drive in [
+        (outcome.held_said, outcome.held),
+        *zip(outcome.fitted_said, outcome.fitted, strict=True),
+    ]:
+        if said.alarms:
+            alarm = said.alarms[0]
+            found.append(
+                Reason(
+                    f"{drive.name}: {alarm.state} is named from {alarm.begin:.1f} s to "
+                    f"{alarm.end:.1f} s ({len(said.alarms)} in all) in a drive taken for healthy",
+                    "if something was wrong there, leave it out with --skip or record it again; "
+                    "else the bands do not fit: give more drives",
+                )
+            )
+    shares = outside(outcome.held, outcome.bands)
+    kind = max(shares, key=shares.__getitem__, default="")
+    if kind and shares[kind] > limits.outside:
+        found.append(
+            Reason(
+                f"{100 * shares[kind]:.1f} % of the held-out residuals of {kind} lie outside of "
+                f"their bands, {100 * limits.outside:g} % may",
+                "the held-out drive is of another kind (floor, load, heat): give all kinds",
+            )
+        )
+    return found
+
+
+def _alarm_rate(outcome: Outcome) -> list[Reason]:
+    level = outcome.level
+    if level.is_enough:
+        return []
+    return [
+        Reason(
+            f"even with the most caution there is ({MOST_CAUTION:g} decades) "
+            f"{level.expected:.2g} false alarms per hour are expected "
+            f"(95 %: {level.low:.2g} to {level.high:.2g}), {level.wanted:g} were asked for",
+            f"ask for --false-alarms-per-hour {_rounded_up(level.high)}, or see commission.html "
+            "for where they come from",
+        )
+    ]
+
+
+def _rounded_up(value: float) -> str:
+    return f"{float(f'{1.05 * value:.1g}'):g}"

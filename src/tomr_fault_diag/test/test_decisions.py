@@ -1,0 +1,277 @@
+"""When a fault is named and let go of, and what a motor's own data have to do with it."""
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from tomr_fault_diag.classifier import states
+from tomr_fault_diag.classifier.advice import check_first
+from tomr_fault_diag.classifier.belief import CONTROLS, HYPOTHESES
+from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
+from tomr_fault_diag.classifier.messages import diagnosis_message, six_state
+from tomr_fault_diag.classifier.observability import Unseen
+from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
+from tomr_fault_diag.classifier.states import (
+    CONTROL,
+    MOTOR,
+    NORMAL,
+    POWER_SENSOR,
+    SLIP,
+    STATES,
+    State,
+)
+from tomr_fault_diag.classifier.window_network import WindowNetwork
+from tomr_fault_diag.residuals.frame import (
+    ENCODERS,
+    GAP,
+    MOTORS,
+    NO_COMMAND,
+    SCATTER,
+    SPEEDS,
+    TOTAL,
+    Residual,
+    ResidualFrame,
+)
+from tomr_power_model.messages.plain import Level
+from tomr_power_model.model.ticks import to_ns
+from tomr_power_model.robot import shipped_robot
+
+MS = 1_000_000
+BASE = 1_700_000_000_000 * MS
+NAN = float("nan")
+TURNING = (3.0, -8.0, 5.0)
+# Encoder of wheel 2 lost: it reads standstill while its motor draws more and more.
+LOST = {
+    TOTAL: 38.0, MOTORS[1]: 30.0, ENCODERS[1]: 32.0, SPEEDS[1]: -8.0, MOTORS[0]: 4.0,
+    MOTORS[2]: 4.0, ENCODERS[0]: 4.0, ENCODERS[2]: 4.0, SPEEDS[0]: 0.1, SPEEDS[2]: 0.1,
+}  # fmt: skip
+
+
+def frame(at_ms: int, off: dict[int, float] | None = None) -> ResidualFrame:
+    """All as modelled but for some residuals [W or rad/s]."""
+    found = []
+    for index in range(10):
+        value = (off or {}).get(index, 0.0)
+        if index in SPEEDS:
+            found.append(Residual(value, 0.2, TURNING[index - SPEEDS[0]], "rad/s"))
+        else:
+            found.append(Residual(value, 2.0, 2.0))
+    return ResidualFrame(BASE + at_ms * MS, tuple(found))
+
+
+def without(given: ResidualFrame, places: Sequence[int], why: str) -> ResidualFrame:
+    """The same without some residuals."""
+    return evolve(
+        given,
+        residuals=tuple(
+            evolve(item, residual=NAN, missing=why) if index in places else item
+            for index, item in enumerate(given.residuals)
+        ),
+    )
+
+
+def ticks(start: int, end: int, off: dict[int, float] | None = None) -> list[ResidualFrame]:
+    return [frame(t, off) for t in range(start, end, 50)]
+
+
+def classified(frames: Sequence[ResidualFrame], **settings: Any) -> list[Diagnosis]:
+    classifier = FaultClassifier(make_judge(ClassifierSettings(**settings)))
+    found = [classifier.classify(item) for item in frames]
+    return [diagnosis for diagnosis in found if diagnosis is not None]
+
+
+def changes(found: Sequence[Diagnosis]) -> list[tuple[int, str]]:
+    """When the state changed, and to what in the paper's terms: a push is normal."""
+    told: list[tuple[int, str]] = []
+    for diagnosis in found:
+        state = diagnosis.state
+        name = state.name if state.paper is None else STATES[state.paper].name
+        if diagnosis.changed and name != (told[-1][1] if told else ""):
+            told.append(((diagnosis.stamp_ns - BASE) // MS, name))
+    return told
+
+
+FAULT = "motor system fault 2"
+FAULTY = [*ticks(50, 2000), *ticks(2000, 4000, LOST)]
+
+
+def test_a_fault_is_named_at_once_or_after_its_hold_time() -> None:
+    (_, (at, name)) = changes(classified(FAULTY))
+    assert name == FAULT
+    assert at < 2400
+    (_, (later, name)) = changes(classified(FAULTY, raise_time=to_ns(0.5)))
+    # Which fault of the motor it is may be settled a tick later.
+    assert name == FAULT
+    assert 500 <= later - at <= 550
+    assert len(changes(classified(FAULTY, raise_time=to_ns(3.0)))) == 1
+
+
+def test_a_latched_fault_stays_until_it_is_released() -> None:
+    classifier = FaultClassifier(make_judge(ClassifierSettings(latch=True)))
+    found = [classifier.classify(item) for item in [*FAULTY, *ticks(4000, 8000)]]
+    assert changes([d for d in found if d is not None])[-1][1] == FAULT
+    assert classifier.release() == FAULT
+    after = [classifier.classify(item) for item in ticks(8000, 9000)]
+    assert changes([d for d in after if d is not None]) == [(8000, "normal")]
+    assert classifier.release() == ""
+
+
+def test_a_released_fault_that_is_still_there_is_named_anew() -> None:
+    classifier = FaultClassifier(make_judge(ClassifierSettings(latch=True)))
+    for item in FAULTY:
+        classifier.classify(item)
+    classifier.release()
+    diagnosis = classifier.classify(frame(4000, LOST))
+    assert diagnosis is not None
+    assert diagnosis.state.name == FAULT
+
+
+def test_no_motor_is_accused_without_data_of_its_own() -> None:
+    drive = [*FAULTY, *ticks(4000, 5000, LOST)]
+    blind = [without(f, [MOTORS[1], ENCODERS[1]], "no fresh wheel_2/power") for f in drive]
+    found = classified(blind)
+    assert FAULT not in {d.state.name for d in found}
+    (last,) = [d for d in found if d.state is POWER_SENSOR[1]][-1:]
+    status = diagnosis_message(shipped_robot("reference"), last, "").statuses[0]
+    assert "not observable: motor 2 (power sensor dead)" in status.message
+    assert "motor 2 (power sensor dead)" in dict(status.values)["not_observable"]
+
+
+def test_a_dropout_of_a_second_is_no_fault_of_a_sensor() -> None:
+    dead = [*MOTORS, *ENCODERS]
+    silent = [without(item, dead, "no fresh power") for item in ticks(2000, 3000)]
+    frames = [*ticks(50, 2000), *silent, *ticks(3000, 5000)]
+    assert [name for _, name in changes(classified(frames))] == ["normal"]
+
+
+def test_a_fault_named_before_stays_while_its_sensor_is_dead() -> None:
+    blind = [
+        without(f, [MOTORS[1], ENCODERS[1]], "no fresh wheel_2/power") for f in ticks(4000, 9000)
+    ]
+    assert changes(classified([*FAULTY, *blind]))[-1][1] == FAULT
+
+
+def test_a_gap_changes_nothing_and_the_fault_is_found_after_it() -> None:
+    def gap(frames: list[ResidualFrame]) -> list[ResidualFrame]:
+        return [without(f, [*SPEEDS, *ENCODERS], f"{GAP}joint_states") for f in frames]
+
+    healthy = [*ticks(50, 2000), *gap(ticks(2000, 2300, LOST)), *ticks(2300, 4000)]
+    assert [name for _, name in changes(classified(healthy))] == ["normal"]
+    # It came in the gap: named as soon as the window is full again, and not before.
+    came = [*ticks(50, 2000), *gap(ticks(2000, 2300, LOST)), *ticks(2300, 4000, LOST)]
+    (_, (at, name)) = changes(classified(came))
+    assert name == FAULT
+    assert 2300 + 350 <= at <= 2300 + 800
+    # A fault that was named is not cleared by a gap, however long.
+    named = [*FAULTY, *gap(ticks(4000, 9000)), *ticks(9000, 9900)]
+    assert [name for _, name in changes(classified(named))] == ["normal", FAULT]
+
+
+def test_too_many_gaps_are_not_enough_data() -> None:
+    frames = []
+    for t in range(50, 6000, 50):
+        broken = t > 2000 and t % 400 < 300
+        frames.append(without(frame(t), SPEEDS, f"{GAP}joint_states") if broken else frame(t))
+    found = classified(frames)
+    assert [name for _, name in changes(found)] == ["normal", "not enough data"]
+    assert not any(d.probabilities for d in found if not d.usable)
+
+
+def test_speeds_that_cannot_be_told_leave_the_powers() -> None:
+    frames = [without(item, SPEEDS, SCATTER) for item in FAULTY]
+    assert [name for _, name in changes(classified(frames))][1:] in ([FAULT], ["unknown"])
+
+
+def test_commands_that_pause_are_waited_for_after_a_while() -> None:
+    quiet = [
+        evolve(item, residuals=(Residual(NAN, NAN, NAN, missing=NO_COMMAND),) * 10)
+        for item in ticks(2000, 5000)
+    ]
+    found = changes(classified([*ticks(50, 2000), *quiet]))
+    assert [name for _, name in found] == ["normal", "waiting"]
+    assert 2400 <= found[1][0] <= 2600
+
+
+@pytest.mark.parametrize("hz", [5, 10, 20, 40, 100])
+@pytest.mark.parametrize("phase", [0, 7, 21, 43])
+def test_states_do_not_hang_on_rate_or_phase(hz: int, phase: int) -> None:
+    """In the frames of a fault that comes and goes; phases in milliseconds."""
+    period = 1000 // hz
+
+    def at(t: int) -> ResidualFrame:
+        return frame(t, LOST if 3000 < t <= 6000 else None)
+
+    found = changes(classified([at(t) for t in range(period + phase, 9000, period)]))
+    assert [name for _, name in found] == ["normal", FAULT, "normal"]
+    assert found[1][0] - 3000 <= 250 + 2 * period
+    assert found[2][0] - 6000 <= 1600 + 2 * period
+
+
+def test_a_gap_is_no_time_in_which_a_fault_recovers() -> None:
+    healthy = [*ticks(4000, 4900), *ticks(8000, 10_000)]
+    found = changes(classified([*FAULTY, *healthy]))
+    assert [name for _, name in found] == ["normal", FAULT, "normal"]
+    assert found[-1][0] >= 8000 + 1000
+
+
+def test_every_state_that_is_wrong_says_what_to_check_and_which_of_the_six_it_is() -> None:
+    named = [value for value in vars(states).values() if isinstance(value, State)]
+    for state in (*STATES, *POWER_SENSOR, *named):
+        assert bool(check_first(state)) == (state.level is not Level.OK), state
+        paper = "unknown" if state.paper is None else STATES[state.paper].name
+        assert six_state(state) == paper
+    found = next(d for d in classified(FAULTY) if d.changed and d.state is STATES[MOTOR + 1])
+    values = dict(diagnosis_message(shipped_robot("reference"), found, "").statuses[0].values)
+    assert values["six_state"] == FAULT
+    assert values["check_first"].startswith("the encoder's plug")
+
+
+class Fixed:
+    """A judge that is sure of one wheel, whatever it sees."""
+
+    settings = ClassifierSettings()
+    wheel = 0
+
+    def clear(self) -> None: ...
+
+    def interrupt(self) -> None: ...
+
+    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+        return Opinion(np.eye(6)[MOTOR + self.wheel], sure=True, wheel=self.wheel)
+
+
+@pytest.mark.parametrize("before", [None, 0])
+def test_whatever_a_judge_says_a_blind_motor_is_not_named(before: int | None) -> None:
+    judge = Fixed()
+    classifier = FaultClassifier(judge)
+    if before is not None:
+        classifier.classify(frame(50))
+    judge.wheel = 1
+    for item in ticks(100, 1500):
+        blind = without(item, [MOTORS[1], ENCODERS[1]], f"{GAP}wheel_2/power")
+        diagnosis = classifier.classify(blind)
+        expected = STATES[NORMAL] if before is None else STATES[MOTOR]
+        assert diagnosis is None or diagnosis.state is expected
+
+
+class Likely:
+    """A network to which wheel 2's signal is lost, and if not that, the floor is slippery."""
+
+    def log_likelihoods(self, window: np.ndarray) -> np.ndarray:
+        found = np.full(HYPOTHESES, -20.0)
+        found[[CONTROLS.start + 1, SLIP]] = 20.0, 0.0
+        return found
+
+
+def test_what_looks_like_a_blind_motors_fault_is_no_evidence_of_another() -> None:
+    judge = WindowJudge(cast(WindowNetwork, Likely()), ClassifierSettings())
+    for t in range(50, 5000, 50):
+        opinion = judge.judge(frame(t), to_ns(0.05), Unseen(blind=((1, "power sensor dead"),)))
+    assert int(opinion.probabilities.argmax()) == NORMAL
+    for t in range(5000, 9000, 50):
+        opinion = judge.judge(frame(t), to_ns(0.05), Unseen())
+    assert (int(opinion.probabilities.argmax()), opinion.wheel) == (CONTROL, 1)

@@ -1,0 +1,54 @@
+"""Configurations for other tools name topics and statuses that there are."""
+
+import json
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import yaml
+
+from tomr_fault_diag.classifier.messages import NAME
+from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
+from tomr_power_model.robot import shipped_robot
+from tomr_power_model.topics.predictions import prediction_topics
+
+CONFIG = Path(__file__).parents[1] / "config"
+ROBOT = shipped_robot("reference")
+TOPICS = {
+    "/joint_states",
+    "/diagnostics",
+    f"/{RESIDUALS}",
+    *(f"/{wheel}/power" for wheel in ROBOT.wheel_topics),
+    *(f"/{topic}" for topic in prediction_topics(ROBOT)),
+}
+
+
+def test_foxglove_layout_shows_what_there_is() -> None:
+    layout = json.loads((CONFIG / "foxglove.json").read_text())
+    panels = layout["configById"]
+    text = json.dumps(panels)
+    used = set(re.findall(r'"(/[\w/]+?)(?:[.\[][^"]*)?"', text))
+    assert used <= TOPICS
+    assert len(used) > 8
+    shown = re.findall(r'"(\w+![\w]+)"', json.dumps(layout["layout"]))
+    assert sorted(shown) == sorted(panels)
+    assert panels["DiagnosticStatusPanel!drive"]["selectedName"] == NAME
+
+
+def test_plotjuggler_layout_shows_what_there_is() -> None:
+    root = ElementTree.parse(CONFIG / "plotjuggler.xml").getroot()
+    curves = [str(curve.get("name")) for curve in root.iter("curve")]
+    assert len(curves) == 15
+    for curve in curves:
+        joint = re.fullmatch(r"(.*)/(wheel_\d_joint)/velocity", curve)
+        topic = joint[1] if joint else curve.removesuffix("/current")
+        assert topic in TOPICS
+        assert joint is None or joint[2] in ROBOT.wheel_names
+
+
+def test_aggregator_takes_the_statuses_of_every_robot() -> None:
+    document = yaml.safe_load((CONFIG / "aggregator.yaml").read_text())
+    analyzers = document["/**"]["ros__parameters"]["analyzers"].values()
+    for name in (NAME, f"/robot_2/{NAME}", "inputs: joint_states", "/robot_2/inputs: cmd_vel"):
+        taking = [a for a in analyzers if any(part in name for part in a["contains"])]
+        assert len(taking) == 1, name

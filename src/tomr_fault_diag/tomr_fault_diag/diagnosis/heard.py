@@ -1,0 +1,102 @@
+"""What came on each input of a recording, and why nothing could be decided where that is so."""
+
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+from attrs import define, field
+
+from tomr_fault_diag.diagnosis.summary import Summary
+from tomr_power_model.messages.intake import header_stamp_ns
+from tomr_power_model.messages.plain import NANOSECONDS
+
+_APART = NANOSECONDS  # stamps of two inputs that have no time in common
+
+
+@define
+class Stream:
+    """The messages of one topic."""
+
+    first: Any = None
+    last: Any = None
+    count: int = 0
+    last_ns: int = 0  # receive stamp
+    silence_ns: int = 0  # longest time without a message
+
+    @property
+    def stamps_ns(self) -> tuple[int, int] | None:
+        """Header stamps of the first message and the last, None where there is none."""
+        first, last = header_stamp_ns(self.first), header_stamp_ns(self.last)
+        return (first, last) if first and last else None
+
+
+@define
+class Heard:
+    """All inputs of a recording."""
+
+    streams: dict[str, Stream] = field(factory=dict)
+
+    def note(self, topic: str, message: Any, receive_ns: int) -> None:
+        """Count a message."""
+        stream = self.streams.get(topic)
+        if stream is None:
+            stream = self.streams[topic] = Stream(message, last_ns=receive_ns)
+        stream.count += 1
+        silence = receive_ns - stream.last_ns
+        if silence > stream.silence_ns:
+            stream.silence_ns = silence
+        stream.last_ns = receive_ns
+        stream.last = message
+
+
+def why_undecided(
+    heard: Heard, wanted: Iterable[str], complaints: Mapping[tuple[str, str], int], summary: Summary
+) -> str:
+    """One line on why nothing could be decided: which input was missing or unusable.
+
+    Args:
+        heard: what came.
+        wanted: topics that the stages read.
+        complaints: how often a message of a topic could not be used, and why.
+        summary: of the ticks.
+    """
+    silent = [topic for topic in wanted if topic not in heard.streams and topic != "imu/data"]
+    if silent:
+        return f"no {', '.join(dict.fromkeys(silent))} in the recording"
+    clocks = _backwards(heard) or _apart(heard)
+    if clocks:
+        return clocks
+    for (topic, problem), count in sorted(complaints.items(), key=lambda item: -item[1]):
+        total = heard.streams[topic].count
+        if count > total // 2:
+            return f"{topic}: {problem} ({count} of {total} messages)"
+    if not summary.ticks:
+        return "the recording ends before the first decision"
+    return summary.missing or "the robot stands still throughout, so no fault could show"
+
+
+def _backwards(heard: Heard) -> str:
+    """Inputs whose stamps fall."""
+    spans = [(name, stream.stamps_ns) for name, stream in heard.streams.items()]
+    names = [name for name, span in spans if span is not None and span[1] < span[0]]
+    return f"the stamps of {', '.join(sorted(names))} run backwards" if names else ""
+
+
+def _apart(heard: Heard) -> str:
+    """Two inputs whose stamps have no time in common."""
+    spans = [(name, stream.stamps_ns) for name, stream in heard.streams.items()]
+    known = [(min(span), max(span), name) for name, span in spans if span is not None]
+    if len(known) < 2:
+        return ""
+    ends, begins = min(known, key=lambda item: item[1]), max(known)
+    if begins[0] - ends[1] < _APART:
+        return ""
+    return (
+        f"the stamps of {ends[2]} end at {_date(ends[1])}, those of {begins[2]} begin at "
+        f"{_date(begins[0])}: they were stamped by different clocks"
+    )
+
+
+def _date(stamp_ns: int) -> str:
+    moment = datetime.fromtimestamp(stamp_ns / NANOSECONDS, tz=UTC)
+    return moment.strftime("%Y-%m-%d %H:%M:%S")

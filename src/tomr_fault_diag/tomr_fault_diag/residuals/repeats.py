@@ -1,0 +1,91 @@
+"""Power sensors that repeat one reading bit for bit while their motor works.
+
+How many repeats in a row are too many depends on the sensor: a noisy one hardly ever repeats
+itself, a coarse one does all the time at a steady speed. So the share of repeats is learned while
+the wheel turns, and a run counts that has become less likely than one in a billion. Of a coarse
+sensor the model must ask for another reading besides, and the wheel turn as it should: a driver
+without its signal draws the same standby power all the time.
+"""
+
+import math
+from collections import deque
+
+from attrs import frozen
+
+from tomr_power_model.model.ticks import to_ns
+
+Reading = tuple[float, ...]
+
+_IMPROBABLE = math.log(1e9)
+_NOISY = 0.2  # share of repeats of sensors that are not coarse
+_LASTS = to_ns(0.4)  # of a coarse sensor's run
+_PRIOR = 18.0, 20.0  # repeats of so many samples before any was seen
+_MEMORY = 800.0  # samples, before older ones count half
+
+
+@frozen
+class Work:
+    """What a motor does at a tick."""
+
+    turns: bool  # the wheel is told to, or does
+    follows: bool  # and as it should, as far as can be told
+    power: float  # that the model expects [W or A], NaN where it is not known
+    band: float  # of that
+
+
+class RepeatWatch:
+    """Follows the readings of one supply."""
+
+    def __init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget the sensor."""
+        self._ahead: deque[tuple[int, Reading]] = deque()
+        self._repeats, self._samples = _PRIOR
+        self._last: Reading | None = None
+        self._begin_run(0)
+
+    def _begin_run(self, stamp_ns: int) -> None:
+        self._run, self._since = 0, stamp_ns
+        self._least, self._most = math.inf, -math.inf
+        self._strays = False
+
+    def take(self, stamp_ns: int, reading: Reading) -> None:
+        """Take a reading newer than those before."""
+        self._ahead.append((stamp_ns, reading))
+
+    def is_frozen(self, tick_ns: int, work: Work) -> bool:
+        """Whether the readings up to a tick are one and the same for too long."""
+        while self._ahead and self._ahead[0][0] <= tick_ns:
+            self._follow(*self._ahead.popleft(), turns=work.turns)
+        if work.turns and self._run:
+            self._least, self._most = min(self._least, work.power), max(self._most, work.power)
+            self._strays = self._strays or not work.follows
+        return self._is_improbable() and (
+            self._share <= _NOISY
+            or (
+                tick_ns - self._since >= _LASTS
+                and self._most - self._least > work.band
+                and not self._strays
+            )
+        )
+
+    @property
+    def _share(self) -> float:
+        return self._repeats / self._samples
+
+    def _is_improbable(self) -> bool:
+        return -self._run * math.log(self._share) > _IMPROBABLE
+
+    def _follow(self, stamp: int, reading: Reading, turns: bool) -> None:
+        if reading == self._last:
+            self._run += turns
+            return
+        if not self._is_improbable():
+            self._repeats += self._run
+            self._samples += self._run + turns
+        if self._samples > _MEMORY:
+            self._repeats, self._samples = 0.5 * self._repeats, 0.5 * self._samples
+        self._last = reading
+        self._begin_run(stamp)

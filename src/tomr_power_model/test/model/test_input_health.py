@@ -1,0 +1,97 @@
+"""Continuity of a stream, and what is said of it."""
+
+import pytest
+
+from tomr_power_model.messages.plain import Level
+from tomr_power_model.model.continuity import POWER_TOLERANCE, Continuity
+from tomr_power_model.model.input_health import InputReporter, InputState
+
+MS = 1_000_000
+BASE = 1_700_000_000_000 * MS
+
+
+def flow(until_ms: int, every_ms: int = 20, start_ms: int = 0) -> Continuity:
+    found = Continuity(POWER_TOLERANCE)
+    for t in range(start_ms, until_ms, every_ms):
+        found.take(BASE + t * MS)
+    return found
+
+
+def said(state: InputState, at_ms: int) -> tuple[Level, str]:
+    return state.verdict(BASE + at_ms * MS)
+
+
+def test_a_sensor_never_seen_is_stale_and_commands_are_waited_for() -> None:
+    assert said(InputState("x", flow(0)), 50) == (Level.STALE, "no message yet")
+    assert said(InputState("x", flow(0), is_optional=True), 50) == (Level.OK, "waiting")
+
+
+def test_a_sensor_that_dies_is_a_warning_and_commands_may_end() -> None:
+    assert said(InputState("x", flow(1000)), 1000)[0] is Level.OK
+    assert said(InputState("x", flow(1000)), 4180) == (Level.WARN, "silent for 3.2 s")
+    assert said(InputState("x", flow(1000), is_optional=True), 4180)[0] is Level.OK
+
+
+def test_what_comes_may_be_bad() -> None:
+    stream = flow(1000)
+    assert said(InputState("x", stream, "frozen"), 1000) == (Level.WARN, "frozen")
+    stream.refuse()
+    assert said(InputState("x", stream), 1000) == (Level.WARN, "sends what cannot be used at times")
+    stream.refuse()
+    stream.refuse()
+    assert said(InputState("x", stream), 1000) == (Level.WARN, "sends what cannot be used")
+    for t in range(1000, 4000, 20):
+        stream.take(BASE + t * MS)
+    assert said(InputState("x", stream), 4000)[0] is Level.OK
+
+
+def test_a_gap_is_a_warning_for_a_while() -> None:
+    stream = flow(1000)
+    for t in range(1300, 4000, 20):
+        stream.take(BASE + t * MS)
+    assert said(InputState("x", stream), 2000) == (Level.WARN, "a gap a moment ago")
+    assert said(InputState("x", stream), 3900)[0] is Level.OK
+    assert (stream.gaps, stream.refused) == (1, 0)
+
+
+@pytest.mark.parametrize("every_ms", [5, 20, 100])
+def test_rates_and_ages_are_numbers(every_ms: int) -> None:
+    status = InputState("wheel_1/power", flow(3000, every_ms)).status(BASE + 3000 * MS, "robot_7")
+    values = dict(status.values)
+    assert status.name == "inputs: wheel_1/power"
+    assert status.hardware_id == "robot_7"
+    assert float(values["rate"]) == pytest.approx(1000 / every_ms, rel=0.01)
+    assert float(values["age"]) == pytest.approx(every_ms / 1000)
+
+
+def test_no_silence_that_is_usual_is_a_gap() -> None:
+    """A sensor of 5 Hz may stay away for 0.35 s, one of 50 Hz for 0.1 s."""
+    slow, fast = flow(4000, 200), flow(4000, 20)
+    assert not slow.is_silent(BASE + (3800 + 350) * MS)
+    assert slow.is_silent(BASE + (3800 + 351) * MS)
+    assert not fast.is_silent(BASE + (3980 + 100) * MS)
+    assert fast.is_silent(BASE + (3980 + 101) * MS)
+
+
+def test_a_tick_rests_on_what_came_up_to_it() -> None:
+    """Stamps that were read already but lie after the tick change nothing."""
+    early, late = flow(1000), flow(1000)
+    late.take(BASE + 1500 * MS)
+    for at in (1000, 1050, 1100, 1200):
+        assert early.is_broken(BASE + at * MS) == late.is_broken(BASE + at * MS)
+    assert late.gaps == 0
+
+
+def test_it_is_said_once_a_second_and_on_a_change() -> None:
+    reporter, stream = InputReporter(), flow(1520)
+    for t in range(50, 4000, 50):
+        reporter.take(BASE + t * MS, (InputState("x", stream),), "")
+    found = [((r.stamp_ns - BASE) // MS, r.statuses[0].level) for r in reporter.due()]
+    assert found == [
+        (50, Level.OK),
+        (1000, Level.OK),
+        (1650, Level.WARN),
+        (2000, Level.WARN),
+        (3000, Level.WARN),
+    ]
+    assert reporter.due() == []

@@ -1,0 +1,161 @@
+"""Learnt terms: their tables, what they do, how they stand in robot.yaml, and how they run."""
+
+import numpy as np
+import pytest
+from attrs import evolve
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tomr_power_model.errors import InputError
+from tomr_power_model.geometry.kinematics import twist_to_wheels, wheels_to_twist
+from tomr_power_model.model.commanded import CommandPath, CommandTiming, Seen
+from tomr_power_model.robot import read_description, robot_from_parameters, shipped_robot
+from tomr_power_model.unmodelled import FAMILIES, LearntTerm, Motion, motion_of
+from tomr_power_model.unmodelled.described import parameters_of, terms_of
+from tomr_power_model.unmodelled.online import OnlineTerms
+from tomr_power_model.unmodelled.term import basis_at
+
+ROBOT = shipped_robot("reference")
+NAMES = ROBOT.wheel_names
+TICK = 0.05  # s
+NAN = (float("nan"),) * 3
+
+
+def _motion(twist: tuple[float, float, float], seconds: float = 4.0) -> Motion:
+    """A steady drive."""
+    time = np.arange(0.0, seconds, 0.005)
+    speed = np.tile(twist_to_wheels(ROBOT) @ np.array(twist), (len(time), 1))
+    angle = speed * time[:, None]
+    current = np.full_like(speed, 0.5)
+    return motion_of(wheels_to_twist(ROBOT), time, speed=speed, current=current, angle=angle)
+
+
+def _term(family: str, knots: list[list[float]], values: object, *wheels: int) -> LearntTerm:
+    points = tuple(np.array(item) for item in knots)
+    return LearntTerm(
+        FAMILIES[family], wheels, points, np.atleast_2d(np.array(values, dtype=float))
+    )
+
+
+def test_a_table_is_linear_between_its_knots_and_fades_beyond_them() -> None:
+    family = FAMILIES["torque.speed"]
+    knots = (np.array([1.0, 3.0, 5.0]),)
+    at = np.array([[2.0], [5.0], [6.0], [7.0], [0.0], [-9.0]])
+    found = basis_at(family, knots, at) @ np.array([10.0, 20.0, 40.0])
+    np.testing.assert_allclose(found, [15.0, 40.0, 20.0, 0.0, 5.0, 0.0])
+
+
+@given(st.floats(-50.0, 50.0))
+def test_a_periodic_table_has_no_end(angle: float) -> None:
+    knots = (np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False),)
+    rows = np.array([[angle], [angle + 2.0 * np.pi]])
+    found = basis_at(FAMILIES["torque.angle"], knots, rows)
+    np.testing.assert_allclose(found[0], found[1], atol=1e-6)
+    assert found.sum(axis=1) == pytest.approx([1.0, 1.0])
+
+
+def test_a_force_takes_its_power_from_the_wheels() -> None:
+    """3 N along x of the world against a drive at 0.4 m/s: 1.2 W, whatever the heading."""
+    motion = _motion((0.4, 0.1, 0.7))
+    grid = [[-9.0, 9.0], [-9.0, 9.0]]
+    term = _term("force.place", grid, [[-3.0] * 4, [0.0] * 4])
+    power = (term.actions(motion).torque * motion.speed).sum(axis=1)
+    np.testing.assert_allclose(power, 3.0 * motion.velocity_x[:, 0], atol=5e-3)
+
+
+def test_place_and_heading_are_reckoned_from_the_start() -> None:
+    """A quarter of a circle of 0.5 m radius to the left ends at (0.5, 0.5), heading 90 degrees."""
+    seconds = 0.5 * np.pi / 0.4
+    motion = _motion((0.2, 0.0, 0.4), seconds)
+    ends = [motion.x[-1, 0], motion.y[-1, 0], motion.heading[-1, 0]]
+    np.testing.assert_allclose(ends, [0.5, 0.5, 0.5 * np.pi], atol=5e-3)
+
+
+def test_a_sticky_place_resists_each_wheel_against_its_motion() -> None:
+    """0.1 N m everywhere; wheel 1 stands in a straight drive and is not resisted."""
+    motion = _motion((0.4, 0.0, 0.0))
+    term = _term("torque.place", [[-9.0, 9.0], [-9.0, 9.0]], [[0.1] * 4] * 3, 0, 1, 2)
+    np.testing.assert_allclose(term.actions(motion).torque, 0.1 * motion.sign)
+    np.testing.assert_allclose(np.abs(motion.sign[-1]), [0.0, 1.0, 1.0], atol=1e-6)
+
+
+def test_time_and_angle_count_since_the_last_stand() -> None:
+    time = np.arange(0.0, 3.0, 0.01)
+    speed = np.where((time > 1.0) & (time < 2.0), 0.0, 2.0)[:, None] * np.ones(3)
+    motion = motion_of(
+        wheels_to_twist(ROBOT), time, speed=speed, current=speed, angle=np.cumsum(speed, 0) * 0.01
+    )
+    assert motion.since_stand[150] == pytest.approx([0.0] * 3)
+    assert motion.since_stand[-1] == pytest.approx([1.0] * 3, abs=0.02)
+    assert motion.turned[-1] == pytest.approx([2.0] * 3, abs=0.04)
+    assert motion.since_stand[50, 0] > 50.0  # it has not stood yet
+
+
+@pytest.mark.parametrize(
+    "term",
+    [
+        _term("torque.speed", [[0.0, 2.0, 4.0]], [[0.01, 0.02, -0.03], [0.0, 0.1, 0.2]], 0, 2),
+        _term("force.place", [[0.0, 1.0], [0.0, 0.5, 1.0]], [[1.0] * 6, [2.0] * 6]),
+        _term("supply.current", [[0.0, 5.0]], [0.0, 2.0]),
+    ],
+    ids=lambda term: term.family.family_id,
+)
+def test_a_term_stands_in_a_description_and_is_read_again(term: LearntTerm) -> None:
+    values = {**read_description("reference"), **parameters_of("term_1", term, NAMES)}
+    (read,) = robot_from_parameters(values, "made").unmodelled
+    assert (read.family, read.wheels) == (term.family, term.wheels)
+    np.testing.assert_allclose(read.values, term.values)
+    for one, other in zip(read.knots, term.knots, strict=True):
+        np.testing.assert_allclose(one, other)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("family", "torque.moon", r"unmodelled\.term_1\.family = 'torque\.moon': give one of"),
+        ("wheels", ["left"], r"left is no wheel: give some of"),
+        ("wheels", [], r"acts elsewhere: name them"),
+        ("knots_1", [0.0, 1.0, 3.0], r"knots_1: give two knots or more, evenly spaced"),
+        ("values", [0.1, 0.2], r"values: has 2 numbers: give 3"),
+        ("values", ["a"], r"give a list of finite numbers"),
+        ("unit", "W", r"unit = 'W': give N m"),
+        ("colour", "red", r"colour is unknown: give family"),
+    ],
+)
+def test_a_table_that_does_not_fit_is_refused(field: str, value: object, message: str) -> None:
+    term = _term("torque.speed", [[0.0, 1.0, 2.0]], [0.0, 0.1, 0.2], 1)
+    values = parameters_of("term_1", term, NAMES) | {f"unmodelled.term_1.{field}": value}
+    with pytest.raises(InputError, match=message):
+        terms_of(values, NAMES, "made")
+
+
+def test_a_simulation_draws_and_resists_what_was_learnt() -> None:
+    """A driver that draws 2 W more at any speed; a wheel that resists with 0.05 N m more."""
+    draws = _term("driver.speed", [[0.0, 50.0]], [2.0, 2.0], 1)
+    resists = _term("torque.speed", [[0.0, 50.0]], [0.05, 0.05], 0)
+    powers = {}
+    for name, terms in (("none", ()), ("draws", (draws,)), ("resists", (resists,))):
+        path = CommandPath(evolve(ROBOT, unmodelled=terms), CommandTiming(50_000_000))
+        path.command(0, (0.3, 0.0, 0.5))
+        seen = Seen((0.0, 0.0, 0.0), NAN, 0.0)
+        steps = [path.over(tick * 50_000_000, seen) for tick in range(1, 41)]
+        last = steps[-1]
+        assert last is not None
+        powers[name] = np.mean([last.wheels(row, 1) for row in last.rows], axis=0)
+        torque = last.torque[0]
+        if name == "none":
+            before = torque
+    np.testing.assert_allclose(powers["draws"] - powers["none"], [0.0, 2.0, 0.0], atol=1e-9)
+    assert abs(torque) - abs(before) == pytest.approx(0.05, rel=0.02)
+
+
+def test_beyond_its_table_a_term_fades_and_says_so() -> None:
+    term = _term("torque.speed", [[0.0, 1.0, 2.0]], [[0.1] * 3] * 3, 0, 1, 2)
+    inside, outside = _motion((0.02, 0.0, 0.0)), _motion((0.6, 0.0, 0.0))
+    assert term.outside(inside) == 0.0
+    assert term.outside(outside) > 0.5
+    online = OnlineTerms((term,), wheels_to_twist(ROBOT), TICK)
+    speed = twist_to_wheels(ROBOT) @ np.array([0.6, 0.0, 0.0])
+    found = online.over(speed.tolist(), (0.0,) * 3, NAN, 0.0)
+    assert found.outside
+    assert found.torque[1] == 0.0

@@ -1,0 +1,141 @@
+"""Where the samples of a stream do not join up: nothing is concluded from the time around it.
+
+Silences are held against what is usual on this stream: three times its median interval, within
+bounds for all streams of a kind. Stamps that precede what was read already, message after message,
+are a clock that was put back, which leaves a gap as well. Judged at a tick from the stamps up to
+it, so that the answer does not depend on when messages arrive.
+"""
+
+from collections import deque
+from statistics import median
+
+from attrs import frozen
+
+from tomr_power_model.model.ticks import to_ns
+
+_USUAL = 3.0  # intervals: a longer silence is a gap
+_KEPT = 31  # intervals to take the usual one from
+_FEWEST = 5
+_EVERY = 8  # samples: how often it is taken anew
+_STRAYS = 3  # messages in a row that precede: fewer are late ones
+_RATED = to_ns(2.0)  # time over which a rate is counted
+
+
+@frozen
+class Tolerance:
+    """Silences of a kind of stream, in nanoseconds."""
+
+    shortest: int  # no shorter one is a gap
+    longest: int  # every longer one is
+    after: int  # time after a gap from which nothing is concluded either
+    share: float = 0.0  # of the gap's length, on top of that
+
+
+# Contract: encoders at 50 Hz or more, power at 10, commands at 5.
+ENCODER_TOLERANCE = Tolerance(to_ns(0.05), to_ns(0.15), to_ns(0.25))
+POWER_TOLERANCE = Tolerance(to_ns(0.1), to_ns(0.35), to_ns(0.05))
+# What a robot did in a gap, its simulation does after it, and takes as long as that.
+COMMAND_TOLERANCE = Tolerance(to_ns(0.125), to_ns(0.5), to_ns(0.3), share=1.0)
+_LONGEST = to_ns(0.6)  # of a gap, as far as `share` goes
+_REFUSED = -1  # in place of how far a message went back
+
+
+class Continuity:
+    """Follows the stamps of one stream."""
+
+    def __init__(self, tolerance: Tolerance) -> None:
+        self._tolerance = tolerance
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget the stream."""
+        self._ahead: deque[tuple[int, int]] = deque()  # stamp, and how far a message went back
+        self._read = 0  # newest stamp that came
+        self._last = 0  # newest one up to the last tick
+        self._intervals: deque[int] = deque(maxlen=_KEPT)
+        self._counted: deque[int] = deque()
+        self._count = 0
+        self._tolerated = self._tolerance.longest
+        self._back, self._strays = 0, 0
+        self._excused = 0
+        self.refused = 0  # messages up to the last tick
+        self.refused_at = 0  # newest stamp before the last of them, 0: there was none
+        self.refused_since = 0  # the newest sample
+        self.gaps = 0
+        self.resumed = 0  # first stamp after the last gap, 0: there was none
+        self._until = 0
+
+    def take(self, stamp_ns: int) -> None:
+        """Take the stamp of a sample, newer than those before."""
+        self._read = stamp_ns
+        self._ahead.append((stamp_ns, 0))
+
+    def precedes(self, stamp_ns: int) -> None:
+        """Take note of a message that repeats or precedes an earlier stamp, and is ignored."""
+        if self._read > stamp_ns:
+            self._ahead.append((self._read, self._read - stamp_ns))
+
+    def refuse(self) -> None:
+        """Take note of a message that cannot be used."""
+        self._ahead.append((self._read, _REFUSED))
+
+    def restart(self, stamp_ns: int) -> None:
+        """What comes from a stamp on has nothing to do with what came before."""
+        self._ahead.extend([(stamp_ns, 1)] * _STRAYS)
+
+    def excuse(self, tick_ns: int) -> None:
+        """The present silence is no gap: nothing can have happened in it up to this tick."""
+        self._excused = tick_ns
+
+    def last(self, tick_ns: int) -> int:
+        """Newest stamp up to a tick, 0 before the first."""
+        while self._ahead and self._ahead[0][0] <= tick_ns:
+            self._follow(*self._ahead.popleft())
+        return self._last
+
+    def is_broken(self, tick_ns: int) -> bool:
+        """Whether at a tick the stream pauses, or went on only just before."""
+        return self.is_silent(tick_ns) or tick_ns < self._until
+
+    def is_silent(self, tick_ns: int) -> bool:
+        """Whether at a tick nothing has come for longer than usual."""
+        last = self.last(tick_ns)
+        return bool(last) and tick_ns - last > self._tolerated
+
+    def rate(self, tick_ns: int) -> float:
+        """Samples per second of the last moments [Hz]."""
+        self.last(tick_ns)
+        recent = [stamp for stamp in self._counted if stamp > tick_ns - _RATED]
+        return 1e9 * (len(recent) - 1) / (recent[-1] - recent[0]) if len(recent) > 1 else 0.0
+
+    def _follow(self, stamp: int, back: int) -> None:
+        if back:
+            self.refused, self.refused_at = self.refused + 1, stamp
+            self.refused_since += 1
+            if back > 0:
+                self._back, self._strays = max(self._back, back), self._strays + 1
+            return
+        silence = stamp - self._last if self._last else 0
+        if self._strays >= _STRAYS:
+            silence = max(silence, self._back)
+            self._break_off(stamp, silence)
+        elif silence > self._tolerated:
+            if stamp - self._excused > self._tolerated:
+                self._break_off(stamp, silence)
+        elif silence:
+            self._intervals.append(silence)
+        self._back, self._strays, self._last = 0, 0, stamp
+        self.refused_since = 0
+        self._count += 1
+        self._counted.append(stamp)
+        while self._counted[0] <= stamp - _RATED:
+            self._counted.popleft()
+        if len(self._intervals) >= _FEWEST and self._count % _EVERY == 0:
+            given = self._tolerance
+            usual = round(_USUAL * median(self._intervals))
+            self._tolerated = min(max(usual, given.shortest), given.longest)
+
+    def _break_off(self, stamp: int, silence: int) -> None:
+        given = self._tolerance
+        self.resumed, self.gaps = stamp, self.gaps + 1
+        self._until = stamp + given.after + round(given.share * min(silence, _LONGEST))

@@ -1,0 +1,58 @@
+"""Terms of the wheel's speed."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from tomr_power_model.unmodelled.base import Array, Axis, Family, family
+from tomr_power_model.unmodelled.motion import Motion
+
+
+@family
+class TorqueBySpeed(Family):
+    """A friction that is no law of the vocabulary."""
+
+    family_id = "torque.speed"
+    acts = "torque"
+    axes: ClassVar = (Axis("wheel speed", "rad/s", 12),)
+    words = "a torque that depends on the wheel's speed"
+
+    @staticmethod
+    def coordinates(motion: Motion) -> Array:
+        return np.abs(motion.speed)[..., None]
+
+    @staticmethod
+    def factor(motion: Motion) -> Array:
+        return motion.sign
+
+
+@family
+class TorqueBySignedSpeed(Family):
+    """A friction that differs with the way the wheel turns."""
+
+    family_id = "torque.signed_speed"
+    acts = "torque"
+    axes: ClassVar = (Axis("signed wheel speed", "rad/s", 16),)
+    words = "a torque that depends on the wheel's speed and the way it turns"
+
+    @staticmethod
+    def coordinates(motion: Motion) -> Array:
+        return motion.speed[..., None]
+
+    @staticmethod
+    def factor(motion: Motion) -> Array:
+        return np.abs(motion.sign)
+
+
+@family
+class DriverBySpeed(Family):
+    """Power that no torque shows."""
+
+    family_id = "driver.speed"
+    acts = "driver"
+    axes: ClassVar = (Axis("wheel speed", "rad/s", 12),)
+    words = "power drawn by a driver that depends on its wheel's speed"
+
+    @staticmethod
+    def coordinates(motion: Motion) -> Array:
+        return np.abs(motion.speed)[..., None]

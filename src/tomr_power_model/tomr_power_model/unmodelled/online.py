@@ -1,0 +1,106 @@
+"""Learnt terms beside a simulation that goes on tick by tick."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from attrs import field, frozen
+from numpy.typing import NDArray
+
+from tomr_power_model.unmodelled.motion import LONG_AGO, STANDING, Motion
+from tomr_power_model.unmodelled.term import LearntTerm
+
+Array = NDArray[np.float64]
+
+
+@frozen
+class Besides:
+    """What terms do in a tick."""
+
+    torque: Sequence[float] = (0.0, 0.0, 0.0)  # that resists at the wheels [N m]
+    driver: Sequence[float] = (0.0, 0.0, 0.0)  # drawn besides by the drivers [W]
+    supply: float = 0.0  # drawn besides at the supply [W]
+    outside: bool = False  # beyond some table
+
+
+NOTHING = Besides()
+
+
+@frozen
+class _Memory:
+    """Where the robot has come to."""
+
+    time: float = 0.0  # s
+    x: float = 0.0  # m
+    y: float = 0.0
+    since: Array = field(factory=lambda: np.full(3, LONG_AGO))  # s
+    turned: Array = field(factory=lambda: np.full(3, LONG_AGO))  # rad
+
+
+class OnlineTerms:
+    """What terms do, from the motion at the start of each tick; they change slowly."""
+
+    def __init__(self, terms: Sequence[LearntTerm], inverse: Array, tick_s: float) -> None:
+        self._terms = terms
+        self._inverse = inverse
+        self._tick = tick_s
+        self.clear()
+
+    def clear(self) -> None:
+        """Start anew: the world is where the robot stands."""
+        self._memory = _Memory()
+
+    def over(
+        self,
+        speed: Sequence[float],
+        current: Sequence[float],
+        angle: Sequence[float],
+        heading: float,
+    ) -> Besides:
+        """What they do in the tick that begins with wheel speeds [rad/s], motor currents [A],
+        wheel angles [rad] and a heading [rad].
+        """
+        wheels, before, tick = np.array(speed, dtype=np.float64), self._memory, self._tick
+        vx, vy, wz = self._inverse @ wheels
+        middle = heading + 0.5 * wz * tick
+        cos, sin = np.cos(middle), np.sin(middle)
+        velocity = cos * vx - sin * vy, sin * vx + cos * vy
+        moves = np.abs(wheels) >= STANDING
+        now = _Memory(
+            before.time + tick,
+            before.x + tick * velocity[0],
+            before.y + tick * velocity[1],
+            np.where(moves, np.minimum(before.since + tick, LONG_AGO), 0.0),
+            np.where(moves, np.minimum(before.turned + tick * np.abs(wheels), LONG_AGO), 0.0),
+        )
+        self._memory = now
+
+        def body(value: float) -> Array:
+            return np.array([[value]])
+
+        motion = Motion(
+            time=body(now.time),
+            speed=wheels[None],
+            current=np.array([current], dtype=np.float64),
+            angle=np.nan_to_num(np.array([angle], dtype=np.float64)),
+            heading=body(middle),
+            x=body(now.x),
+            y=body(now.y),
+            velocity_x=body(velocity[0]),
+            velocity_y=body(velocity[1]),
+            direction=body(float(np.arctan2(vy, vx))),
+            since_stand=now.since[None],
+            turned=now.turned[None],
+            to_wheels=self._inverse.T,
+        )
+        found = [term.actions(motion) for term in self._terms]
+        return Besides(
+            _summed([item.torque[0] for item in found]),
+            _summed([item.driver[0] for item in found]),
+            sum(float(item.supply[0]) for item in found),
+            any(term.outside(motion) > 0.0 for term in self._terms),
+        )
+
+
+def _summed(rows: Sequence[Array]) -> list[float]:
+    found: list[float] = np.sum(rows, axis=0).tolist()
+    return found

@@ -1,0 +1,88 @@
+"""Laws behind learnt tables, from normal equations made by hand."""
+
+import numpy as np
+import pytest
+
+from tomr_power_model.unmodelled import FAMILIES, LearntTerm
+from tomr_reality_gap.fit.laws import LAWS, Evidence, laws_of, words_of
+from tomr_reality_gap.fit.learnt import Table
+
+
+def _table(family: str, *knots: np.ndarray) -> Table:
+    count = int(np.prod([len(points) for points in knots]))
+    return Table(FAMILIES[family], knots, np.eye(count))
+
+
+def _evidence(values: np.ndarray, exact: float = 1e4) -> Evidence:
+    """Each value of a table measured by itself."""
+    units = values.ravel()
+    return Evidence(exact * np.eye(len(units)), exact * units, 1.0)
+
+
+def _laws(table: Table, values: np.ndarray) -> dict[str, tuple[dict[str, float], LearntTerm]]:
+    term = LearntTerm(table.family, (), table.knots, np.atleast_2d(values))
+    return {
+        item.law.name: (
+            {name: estimate.value for name, estimate in item.fitted.parameters.items()},
+            item.term,
+        )
+        for item in laws_of(table, term, _evidence(np.atleast_2d(values)))
+    }
+
+
+def _spring(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """4 N/m beyond 0.5 m from (0.3, -0.2)."""
+    away = np.stack([0.3 - x, -0.2 - y])
+    far = np.hypot(*away)
+    return 4.0 * np.maximum(far - 0.5, 0.0) / far * away
+
+
+def test_a_spring_is_told_with_its_anchor_and_reaches_beyond_the_table() -> None:
+    line = np.linspace(-1.0, 1.0, 7)
+    x, y = (grid.ravel() for grid in np.meshgrid(line, line, indexing="ij"))
+    found, term = _laws(_table("force.place", line, line), _spring(x, y))["spring"]
+    expected = {"stiffness": 4.0, "slack": 0.5, "x": 0.3, "y": -0.2}
+    assert found == pytest.approx(expected, abs=0.02)
+    far = np.array([2.5, 2.5])
+    at = np.argmin([np.hypot(a - far[0], b - far[1]) for a in term.knots[0] for b in term.knots[1]])
+    place = np.array([(a, b) for a in term.knots[0] for b in term.knots[1]])[at]
+    np.testing.assert_allclose(term.values[:, at], _spring(*place), rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("family", "law", "values", "parameters"),
+    [
+        ("torque.since_stand", "exponential", lambda t: 0.3 * np.exp(-t / 0.9),
+         {"size": 0.3, "decay": 0.9}),
+        ("driver.speed", "step", lambda w: 2.0 * (w > 4.2), {"size": 2.0}),
+        ("torque.speed", "power law", lambda w: 0.01 * w**3, {"size": 0.01, "exponent": 3.0}),
+        ("torque.angle", "periodic", lambda a: 0.2 * np.sin(3.0 * a + 1.0),
+         {"size": 0.2, "order": 3.0, "phase": 1.0}),
+    ],
+)  # fmt: skip
+def test_curves_are_told_as_the_laws_that_they_are(
+    family: str, law: str, values: object, parameters: dict[str, float]
+) -> None:
+    knots = np.linspace(0.0, 8.0, 24)
+    if FAMILIES[family].axes[0].is_periodic:
+        knots = np.linspace(0.0, 2.0 * np.pi, 36, endpoint=False)
+    found = _laws(_table(family, knots), values(knots))  # type: ignore[operator]
+    told, _ = found[law]
+    for name, value in parameters.items():
+        assert told[name] == pytest.approx(value, rel=0.03, abs=0.02)
+
+
+def test_a_curve_that_is_no_law_stays_a_table() -> None:
+    knots = np.linspace(0.0, 8.0, 24)
+    values = np.random.default_rng(1).standard_normal(24)
+    assert _laws(_table("torque.speed", knots), values) == {}
+
+
+def test_a_law_is_told_in_words_with_its_numbers() -> None:
+    knots = np.linspace(0.0, 8.0, 24)
+    table = _table("torque.since_stand", knots)
+    values = 0.3 * np.exp(-knots / 0.9)
+    term = LearntTerm(table.family, (), table.knots, values[None])
+    found = [item.fitted for item in laws_of(table, term, _evidence(values[None]))]
+    assert words_of(found[0]) == "0.3 N m that dies out over 0.9 s"
+    assert len({law.name for law in LAWS}) == len(LAWS)

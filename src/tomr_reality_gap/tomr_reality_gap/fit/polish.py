@@ -1,0 +1,84 @@
+"""A law's parameters brought to their best with the simulator: a table is too coarse for them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from attrs import evolve
+from numpy.typing import NDArray
+
+from tomr_power_model.robot import Robot
+from tomr_power_model.unmodelled import LearntTerm, Motion
+from tomr_reality_gap.fit.dataset import Dataset
+from tomr_reality_gap.fit.laws import LawAt
+from tomr_reality_gap.fit.learnt import power_rows
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 4
+_STEP = 0.02  # of a parameter, for its derivative
+_LEAST = 0.005  # the same, in its unit
+
+
+def changes_of(
+    dataset: Dataset, robot: Robot, motions: Sequence[Motion], terms: Sequence[LearntTerm]
+) -> Array:
+    """What each of some terms adds to every value, (v, n)."""
+    found = [[term.actions(motion) for term in terms] for motion in motions]
+    if terms[0].family.acts in ("torque", "force"):
+        torques = [np.stack([item.torque for item in row]) for row in found]
+        return np.asarray(dataset.respond(robot, torques) - dataset.predict([robot])[0])
+    return np.concatenate(
+        [
+            np.stack([power_rows(simulation, item) for item in row])
+            for simulation, row in zip(dataset.simulations, found, strict=True)
+        ],
+        axis=1,
+    )
+
+
+def polished(
+    law: LawAt,
+    dataset: Dataset,
+    robot: Robot,
+    motions: Sequence[Motion],
+    *,
+    residual: Array,
+    base: Array,
+    weight: Array,
+    inflation: float,
+) -> tuple[LawAt, Array]:
+    """The law at its best, and what it adds to every value.
+
+    Args:
+        law: where to start.
+        dataset: recordings.
+        robot: without the law.
+        motions: its motions in them.
+        residual: that it leaves, whitened, (n,).
+        base: whitened derivatives by what is not exactly known, (n, q).
+        weight: of each value, (n,).
+        inflation: of the parameters' variance.
+    """
+    inner = np.linalg.inv(base.T @ base + np.eye(base.shape[1]))
+
+    def beside(columns: Array) -> Array:
+        """Without what the base makes of it."""
+        return np.asarray(columns - base @ (inner @ (base.T @ columns)))
+
+    best, change, cost = law, np.zeros_like(residual), np.inf
+    for _ in range(_ROUNDS):
+        steps = np.maximum(_STEP * np.abs(law.parameters), _LEAST)
+        moved = [evolve(law, parameters=law.parameters + row) for row in np.diag(steps)]
+        terms = [item.term for item in (law, *moved)]
+        rows = changes_of(dataset, robot, motions, terms) * weight
+        left = beside(residual - rows[0])
+        now = float(left @ left)
+        if now >= cost:  # the last step was too long
+            break
+        jacobian = beside(((rows[1:] - rows[0]).T) / steps)
+        information = jacobian.T @ jacobian
+        covariance = np.linalg.pinv(information)
+        sigma = np.sqrt(np.maximum(np.diag(covariance) * inflation, 0.0))
+        best, change, cost = evolve(law, sigma=sigma), rows[0] / weight, now
+        law = evolve(law, parameters=law.parameters + covariance @ (jacobian.T @ left))
+    return best, change

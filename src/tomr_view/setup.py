@@ -1,0 +1,25 @@
+"""Build description of tomr_view for colcon and pip."""
+
+from setuptools import find_packages, setup
+
+NAME = "tomr_view"
+
+setup(
+    name=NAME,
+    version="0.2.0",
+    description="The diagnosis of a robot in a browser, live or of a recording.",
+    maintainer="TOMR maintainers",
+    maintainer_email="maintainers@tomr.dev",
+    license="Apache-2.0",
+    python_requires=">=3.11",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={NAME: ["py.typed", "page/*"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+    ],
+    install_requires=["setuptools"],
+    extras_require={"test": ["pytest"]},
+    zip_safe=False,
+    entry_points={"console_scripts": [f"tomr_view = {NAME}.entry:tomr_view"]},
+)

@@ -1,0 +1,119 @@
+"""Whatever happens to a command, 1 is an answer and nothing else gives it."""
+
+import os
+import signal
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_DEFECT, run_main
+
+ROOT = Path(__file__).parents[1]
+SQUARE = ROOT / "bags" / "square"
+DIAGNOSE = Path(sysconfig.get_path("scripts"), "tomr_diagnose")
+
+
+def raising(error: BaseException) -> int:
+    def main(_: object) -> int:
+        raise error
+
+    return run_main(main)
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "words"),
+    [
+        (ZeroDivisionError("by zero"), EXIT_DEFECT, "ZeroDivisionError: by zero (test_exit_codes"),
+        (KeyError("a\nb"), EXIT_DEFECT, "TOMR_DEBUG=1"),
+        (MemoryError(), EXIT_BAD_INPUT, "memory"),
+        (PermissionError(13, "Permission denied", "x"), EXIT_BAD_INPUT, "x: Permission denied"),
+        (OSError(28, "No space left on device"), 74, "output cannot be written"),
+        (BrokenPipeError(), 141, ""),
+        (KeyboardInterrupt(), 130, "interrupted"),
+    ],
+)
+def test_an_error_nobody_expected_is_one_line(
+    error: BaseException, code: int, words: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert raising(error) == code
+    line = capfd.readouterr().err
+    assert words in line
+    assert line.count("\n") == (1 if words else 0)
+
+
+def test_where_it_comes_from_is_shown_on_request(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TOMR_DEBUG", "1")
+    assert raising(ZeroDivisionError()) == EXIT_DEFECT
+    assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("redirection", "code"), [("> /dev/full", 74), (">&-", 0), (">&- 2>&- <&-", 0), ("| true", 141)]
+)
+def test_output_that_cannot_be_written(redirection: str, code: int) -> None:
+    """Closed is what the user chose; full is not."""
+    script = f"{DIAGNOSE} {SQUARE} --json {redirection}; exit ${{PIPESTATUS[0]}}"
+    run = subprocess.run(
+        ["bash", "-c", script], capture_output=True, text=True, timeout=60, env=_environment()
+    )
+    # A pipe may take all before its reader is gone.
+    assert run.returncode in ({code, 0} if code == 141 else {code})
+    assert "Traceback" not in run.stderr
+    assert run.stderr.count("\n") <= 1
+
+
+def test_names_that_the_terminal_lacks_letters_for(tmp_path: Path) -> None:
+    for name in (
+        "Straße-\N{SNOWMAN}",
+        "line\nbreak",
+        os.fsdecode(b"\xff\xfe"),
+    ):
+        missing = tmp_path / name
+        run = subprocess.run(
+            [DIAGNOSE, missing],
+            capture_output=True,
+            timeout=60,
+            env=_environment(PYTHONIOENCODING="ascii"),
+        )
+        assert run.returncode == EXIT_BAD_INPUT
+        assert run.stderr.count(b"\n") == 1
+        assert run.stderr.isascii()
+
+
+_SLOW = """
+import signal, sys, threading, _thread, time, types
+from importlib import abc, machinery
+import os
+class Slow(abc.MetaPathFinder, abc.Loader):
+    def find_spec(self, name, path=None, target=None):
+        return machinery.ModuleSpec(name, self) if name == "slow" else None
+    def exec_module(self, module):
+        os.kill(os.getpid(), {number})
+        time.sleep(60)
+sys.meta_path.insert(0, Slow())
+from tomr_power_model.cli import run_module
+sys.exit(run_module("slow"))
+"""
+
+
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=["INT", "TERM"]
+)
+def test_a_signal_while_modules_load(number: int, code: int) -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", _SLOW.format(number=int(number))],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        env=_environment(),
+    )
+    assert (run.returncode, run.stderr) == (code, "interrupted\n")
+
+
+def _environment(**more: str) -> dict[str, str]:
+    return {**os.environ, **more}

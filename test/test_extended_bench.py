@@ -1,0 +1,69 @@
+"""What bench/extended.py draws and how it cuts time; no drive is simulated."""
+
+import sys
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.append(str(Path(__file__).resolve().parent.parent / "bench"))
+
+from extended import KINDS, faulty_drive, pushed_drive, spans, targets
+
+from tomr_fault_diag.diagnosis.score import Case, Seen
+from tomr_sim_bridge.faults import natures
+
+
+def test_every_fault_beyond_the_papers_is_drawn() -> None:
+    drawn = {kind.fault_id: kind.is_known for kind in KINDS.values()}
+    for fault_id, nature in natures().items():
+        if nature == "disturbance" or fault_id in ("encoder_lost", "floor_slippery"):
+            continue
+        assert drawn[fault_id] == (nature == "fault")
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_seed_makes_a_drive(name: str) -> None:
+    drive, size = faulty_drive(4_000_000, name)
+    again, _ = faulty_drive(4_000_000, name)
+    fault = drive.mission.faults[0]
+    assert again.mission == drive.mission
+    assert size > 0.0
+    assert 0.0 < fault.start < (fault.end or 0.0) <= drive.length
+    assert fault.settings["severity"] == 1.0
+
+
+def test_pushes_follow_one_another_within_what_is_no_fault() -> None:
+    for seed in range(4_000_000, 4_000_020):
+        faults = pushed_drive(seed).mission.faults
+        for fault in faults:
+            assert fault.fault_id == "pushed"
+            assert float(str(fault.settings["force"])) <= 3.0
+        ends = [fault.end or 0.0 for fault in faults]
+        assert all(end <= fault.start for end, fault in zip(ends, faults[1:], strict=False))
+
+
+def test_spans_close_short_gaps() -> None:
+    flags = np.zeros(100, dtype=bool)
+    flags[[10, 11, 30, 31, 80]] = True  # 0.95 s apart, then 2.45 s
+    assert np.array(spans(flags, 1)) == pytest.approx(np.array([[0.55, 1.65], [4.05, 4.1]]))
+    assert spans(flags & False, 1) == ()
+
+
+def test_targets_count_each_fault_by_what_it_was_called_most() -> None:
+    def case(kind: str, **verdicts: int) -> Case:
+        return Case(kind, 1.0, 0.5, 0.5, Counter(), Counter(verdicts))
+
+    cases = (
+        case("wheel_stuck", right=9, unknown=1),
+        case("wheel_stuck", unknown=9, right=1),
+        case("windy", another_named=5),
+        case("windy", normal_or_nothing=5),
+    )
+    found = targets([Seen(cases, (), 0.0, 0, 1)])
+    known, unknown = found["extended states"], found["unknown kinds"]
+    assert known["right"]["share"] == 0.5  # type: ignore[index]
+    assert known["right or unknown"]["share"] == 1.0  # type: ignore[index]
+    assert unknown["a wrong fault"]["share"] == 0.5  # type: ignore[index]
+    assert unknown["unknown or a fault"]["share"] == 0.5  # type: ignore[index]

@@ -1,0 +1,93 @@
+"""Whole drives in which data are missing or bad: no fault is named because of that."""
+# ruff: noqa: E402 (bench/ is no package)
+
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT / "bench"))
+
+import interrupted
+from interrupted import (
+    Change,
+    Drive,
+    Item,
+    absurd,
+    accused,
+    both,
+    dead,
+    leap,
+    loss,
+    pause,
+    power,
+    scatter,
+    states,
+)
+
+from tomr_power_model.messages.intake import stamp_of
+from tomr_power_model.recordings import open_recording
+
+FAULT = "motor system fault 3"  # in bags/circle_encoder_lost, from 8 s to 14 s
+
+
+@cache
+def drive(bag: str) -> Drive:
+    topics = {f"/{topic}" for topic in interrupted.STREAMS["all"]}
+    with open_recording(ROOT / "bags" / bag) as recording:
+        return tuple(
+            Item(stamp_of(message, received), topic.removeprefix("/"), message)
+            for topic, _, message, received in recording.messages(topics)
+        )
+
+
+@pytest.fixture(autouse=True)
+def _start(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Times of disturbances count from the start of the recordings."""
+    monkeypatch.setattr(interrupted, "_START", drive("square")[0].stamp_ns)
+
+
+def pauses(streams: str, length: float) -> Change:
+    return both(*(pause(streams, at, length) for at in (1.9, 4.3, 6.7, 9.1, 11.5, 13.9)))
+
+
+CASES = {
+    "0.3 s": lambda: pauses("all", 0.3),
+    "0.5 s": lambda: pauses("all", 0.5),
+    "0.5 s of commands": lambda: pauses("cmd_vel", 0.5),
+    "0.3 s of encoders": lambda: pauses("joint_states", 0.3),
+    "leaps": lambda: both(leap(5.3, 0.3), leap(9.0, -0.3), leap(12.7, 0.3)),
+    "half is lost": lambda: loss(0.5),
+    "5 ms": lambda: scatter(0.005),
+    "2 %, 5 ms, a second without power": lambda: both(
+        loss(0.02), scatter(0.005), pause("motors", 7.0, 1.0)
+    ),
+    "one absurd sample": lambda: power(1, 6.0, absurd, 0.015),
+    "absurd samples": lambda: power(1, 6.0, absurd),
+    "a dead sensor": lambda: power(2, 6.0, dead),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_healthy_robot_is_not_accused(name: str) -> None:
+    found = states(CASES[name]()(drive("square"), np.random.default_rng(3)))
+    assert accused(found) == []
+    assert any(d.state.name == "normal" for d in found)
+
+
+@pytest.mark.parametrize("streams", ["all", "cmd_vel", "joint_states", "motors"])
+def test_a_fault_is_neither_cleared_nor_missed(
+    streams: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    circle = drive("circle_encoder_lost")
+    monkeypatch.setattr(interrupted, "_START", start := circle[0].stamp_ns)
+    at_onset, within = pause(streams, 7.8, 0.5), pause(streams, 11.0, 0.5)
+    found = states(both(at_onset, within)(circle, np.random.default_rng(3)))
+    assert accused(found) == [FAULT]
+    (named,) = [d for d in found if d.changed and d.state.name == FAULT]
+    assert 8.0 < 1e-9 * (named.stamp_ns - start) < 8.3 + 2.0
+    during = {d.state.name for d in found if named.stamp_ns <= d.stamp_ns < start + 14 * 10**9}
+    assert during == {FAULT}
