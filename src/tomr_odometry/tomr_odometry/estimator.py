@@ -29,6 +29,7 @@ _FROZEN_COUNTS = 4.0  # that they should have counted
 _NO_IMU = np.full(6, np.nan)
 _NO_FORCES = np.zeros((0, 4))
 _TURNING = 0.02  # m/s: below it there is no slip ratio
+_CREEPING = 0.05  # m/s, the same of creep: a ratio to a wheel that hardly turns says nothing
 _SLIDES = 0.5  # probability from which a wheel is said to slide
 _SLOW = 0.02  # m/s: sliding slower than that is none
 _TRACTION_TIME = 0.3  # s, over which traction is averaged where creep depends on it
@@ -206,11 +207,23 @@ class SlipOdometry:
             self._last.popleft()
 
     def _is_frozen(self, time: int, angle: Array) -> bool:
-        """Whether encoders repeat themselves although the wheels should have turned on."""
-        if not np.array_equal(angle, self._last[-1][1]) or time - self._time > _FROZEN_NS:
+        """Whether encoders repeat themselves although the wheels should have turned on.
+
+        Counts repeat where a robot has come to rest as well. With an IMU the filter weighs that
+        itself; without one wheels that have been braking are taken to brake on.
+        """
+        if self._is_aided or time - self._time > _FROZEN_NS:
+            return False
+        if not np.array_equal(angle, self._last[-1][1]):
             return False
         (first, old), (last, new) = self._last[0], self._last[-1]
-        turned = float(np.abs(new - old).max()) / max(last - first, 1) * (time - self._time)
+        stamp, middle = self._last[len(self._last) // 2]
+        earlier = np.abs(middle - old).max() / max(stamp - first, 1)
+        later = np.abs(new - middle).max() / max(last - stamp, 1)
+        braking = max(float(earlier - later), 0.0) / max(0.5 * (last - first), 1.0)
+        turned = float(later) * (time - self._time)
+        if braking > 0.0:
+            turned = min(turned, 0.5 * float(later) ** 2 / braking)
         return turned > _FROZEN_COUNTS * self._quantum
 
     def _go_on(self, time: int, angle: Array) -> None:
@@ -284,9 +297,11 @@ class SlipOdometry:
         (first, old), (last, new) = self._last[0], self._last[-1]
         rim = (new - old) / max(1e-9 * (last - first), 1e-3) * self._radius
         creeps = x[CREEP] * self.settings.creep.shape(self._used) * math.hypot(*self._travel)
-        sliding = np.where(self._mode[:3] > _SLIDES, rim - ground, creeps)
+        is_sliding = self._mode[:3] > _SLIDES
+        sliding = np.where(is_sliding, rim - ground, creeps)
         larger = np.maximum(np.abs(rim), np.abs(rim - sliding))
-        slip = np.where(larger > _TURNING, sliding / np.maximum(larger, _TURNING), 0.0)
+        least = np.where(is_sliding, _TURNING, _CREEPING)
+        slip = np.where(larger > least, sliding / np.maximum(larger, least), 0.0)
         missing, sensors = self._sensors(tick)
         return Estimate(
             stamp_ns=tick,
@@ -299,7 +314,7 @@ class SlipOdometry:
             probability=self._mode[:3].copy(),
             traction=self._forces.copy(),
             available=self._available.copy(),
-            is_slipping=bool(np.any((self._mode[:3] > _SLIDES) & (np.abs(sliding) > _SLOW))),
+            is_slipping=bool(np.any(is_sliding & (np.abs(sliding) > _SLOW))),
             is_carried=tick < self._carried_until,
             missing=missing,
             sensors=sensors,
