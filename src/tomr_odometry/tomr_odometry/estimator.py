@@ -29,12 +29,15 @@ _FROZEN_COUNTS = 4.0  # that they should have counted
 _NO_IMU = np.full(6, np.nan)
 _NO_FORCES = np.zeros((0, 4))
 _TURNING = 0.02  # m/s: below it there is no slip ratio
+_CREEPING = 0.05  # m/s, the same of creep: a ratio to a wheel that hardly turns says nothing
 _SLIDES = 0.5  # probability from which a wheel is said to slide
 _SLOW = 0.02  # m/s: sliding slower than that is none
 _TRACTION_TIME = 0.3  # s, over which traction is averaged where creep depends on it
 _GRAVITY_TIME = 0.5  # s, over which a new gravity would be taken for granted
 _AHEAD = 0.25  # s, for which the motion of the last encoder sample is taken to go on
 _LOST_SPEED = 1.0  # m/s, by which a robot without encoders may be off
+_SLOW_ENCODERS = 0.02  # s between samples, from which they are looked at for uneven timing
+_UNEVEN_SHARE = 0.05  # of a new sample in the mean
 _LIFTED = 1.5  # m/s^2 off the usual weight
 _LIFTED_TILT = 0.6  # rad/s of rolling or pitching
 _CARRIED_NS = to_ns(0.7)  # how long after such a moment the robot may still be carried
@@ -100,6 +103,9 @@ class SlipOdometry:
         self._quantum = 2e-2  # rad, smallest step of the encoders seen
         self._forces = np.full(WHEELS, np.nan)
         self._used = np.zeros(WHEELS)
+        self._travel = np.zeros(2)
+        self._moved = np.zeros(WHEELS)
+        self._uneven = 0.0
         self._available = np.full(WHEELS, np.nan)
         self._inertial: list[tuple[float, ...]] = []
         self._tractive: list[Traction] = []
@@ -201,11 +207,23 @@ class SlipOdometry:
             self._last.popleft()
 
     def _is_frozen(self, time: int, angle: Array) -> bool:
-        """Whether encoders repeat themselves although the wheels should have turned on."""
-        if not np.array_equal(angle, self._last[-1][1]) or time - self._time > _FROZEN_NS:
+        """Whether encoders repeat themselves although the wheels should have turned on.
+
+        Counts repeat where a robot has come to rest as well. With an IMU the filter weighs that
+        itself; without one wheels that have been braking are taken to brake on.
+        """
+        if self._is_aided or time - self._time > _FROZEN_NS:
+            return False
+        if not np.array_equal(angle, self._last[-1][1]):
             return False
         (first, old), (last, new) = self._last[0], self._last[-1]
-        turned = float(np.abs(new - old).max()) / max(last - first, 1) * (time - self._time)
+        stamp, middle = self._last[len(self._last) // 2]
+        earlier = np.abs(middle - old).max() / max(stamp - first, 1)
+        later = np.abs(new - middle).max() / max(last - stamp, 1)
+        braking = max(float(earlier - later), 0.0) / max(0.5 * (last - first), 1.0)
+        turned = float(later) * (time - self._time)
+        if braking > 0.0:
+            turned = min(turned, 0.5 * float(later) ** 2 / braking)
         return turned > _FROZEN_COUNTS * self._quantum
 
     def _go_on(self, time: int, angle: Array) -> None:
@@ -219,6 +237,8 @@ class SlipOdometry:
         speed = (angle - self._last[-1][1]) * self._radius / dt
         variance = (self._quantum * self._radius) ** 2 / 12.0
         variance = variance + (noise.jitter * speed) ** 2 + noise.rim**2
+        if dt > _SLOW_ENCODERS:
+            variance = variance + self._unevenness(speed * dt)
         inertial = np.mean(self._inertial, axis=0) if self._inertial else _NO_IMU
         forces = self._evidence(dt)
         self._inertial, self._tractive = [], []
@@ -230,6 +250,13 @@ class SlipOdometry:
                 self._P[place, place] += lost
         sliding = self._mode[:3] > _SLIDES
         self._available = np.where(sliding, np.abs(self._forces), self._available)
+
+    def _unevenness(self, moved: Array) -> float:
+        """Variance of ways sampled unevenly in time, by their second differences [m^2]."""
+        second = float(np.mean((moved - self._moved) ** 2)) / 6.0
+        self._moved = moved
+        self._uneven += _UNEVEN_SHARE * (second - self._uneven)
+        return self._uneven
 
     def _evidence(self, dt: float) -> Array:
         """Forces for the filter, if they are evidence; keeps what creep and messages need."""
@@ -247,6 +274,9 @@ class SlipOdometry:
     def _advance(self, time: int, dt: float, rims: Array, inertial: Array, forces: Array) -> None:
         used = self.settings.creep.shape(self._used)
         noise = self.settings.noise if self._is_aided else self._unaided
+        keep = math.exp(-dt / _TRACTION_TIME)
+        self._travel = self._x[VX : VX + 2] + keep * (self._travel - self._x[VX : VX + 2])
+        used = used * math.hypot(*self._travel)
         self._P = step(
             self._x, self._P, self._body, noise, self._mode, used, dt,
             rims, inertial, forces,
@@ -266,10 +296,12 @@ class SlipOdometry:
         ground = body.rows @ twist
         (first, old), (last, new) = self._last[0], self._last[-1]
         rim = (new - old) / max(1e-9 * (last - first), 1e-3) * self._radius
-        creeps = x[CREEP] * self.settings.creep.shape(self._used) * math.hypot(*twist[:2])
-        sliding = np.where(self._mode[:3] > _SLIDES, rim - ground, creeps)
+        creeps = x[CREEP] * self.settings.creep.shape(self._used) * math.hypot(*self._travel)
+        is_sliding = self._mode[:3] > _SLIDES
+        sliding = np.where(is_sliding, rim - ground, creeps)
         larger = np.maximum(np.abs(rim), np.abs(rim - sliding))
-        slip = np.where(larger > _TURNING, sliding / np.maximum(larger, _TURNING), 0.0)
+        least = np.where(is_sliding, _TURNING, _CREEPING)
+        slip = np.where(larger > least, sliding / np.maximum(larger, least), 0.0)
         missing, sensors = self._sensors(tick)
         return Estimate(
             stamp_ns=tick,
@@ -282,7 +314,7 @@ class SlipOdometry:
             probability=self._mode[:3].copy(),
             traction=self._forces.copy(),
             available=self._available.copy(),
-            is_slipping=bool(np.any((self._mode[:3] > _SLIDES) & (np.abs(sliding) > _SLOW))),
+            is_slipping=bool(np.any(is_sliding & (np.abs(sliding) > _SLOW))),
             is_carried=tick < self._carried_until,
             missing=missing,
             sensors=sensors,

@@ -5,7 +5,7 @@ its contact gave it to the body; biases of accelerometer and gyro; pull of the f
 odometry frame; unknown friction of each wheel; roller drag and creep.
 
 An encoder counts its rim's way, always: the measurement is never rejected. What slips is the
-process that ties the rim to the body, d(rim_i) = (row_i v + creep s_i |v|) dt + noise, whose noise
+process that ties the rim to the body, d(rim_i) = (row_i v + creep_i) dt + noise, whose noise
 is small while the wheel grips and large while it slides. So counts do not turn into velocities,
 their quantum does not random-walk, and where nothing slides the pose is that of plain wheel
 odometry. The functions use what numba compiles, too.
@@ -37,7 +37,7 @@ class Noise(NamedTuple):
     slope: float = 0.02  # m/s^2
     friction: float = 0.8  # N
     drag: float = 0.08
-    creep: float = 0.02
+    creep: float = 0.1
     rate: float = 1.5  # m/s^2, of the body's acceleration
     turn_rate: float = 6.0  # rad/s^2, of its turning
     rate_time: float = 0.25  # s, over which both are forgotten
@@ -83,7 +83,7 @@ def predict(x: Array, P: Array, b: Body, n: Noise, mode: Array, used: Array, dt:
     """Go on by dt [s]; returns the covariance.
 
     mode: probabilities that the wheels slide, and whether one did a moment ago (1 to 0), (4,).
-    used: how far traction makes each wheel creep, per unit of the creep's coefficient, (3,).
+    used: how fast each wheel creeps per unit of the creep's coefficient [m/s], (3,).
     """
     v, a = x[VX : WZ + 1].copy(), x[AX : AW + 1].copy()
     keep, half = math.exp(-dt / n.rate_time), 0.5 * dt * dt
@@ -98,14 +98,13 @@ def predict(x: Array, P: Array, b: Body, n: Noise, mode: Array, used: Array, dt:
     f[X : YAW + 1, AX : AW + 1] = turn * half
     ground = b.rows @ v
     travel = math.sqrt(v[0] ** 2 + v[1] ** 2)
-    way = np.array([v[0], v[1], 0.0]) / max(travel, 1e-3)
     q = np.zeros(SIZE)
     for i in range(3):
-        lead = b.rows[i] + x[CREEP] * used[i] * way
-        f[RIM + i, VX : WZ + 1] = lead * dt
-        f[RIM + i, AX : AW + 1] = lead * half
-        f[RIM + i, CREEP] = used[i] * travel * dt
-        x[RIM + i] += b.rows[i] @ step + x[CREEP] * used[i] * travel * dt
+        f[RIM + i, VX : WZ + 1] = b.rows[i] * dt
+        f[RIM + i, AX : AW + 1] = b.rows[i] * half
+        if n.slip_rate > 0.0:  # unaided, creep cannot be told from travel: it is taken as known
+            f[RIM + i, CREEP] = used[i] * dt
+        x[RIM + i] += b.rows[i] @ step + x[CREEP] * used[i] * dt
         f[VX + i, AX + i] = dt
         f[AX + i, AX + i] = keep
         loose = 1.0 + n.doubt * mode[3]
@@ -137,6 +136,9 @@ def judge(x: Array, P: Array, n: Noise, mode: Array, rims: Array, dt: float) -> 
     wide = (n.slide * dt) ** 2
     for i in range(3):
         k, was = RIM + i, mode[i]
+        if n.slip_rate == 0.0:  # nothing tells: the wheels are taken for gripping
+            mode[i] = 0.0
+            continue
         grips = max(P[k, k] - was * wide, 0.0) + TAILS * rims[1, i]
         slides = grips + wide
         square = (rims[0, i] - x[k]) ** 2
@@ -149,19 +151,31 @@ def judge(x: Array, P: Array, n: Noise, mode: Array, rims: Array, dt: float) -> 
         mode[i] = now
 
 
-def correct(x: Array, P: Array, h: Array, innovation: Array, variance: Array, gate: float) -> Array:
-    """Measurements made at once, (m, SIZE), (m,), (m,); returns the covariance."""
+def correct(
+    x: Array, P: Array, h: Array, innovation: Array, variance: Array, gate: float, held: bool
+) -> Array:
+    """Measurements made at once, (m, SIZE), (m,), (m,); returns the covariance.
+
+    held: biases, friction, drag and creep stay as they are, and so does what is not known of them:
+    without an IMU the wheels tell nothing of these.
+    """
     ph = P @ h.T
     s = h @ ph
+    noise = np.abs(variance)
     for i in range(len(innovation)):
         square = innovation[i] ** 2
-        if variance[i] > 0.0 and square > gate * (s[i, i] + variance[i]):
-            s[i, i] = square / gate  # an outlier counts less
-        else:
-            s[i, i] += abs(variance[i])
+        if variance[i] > 0.0 and square > gate * (s[i, i] + noise[i]):
+            noise[i] = square / gate - s[i, i]  # an outlier counts less
+    s += np.diag(noise)
     gain = np.linalg.solve(s, ph.T.copy()).T
+    if held:
+        gain = gain.copy()
+        gain[ACCELEROMETER:] = 0.0
+        left = np.eye(SIZE) - gain @ h
+        P = left @ P @ left.T + (gain * noise) @ gain.T
+    else:
+        P = P - gain @ ph.T
     x += gain @ innovation
-    P = P - gain @ ph.T
     return 0.5 * (P + P.T)
 
 
@@ -235,8 +249,8 @@ def step(
     P = predict(x, P, b, n, mode, used, dt)
     judge(x, P, n, mode, rims, dt)
     h, innovation, variance = motion_rows(x, n, rims, inertial)
-    P = correct(x, P, h, innovation, variance, n.gate)
+    P = correct(x, P, h, innovation, variance, n.gate, n.slip_rate == 0.0)
     if len(forces):
         h, innovation, variance = force_rows(x, b, forces)
-        P = correct(x, P, h, innovation, variance, n.force_gate)
+        P = correct(x, P, h, innovation, variance, n.force_gate, False)
     return P
