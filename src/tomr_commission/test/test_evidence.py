@@ -21,7 +21,7 @@ def test_alarm_comes_where_evidence_passes_the_caution(faulty: Observed) -> None
     frames = frames_of(faulty, BandSettings())
     evidence = evidence_in(frames, SETTINGS)
     assert evidence.max() >= MOST_CAUTION
-    for caution in (4.0, 11.0, 20.0):
+    for caution in (8.0, 11.0, 20.0):
         alarms = decisions(frames, evolve(SETTINGS, caution=caution)).alarms
         first = faulty.seconds[np.argmax(evidence >= caution + SURE)]
         assert abs(alarms[0].begin - first) <= 0.1001
