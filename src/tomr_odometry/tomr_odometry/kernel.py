@@ -85,8 +85,17 @@ def predict(x: Array, P: Array, b: Body, n: Noise, mode: Array, used: Array, dt:
     mode: probabilities that the wheels slide, and whether one did a moment ago (1 to 0), (4,).
     used: how fast each wheel creeps per unit of the creep's coefficient [m/s], (3,).
     """
-    v, a = x[VX : WZ + 1].copy(), x[AX : AW + 1].copy()
     keep, half = math.exp(-dt / n.rate_time), 0.5 * dt * dt
+    # The twist's rate changes before it moves the robot: what the IMU measures between two encoder
+    # samples is what moved the robot between them. Otherwise its velocity lags, like creep.
+    P = P.copy()
+    x[AX : AW + 1] *= keep
+    P[AX : AW + 1] *= keep
+    P[:, AX : AW + 1] *= keep
+    P[AX, AX] += n.rate**2 * (1.0 - keep * keep)
+    P[AY, AY] += n.rate**2 * (1.0 - keep * keep)
+    P[AW, AW] += n.turn_rate**2 * (1.0 - keep * keep)
+    v, a = x[VX : WZ + 1].copy(), x[AX : AW + 1].copy()
     step = v * dt + a * half
     yaw = x[YAW] + 0.5 * step[2]
     c, s = math.cos(yaw), math.sin(yaw)
@@ -106,13 +115,11 @@ def predict(x: Array, P: Array, b: Body, n: Noise, mode: Array, used: Array, dt:
             f[RIM + i, CREEP] = used[i] * dt
         x[RIM + i] += b.rows[i] @ step + x[CREEP] * used[i] * dt
         f[VX + i, AX + i] = dt
-        f[AX + i, AX + i] = keep
         loose = 1.0 + n.doubt * mode[3]
         q[RIM + i] = (n.grip**2 + (n.grip_share * ground[i]) ** 2) * loose**2 * dt
         q[RIM + i] += mode[i] * (n.slide * dt) ** 2
         q[FRICTION + i] = n.walk_friction**2 * dt
         x[VX + i] += a[i] * dt
-        x[AX + i] *= keep
     x[X] += dx
     x[Y] += dy
     x[YAW] += step[2]
@@ -120,8 +127,6 @@ def predict(x: Array, P: Array, b: Body, n: Noise, mode: Array, used: Array, dt:
     lost = (n.way * travel) ** 2 + (n.slid * mode[3]) ** 2
     q[X] = q[Y] = lost * dt
     q[YAW] = ((n.turn * travel) ** 2 + (n.slid_yaw * mode[3]) ** 2) * dt
-    q[AX] = q[AY] = n.rate**2 * (1.0 - keep * keep)
-    q[AW] = n.turn_rate**2 * (1.0 - keep * keep)
     q[ACCELEROMETER] = q[ACCELEROMETER + 1] = n.walk_bias**2 * dt
     q[GYRO] = n.walk_gyro**2 * dt
     q[SLOPE] = q[SLOPE + 1] = n.walk_slope**2 * dt
