@@ -153,9 +153,7 @@ def test_two_seconds_after_a_bump_are_left_out() -> None:
 
 
 def test_states_are_scored_by_their_names_and_first_stamps() -> None:
-    names = [
-        scored_name(state) for state in (*STATES, NOT_OBSERVABLE, STALE, DISOBEYS, WAITING)
-    ]
+    names = [scored_name(state) for state in (*STATES, NOT_OBSERVABLE, STALE, DISOBEYS, WAITING)]
     assert names == [
         *("normal", "slip", "control_system"),
         *("motor_system_1", "motor_system_2", "motor_system_3", "not_observable", "stale"),
