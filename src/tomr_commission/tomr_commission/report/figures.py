@@ -31,6 +31,7 @@ def alarm_picture(found: Commissioned) -> str:
             color="#15803d",
         )
         panel.set_yscale("log")
+        panel.yaxis.set_major_formatter("{x:g}")
         panel.set_xlim(0.0, MOST_CAUTION + SURE + 2.0)
         panel.set_ylim(bottom=min(level.wanted, 0.01) / 10.0)
         panel.set_xlabel("evidence for a fault, decades")
@@ -63,6 +64,6 @@ def held_picture(found: Commissioned) -> str:
                 panel.plot(drive.seconds, ratio[:, channel], lw=0.6)
             panel.axhspan(-1.0, 1.0, color="#dcfce7", zorder=0)
             panel.set_ylim(-2.5, 2.5)
-            panel.set_ylabel(f"{kind}\nbands", fontsize=7)
+            panel.set_ylabel(kind.replace(", ", ",\n") + "\nbands", fontsize=6)
         panels[-1].set_xlabel("s")
         return png(drawing)
