@@ -89,6 +89,8 @@ _SLOW = """
 import signal, sys, threading, _thread, time, types
 from importlib import abc, machinery
 import os
+# A shell that starts tests in the background has SIGINT ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 class Slow(abc.MetaPathFinder, abc.Loader):
     def find_spec(self, name, path=None, target=None):
         return machinery.ModuleSpec(name, self) if name == "slow" else None

@@ -155,6 +155,8 @@ class FaultClassifier:
     def _weigh(self, opinion: Opinion, misfit: Misfit, stamp: int) -> None:
         """Name what the judge is sure of, or what it does not know."""
         leading = opinion.leading
+        if leading is PUSHED and (misfit.ignores_commands or not opinion.sure):
+            leading = STATES[NORMAL]  # a fault that begins may look like a push at first
         if leading in _WELL and misfit.unexplained:
             leading = UNKNOWN
         candidate = STATES[NORMAL] if leading in _WELL else leading
