@@ -79,7 +79,7 @@ def test_a_recording_is_shown_and_scrubbed(
 ) -> None:
     def drawn(time: float) -> bool:
         # Set when all has been drawn without an error.
-        shown = evaluate("document.body.dataset.t")
+        shown = evaluate("document.body?.dataset.t")
         return shown is not None and abs(float(shown) - time) < 0.11
 
     def text(name: str) -> str:
