@@ -63,7 +63,7 @@ class PowerPredictor:
         self._clock = TickClock(given.ticks)
         timing = CommandTiming(given.ticks.period, given.command_timeout, given.stale)
         self._path = CommandPath(robot, timing, is_compiled=is_compiled)
-        self._resting = RestingDrivers(robot.controller, WHEELS)
+        self._resting = RestingDrivers(robot.controller, WHEELS, robot.supply.nominal_voltage)
         self._encoders = EncoderWindow(
             given.encoder_window, given.ticks.period, given.stale, fastest_wheel(robot)
         )
