@@ -148,6 +148,15 @@ def test_a_dropout_of_a_second_is_no_fault_of_a_sensor() -> None:
     assert [name for _, name in changes(classified(frames))] == ["normal"]
 
 
+def test_bad_stamps_are_no_fault_of_a_sensor() -> None:
+    odd = f"{GAP}wheel_2/power: its stamps do not fit"
+    blind = [without(f, [MOTORS[1], ENCODERS[1]], odd) for f in ticks(2000, 9000)]
+    found = classified([*ticks(50, 2000), *blind])
+    assert [name for _, name in changes(found)] == ["normal"]
+    status = diagnosis_message(shipped_robot("reference"), found[-1], "").statuses[0]
+    assert "motor 2" in dict(status.values)["not_observable"]
+
+
 def test_a_fault_named_before_stays_while_its_sensor_is_dead() -> None:
     blind = [
         without(f, [MOTORS[1], ENCODERS[1]], "no fresh wheel_2/power") for f in ticks(4000, 9000)
