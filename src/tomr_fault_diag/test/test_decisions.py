@@ -16,12 +16,18 @@ from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import (
+    BURDENED,
     CONTROL,
+    DEGRADED,
+    DRAGGING,
     MOTOR,
     NORMAL,
     POWER_SENSOR,
+    PUSHED,
     SLIP,
     STATES,
+    STUCK,
+    UNKNOWN,
     State,
 )
 from tomr_fault_diag.classifier.window_network import WindowNetwork
@@ -242,7 +248,9 @@ def test_every_state_that_is_wrong_says_what_to_check_and_which_of_the_six_it_is
 class Fixed:
     """A judge that is sure of one wheel, whatever it sees."""
 
-    settings = ClassifierSettings()
+    def __init__(self, **settings: Any) -> None:
+        self.settings = ClassifierSettings(**settings)
+
     wheel = 0
 
     def clear(self) -> None: ...
@@ -284,3 +292,54 @@ def test_what_looks_like_a_blind_motors_fault_is_no_evidence_of_another() -> Non
     for t in range(5000, 9000, 50):
         opinion = judge.judge(frame(t), to_ns(0.05), Unseen())
     assert (int(opinion.probabilities.argmax()), opinion.wheel) == (CONTROL, 1)
+
+
+class Leading(Fixed):
+    """A judge to which one state leads."""
+
+    def __init__(self, state: State, sure: bool, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.state, self.sure = state, sure
+
+    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+        return Opinion(np.eye(6)[NORMAL], self.sure, state=self.state)
+
+
+def said(judge: Leading, frames: Sequence[ResidualFrame]) -> list[tuple[int, str]]:
+    """When the state changed, and to what."""
+    classifier = FaultClassifier(judge)
+    found = [classifier.classify(item) for item in frames]
+    return [((d.stamp_ns - BASE) // MS, d.state.name) for d in found if d is not None and d.changed]
+
+
+STANDING = {place: -abs(speed) for place, speed in zip(SPEEDS, TURNING, strict=True)}
+
+
+def test_a_push_is_said_only_where_it_is_striking() -> None:
+    assert said(Leading(PUSHED, sure=True), ticks(50, 500)) == [(50, "pushed")]
+    assert said(Leading(PUSHED, sure=False), ticks(50, 500)) == [(50, "normal")]
+
+
+def test_a_robot_that_ignores_its_commands_is_not_pushed() -> None:
+    frames = [*ticks(50, 500), *ticks(500, 1000, STANDING)]
+    assert said(Leading(PUSHED, sure=True), frames) == [
+        (50, "pushed"),
+        (500, "normal"),
+        (800, "does not follow its commands"),
+    ]
+
+
+@pytest.mark.parametrize("state", [UNKNOWN, BURDENED, *STUCK, *DRAGGING, *DEGRADED, *POWER_SENSOR])
+def test_every_state_is_held_raised_and_cleared_alike(state: State) -> None:
+    judge = Leading(state, sure=True, raise_time=to_ns(0.3), recovery_time=to_ns(0.6))
+    classifier, found = FaultClassifier(judge), []
+    for item in ticks(50, 3000):
+        at = (item.stamp_ns - BASE) // MS
+        judge.state = state if 1000 <= at < 2000 else STATES[NORMAL]
+        judge.sure = at != 1200  # a moment of doubt: the time counts anew
+        diagnosis = classifier.classify(item)
+        if diagnosis is not None and diagnosis.changed:
+            found.append((at, diagnosis.state.name))
+    # The states of a sensor are left at once: they accuse nobody who would have to recover.
+    cleared = 2000 if state in POWER_SENSOR else 2600
+    assert found == [(50, "normal"), (1550, state.name), (cleared, "normal")]
