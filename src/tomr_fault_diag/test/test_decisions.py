@@ -356,6 +356,17 @@ def test_which_fault_of_a_motor_it_is_may_be_settled_while_its_time_passes() -> 
     assert found[1:] == [(550, "motor system fault 2"), (1500, "stuck wheel 3")]
 
 
+def test_what_ails_a_motor_may_turn_out_at_once_after_it_was_named() -> None:
+    judge = Leading(DRAGGING[1], sure=True)
+    classifier = FaultClassifier(judge)
+    classifier.classify(frame(50))
+    judge.state, judge.afresh = STATES[MOTOR + 1], False
+    diagnosis = classifier.classify(frame(100))
+    assert diagnosis is not None
+    assert diagnosis.state is STATES[MOTOR + 1]
+    assert diagnosis.since_ns == BASE + 50 * MS
+
+
 @pytest.mark.parametrize(
     ("lasts", "afresh", "named"),
     [(350, True, None), (1000, True, 1400), (1000, False, None)],
