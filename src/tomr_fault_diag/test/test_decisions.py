@@ -386,3 +386,11 @@ def test_a_window_that_holds_the_end_of_a_fault_names_no_other(
             found[diagnosis.state.name] = at
     assert found.get("motor system fault 1") == named
     assert found["normal"] == 1000 + lasts + 1000
+
+
+def test_without_enough_data_no_robot_is_said_to_ignore_its_commands() -> None:
+    """Its wheels stand when the encoders come back; half of the last second must be known."""
+    gap = [without(f, [*SPEEDS, *ENCODERS], f"{GAP}joint_states") for f in ticks(2000, 2800)]
+    frames = [*ticks(50, 2000), *gap, *ticks(2800, 4000, STANDING)]
+    found = said(Leading(STATES[NORMAL], sure=True), frames)
+    assert found[-2:] == [(2500, "not enough data"), (3250, "does not follow its commands")]
