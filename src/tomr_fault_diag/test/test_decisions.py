@@ -33,6 +33,7 @@ from tomr_fault_diag.classifier.states import (
 from tomr_fault_diag.classifier.window_network import WindowNetwork
 from tomr_fault_diag.residuals.frame import (
     ENCODERS,
+    FROZEN,
     GAP,
     MOTORS,
     NO_COMMAND,
@@ -133,15 +134,19 @@ def test_a_released_fault_that_is_still_there_is_named_anew() -> None:
     assert diagnosis.state.name == FAULT
 
 
-def test_no_motor_is_accused_without_data_of_its_own() -> None:
+@pytest.mark.parametrize(
+    ("missing", "ails"),
+    [("no fresh wheel_2/power", "dead"), (f"wheel_2/power{FROZEN}", "frozen")],
+)
+def test_no_motor_is_accused_without_data_of_its_own(missing: str, ails: str) -> None:
     drive = [*FAULTY, *ticks(4000, 5000, LOST)]
-    blind = [without(f, [MOTORS[1], ENCODERS[1]], "no fresh wheel_2/power") for f in drive]
+    blind = [without(f, [MOTORS[1], ENCODERS[1]], missing) for f in drive]
     found = classified(blind)
     assert FAULT not in {d.state.name for d in found}
     (last,) = [d for d in found if d.state is POWER_SENSOR[1]][-1:]
     status = diagnosis_message(shipped_robot("reference"), last, "").statuses[0]
-    assert "not observable: motor 2 (power sensor dead)" in status.message
-    assert "motor 2 (power sensor dead)" in dict(status.values)["not_observable"]
+    assert f"not observable: motor 2 (power sensor {ails})" in status.message
+    assert f"motor 2 (power sensor {ails})" in dict(status.values)["not_observable"]
 
 
 def test_a_dropout_of_a_second_is_no_fault_of_a_sensor() -> None:
