@@ -11,6 +11,7 @@ from tomr_power_model.recordings import open_recording
 ROOT = Path(__file__).resolve().parents[2]
 HEALTHY, FAULTY = ROOT / "bags" / "square", ROOT / "bags" / "circle_encoder_lost"
 FAULT = "motor system fault 3"  # in the faulty one
+POWER = {f"/wheel_{number}/power": f"power sensor fault {number}" for number in (1, 2, 3)}
 
 
 @frozen

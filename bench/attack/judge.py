@@ -17,6 +17,7 @@ from typing import Any
 from attrs import frozen
 
 from attack.case import Attack
+from tomr_fault_diag.classifier.states import FAULTLESS, UNKNOWN
 from tomr_power_model.errors import InputError
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import load_robot
@@ -68,7 +69,7 @@ def run(make: Callable[[], Attack], folder: Path) -> tuple[Attack | None, Outcom
     errors = (folder / "stderr").read_text("utf-8", "replace")
     output = (folder / "stdout").read_text("utf-8", "replace")
     memory = int(usage.ru_maxrss)
-    problem = "hang" if hung else _problem(given, code, errors, output)
+    problem = "hang" if hung else problem_of(given, code, errors, output)
     if not problem and memory > MOST_MEMORY:
         problem = "memory"
     return given, Outcome(code, seconds, memory, problem, errors.strip().rpartition("\n")[2][:300])
@@ -118,7 +119,8 @@ def _be_the_command(given: Attack, folder: Path) -> None:
         os._exit(code & 0xFF)
 
 
-def _problem(given: Attack, code: int, errors: str, output: str) -> str:
+def problem_of(given: Attack, code: int, errors: str, output: str) -> str:
+    """What is wrong with how a try ended, empty if nothing."""
     # A full disk takes what is said as well.
     if "Traceback" in errors or code in (70, _MADE):
         return "traceback"
@@ -179,8 +181,5 @@ def _false_word(given: Attack, code: int, output: str) -> str:
         return "silence"
     if given.names is None or code == 0:
         return ""
-    # "power sensor fault" says that its data are no good, and so they are.
-    said = {name for name in found["shares"] if not name.startswith("power sensor")}
-    named = {name for name in said if "fault" in name or "slip" in name}
-    wrong = named - given.names
+    wrong = found["shares"].keys() - FAULTLESS - {UNKNOWN.name} - given.names
     return f"false word: {', '.join(sorted(wrong))}" if wrong else ""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from attrs import evolve
 
-from attack.case import HEALTHY, Attack, Base, Raw, attack, reading
+from attack.case import HEALTHY, POWER, Attack, Base, Raw, attack, reading
 from tomr_power_model.messages.bag import jazzy_typestore
 from tomr_power_model.recordings import RecordingWriter, open_recording
 
@@ -210,7 +210,19 @@ def odd_stamps(dice: random.Random, folder: Path, base: Base) -> Attack:
 
     bag = write(folder / "bag", [made(raw) for raw in raws])
     tool, arguments = reading(dice, bag)
-    return Attack(tool, arguments, f"{kind} by {by / SECOND:g} s on {len(chosen)} topics", names)
+    where = next(iter(chosen)) if len(chosen) == 1 else "all topics"
+    what = f"{kind} by {by / SECOND:g} s on {where}{', received so' * also_received}"
+    known = _known_of_stamps(kind, chosen, names) if also_received else names
+    return Attack(tool, arguments, what, known)
+
+
+def _known_of_stamps(kind: str, chosen: set[str], names: frozenset[str]) -> frozenset[str] | None:
+    """Faults that may be named where messages are received as they are stamped."""
+    if kind in ("reverse", "shuffle"):
+        return None  # a well-formed recording of another motion
+    if kind == "jump" and len(chosen) == 1:  # nothing comes of that topic while the others go on
+        return names | {POWER[topic] for topic in chosen if topic in POWER}
+    return names
 
 
 @attack("gaps and losses")
@@ -237,6 +249,8 @@ def missing(dice: random.Random, folder: Path, base: Base) -> Attack:
     bag = write(folder / "bag", [raw for raw in raws if not lost(raw)])
     tool, arguments = reading(dice, bag)
     what = f"{kind} of {length / SECOND:g} s, {share:.0%} on {len(chosen)} topics"
+    if kind in ("late", "all"):
+        names |= {POWER[topic] for topic in chosen if topic in POWER}
     return Attack(tool, arguments, what, names)
 
 

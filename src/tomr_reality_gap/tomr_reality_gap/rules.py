@@ -20,6 +20,9 @@ _MUCH = 0.3  # of the mismatch left: what was named is not the whole story
 _GROSS = 10.0  # times the noise: no match, even if nothing is named; slow noise reaches 1
 _SURE = 0.97
 DOUBTED = 0.45  # confidence of a finding that leaves much at most
+# Fixed, and no posterior: the evidence leaves no doubt that something is there (e^-20 at least, as
+# odds are tempered), but how likely it is that no name fits it cannot be had from the names.
+NAMELESS = 0.9
 
 
 @frozen

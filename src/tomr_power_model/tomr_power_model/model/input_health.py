@@ -27,6 +27,8 @@ class InputState:
         """How it does at a tick."""
         flow, last = self.flow, self.flow.last(tick_ns)
         age = tick_ns - last
+        if flow.is_misplaced(tick_ns):
+            return Level.WARN, "its stamps do not fit"
         if flow.refused_since >= _MANY:
             return Level.WARN, "sends what cannot be used"
         if not last:
