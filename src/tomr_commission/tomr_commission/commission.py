@@ -27,7 +27,7 @@ from tomr_commission.parallel import on_all_cores
 from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse
 from tomr_commission.request import CommissionRequest
 from tomr_commission.simulated import try_simulated
-from tomr_commission.store import Store, digest, fingerprint, write_atomically
+from tomr_commission.store import Store, digest, fingerprint
 from tomr_commission.suspects import check_values, check_wheels
 from tomr_commission.trials import Floor, Trial, floors_of
 from tomr_commission.verdict import Outcome, Reason, reasons
@@ -39,7 +39,9 @@ from tomr_power_model.drive.cut import names_of
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
+from tomr_power_model.files.write import make_folder, write_together
 from tomr_power_model.robot import load_robot, read_description, read_node_sections
+from tomr_reality_gap.report.write import write_report
 
 Progress = Callable[[str, float], None]
 
@@ -176,9 +178,9 @@ class _Work:
 
         key = digest([self.key, repr(request.tolerance)])
         found = self.store.values("explained", key, make)
-        (request.out / FOLDER / EXPLAINED).unlink(missing_ok=True)  # of an earlier run
-        for name, text in found["files"].items():
-            write_atomically(request.out / FOLDER / name, text)
+        folder = request.out / FOLDER
+        make_folder(folder)
+        write_report(folder, found["files"])
         return found
 
     def description(self, explained: Any) -> Path | None:
@@ -365,8 +367,6 @@ def _text(
 def write_results(found: Commissioned, texts: dict[str, str]) -> list[Path]:
     """Write commissioned.yaml and the reports; returns what was written."""
     folder = found.request.out
-    written = []
-    for name, text in {FILE: found.text, **texts}.items():
-        write_atomically(folder / name, text)
-        written.append(folder / name)
-    return written
+    written = {folder / name: text for name, text in {FILE: found.text, **texts}.items()}
+    write_together(written)
+    return list(written)
