@@ -231,6 +231,16 @@ def test_a_force_is_a_push_first_and_a_load_when_it_lasts() -> None:
     assert belief.shares[NORMAL] > 0.99
 
 
+def test_a_push_is_no_load_either_where_a_fault_was_believed() -> None:
+    belief = Belief(0.5, 11.0)
+    for _ in range(20):
+        belief.update(_against_all_but(WEAKS.start, 20.0))
+    for _ in range(8):
+        belief.update(_against_all_but(EXTERNAL, 20.0))
+    assert belief.shares[EXTERNAL] > 0.99
+    assert belief.shares[LOADED] < 1e-6
+
+
 def test_what_looks_like_another_fault_every_moment_is_none_that_is_known() -> None:
     belief = Belief(0.4, 11.0)
     for k in range(30):

@@ -98,6 +98,7 @@ def _transitions(onset: float) -> Array:
     """P(j -> k), (20, 20)."""
     onset = min(onset, _PUSH)  # a fault, slip as well, is no likelier than a push
     moves = np.full((_STATES, _STATES), _OTHER)
+    moves[:, LOADED] *= onset / _PUSH  # as rare beside a push as it is without a fault
     moves[:, NORMAL] = _ENDING
     moves[SLIP, NORMAL] = _SLIP_ENDING
     moves[[NORMAL, EXTERNAL]] = onset
