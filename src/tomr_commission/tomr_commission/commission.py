@@ -46,7 +46,6 @@ from tomr_reality_gap.report.write import write_report
 Progress = Callable[[str, float], None]
 
 STEPS = "steps"
-_BLOCK_TICKS = 200
 _CURRENTS = "neither shoves nor faults were simulated: the robot tells currents, not powers"
 _HOPELESS = 1.5  # times the caution that may be needed: more shoves will not bring it down
 
@@ -244,7 +243,7 @@ class _Work:
         while True:
             self.progress("simulating healthy hours", share)
             bands = bands_of(fitted, choice)
-            evidence = _real_peaks(fitted, bands, settings)
+            evidence = _real_peaks(fitted, bands, settings, self.request.alarm.block)
             wider = choice.wider * choice.margin
             # A few shoves tell where many are not worth while.
             for asked, most in (
@@ -324,11 +323,12 @@ class _Real:
 
 
 def _real_peaks(
-    fitted: Sequence[Observed], bands: BandSettings, settings: ClassifierSettings
+    fitted: Sequence[Observed], bands: BandSettings, settings: ClassifierSettings, block: float
 ) -> _Real:
     peaks: list[float] = []
     for drive in fitted:
-        peaks += block_peaks(evidence_in(frames_of(drive, bands), settings), _BLOCK_TICKS)
+        evidence = evidence_in(frames_of(drive, bands), settings)
+        peaks += block_peaks(evidence, drive.seconds, block)
     return _Real(tuple(peaks), sum(drive.hours for drive in fitted))
 
 
