@@ -17,7 +17,6 @@ from tomr_commission.commissioned import (
     Record,
     base_sections,
     commissioned_text,
-    suite_version,
 )
 from tomr_commission.evidence import decisions, evidence_in
 from tomr_commission.explained import EXPLAINED, FOLDER, Split, explain_drives
@@ -40,7 +39,12 @@ from tomr_power_model.drive.read import read_drive
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
 from tomr_power_model.files.write import make_folder, write_together
-from tomr_power_model.robot import load_robot, read_description, read_node_sections
+from tomr_power_model.robot import (
+    load_robot,
+    read_description,
+    read_node_sections,
+    suite_version,
+)
 from tomr_reality_gap.report.write import write_report
 
 Progress = Callable[[str, float], None]
@@ -305,7 +309,7 @@ class _Work:
     def _parts(self, source: str, settings: ClassifierSettings) -> tuple[object, ...]:
         """What everything simulated hangs on, weights of the classifier included."""
         described = sorted(read_description(source).items())
-        return self.key, described, settings, stamp_of("", settings)
+        return self.key, described, settings, stamp_of("", settings, load_robot(source))
 
 
 def _observe(job: tuple[Path, str, str]) -> Observed:
@@ -358,7 +362,9 @@ def _text(
         level=outcome.level,
         floors={floor.kind: floor.words for floor in floors},
         verdict="no-go" if against else "go",
-        stamp="" if against else stamp_of(date, work.classifier(described)),
+        stamp=""
+        if against
+        else stamp_of(date, work.classifier(described), load_robot(work.source(described))),
     )
     sections = base_sections(request.robot, described)
     return commissioned_text(sections, outcome.bands, record, Path(request.robot).name)
