@@ -20,7 +20,7 @@ from tomr_commission.commissioned import (
 )
 from tomr_commission.evidence import decisions, evidence_in
 from tomr_commission.explained import EXPLAINED, FOLDER, Split, explain_drives
-from tomr_commission.injected import try_injected
+from tomr_commission.injected import kinds_for, try_injected
 from tomr_commission.observed import Observed, frames_of, observe, tells_currents
 from tomr_commission.parallel import on_all_cores
 from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse
@@ -50,7 +50,10 @@ from tomr_reality_gap.report.write import write_report
 Progress = Callable[[str, float], None]
 
 STEPS = "steps"
-_CURRENTS = "neither shoves nor faults were simulated: the robot tells currents, not powers"
+_CURRENTS = (
+    "neither shoves nor faults were simulated: the robot tells currents, not powers; so the alarm "
+    "level is the shipped one at least, and how many false alarms shoves raise is not known"
+)
 _HOPELESS = 1.5  # times the caution that may be needed: more shoves will not bring it down
 
 
@@ -99,13 +102,14 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     described = work.description(explained)
     drives = work.observed(described)
     fitted, held = work.divided(drives)
-    classifier, plan = work.classifier(described), Rehearsal()
+    silent = set.intersection(*(set(drive.silent) for drive in fitted))
+    classifier, plan = work.classifier(described), Rehearsal(silent=tuple(sorted(silent)))
     tuned = work.tuned(described, fitted, classifier, plan)
     bands, level = tuned.bands, tuned.level
     chosen = evolve(classifier, caution=level.caution)
     progress("validating", 0.85)
     said = [decisions(frames_of(drive, bands), chosen) for drive in (*fitted, held)]
-    trials = try_injected(held, bands, chosen)
+    trials = try_injected(held, bands, chosen, kinds_for(held))
     notes = [note for drive in work.drives for note in drive.notes]
     if tells_currents(held):
         notes.append(_CURRENTS)
@@ -343,7 +347,9 @@ def _level(request: CommissionRequest, real: _Real, shoved: Shoved, plan: Rehear
         Tail.of("simulated shoves", shoved.peaks, plan.shoves_per_hour, request.alarm),
     )
     shipped = ClassifierSettings().caution
-    return alarm_level(tails, request.false_alarms_per_hour, shipped, request.alarm)
+    # Some minutes of driving alone are no reason to be less careful.
+    alarm = request.alarm if shoved.peaks else evolve(request.alarm, below_shipped=0.0)
+    return alarm_level(tails, request.false_alarms_per_hour, shipped, alarm)
 
 
 def _text(
