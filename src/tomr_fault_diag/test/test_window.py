@@ -172,14 +172,34 @@ def _against_all_but(hypothesis: int, size: float) -> np.ndarray:
 
 
 def test_belief_by_hand() -> None:
-    """One window that says e^-10 of everything but slip, at half weight: odds of 10^-6 e^5."""
-    belief = Belief(0.5, 6.0)
+    """One window that says e^-10 of everything but slip, at half weight: odds of 10^-9 e^5."""
+    belief = Belief(0.5, 9.0)
     shares = belief.update(_against_all_but(SLIP, 10.0))
-    # Slip of 10^-1, seven faults of 10^-6, nine of 10^-10, one of 10^-8, and a push of 10^-3.
-    odds = 0.1 * np.exp(5.0) / (1.0 - 0.1 - 7e-6 - 9e-10 - 1e-8 - 1e-3)
+    # Slip of 10^-4, seven faults of 10^-9, nine of 10^-13, one of 10^-11, and a push of 10^-3.
+    odds = 1e-4 * np.exp(5.0) / (1.0 - 1e-4 - 7e-9 - 9e-13 - 1e-11 - 1e-3)
     assert shares[SLIP] / shares[NORMAL] == pytest.approx(odds, rel=1e-6)
     assert named_of(shares).sum() == pytest.approx(1.0)
     assert len(named_of(shares)) == len(NAMED)
+
+
+@pytest.mark.parametrize("caution", [0.0, 2.0, 4.0, 5.0, 11.0, 30.0])
+def test_without_evidence_a_robot_is_well_whatever_the_caution(caution: float) -> None:
+    belief = Belief(0.5, caution)
+    for _ in range(10):
+        shares = belief.update(np.zeros(len(STATE_OF)))
+    assert (shares > 0.0).all()
+    assert shares.sum() == pytest.approx(1.0)
+    assert shares[NORMAL] > 0.8
+
+
+@pytest.mark.parametrize("state", [SLIP, ENCODERS.start, DRAGS.start, METERS.start, OTHER])
+def test_a_decade_of_caution_is_a_decade_of_odds_for_every_fault(state: int) -> None:
+    odds = []
+    for caution in (10.0, 20.0, 30.0):
+        belief = Belief(0.5, caution)
+        belief.update(_against_all_but(state, 10.0))
+        odds.append(np.log10(belief.shares[state] / belief.shares[NORMAL]))
+    assert np.diff(odds) == pytest.approx([-10.0, -10.0], abs=0.01)
 
 
 def test_probabilities_stand_beside_their_states() -> None:
@@ -209,6 +229,16 @@ def test_a_force_is_a_push_first_and_a_load_when_it_lasts() -> None:
     for _ in range(10):
         belief.update(_against_all_but(NORMAL, 20.0))
     assert belief.shares[NORMAL] > 0.99
+
+
+def test_a_push_is_no_load_either_where_a_fault_was_believed() -> None:
+    belief = Belief(0.5, 11.0)
+    for _ in range(20):
+        belief.update(_against_all_but(WEAKS.start, 20.0))
+    for _ in range(8):
+        belief.update(_against_all_but(EXTERNAL, 20.0))
+    assert belief.shares[EXTERNAL] > 0.99
+    assert belief.shares[LOADED] < 1e-6
 
 
 def test_what_looks_like_another_fault_every_moment_is_none_that_is_known() -> None:
@@ -291,6 +321,41 @@ def test_a_fault_that_is_surely_of_one_motor_is_named_though_its_cause_is_not() 
     assert opinion.probabilities.max() < 0.6
     assert opinion.sure
     assert opinion.leading in (DRAGGING[0], DEGRADED[0])
+
+
+@pytest.mark.parametrize("state", [ENCODERS.start, DRAGS.start, WEAKS.start, METERS.start, SLIP])
+def test_evidence_says_how_much_caution_a_fault_overcomes(state: int) -> None:
+    """Half a decade in each tick: a judge of any caution is sure where its evidence says so."""
+    network = Saying()
+    network.likelihoods[state] = 2.5 + (state not in (SLIP, ENCODERS.start))
+    settings = ClassifierSettings(striking=0.0)
+
+    def judge(caution: float) -> WindowJudge:
+        return WindowJudge(network, evolve(settings, caution=caution))  # type: ignore[arg-type]
+
+    def first(said: Sequence[bool]) -> int:
+        return said.index(True)
+
+    witness, evidence, cautions = judge(30.0), [], (9.0, 14.0, 20.0)
+    others, sure = [judge(caution) for caution in cautions], []
+    for tick in range(80):
+        witness.judge(frame(tick), 50 * MS, Unseen())
+        evidence.append(witness.evidence())
+        said = [other.judge(frame(tick), 50 * MS, Unseen()) for other in others]
+        sure.append([one.sure and one.leading is STATE_OF[state] for one in said])
+    for k, caution in enumerate(cautions):
+        named = first([row[k] for row in sure])
+        assert abs(named - first([decades > caution + 2.0 for decades in evidence])) <= 1
+
+
+def test_what_may_be_either_of_two_faults_is_evidence_of_neither() -> None:
+    network = Saying()
+    judge = WindowJudge(network, ClassifierSettings(caution=30.0))  # type: ignore[arg-type]
+    network.likelihoods[:] = -30.0
+    network.likelihoods[[ENCODERS.start, ENCODERS.start + 1]] = 0.0
+    for tick in range(40):
+        judge.judge(frame(tick), 50 * MS, Unseen())
+    assert judge.evidence() == 0.0
 
 
 def test_a_push_is_said_and_accuses_nobody() -> None:
