@@ -302,10 +302,10 @@ class Leading(Fixed):
 
     def __init__(self, state: State, sure: bool, **settings: Any) -> None:
         super().__init__(**settings)
-        self.state, self.sure, self.afresh = state, sure, True
+        self.state, self.sure = state, sure
 
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
-        return Opinion(np.eye(6)[NORMAL], self.sure, None, self.state, self.afresh)
+        return Opinion(np.eye(6)[NORMAL], self.sure, state=self.state)
 
 
 def said(judge: Leading, frames: Sequence[ResidualFrame]) -> list[tuple[int, str]]:
@@ -365,32 +365,11 @@ def test_what_ails_a_motor_may_turn_out_at_once_after_it_was_named() -> None:
     judge = Leading(DRAGGING[1], sure=True)
     classifier = FaultClassifier(judge)
     classifier.classify(frame(50))
-    judge.state, judge.afresh = STATES[MOTOR + 1], False
+    judge.state = STATES[MOTOR + 1]
     diagnosis = classifier.classify(frame(100))
     assert diagnosis is not None
     assert diagnosis.state is STATES[MOTOR + 1]
     assert diagnosis.since_ns == BASE + 50 * MS
-
-
-@pytest.mark.parametrize(
-    ("lasts", "afresh", "named"),
-    [(350, True, None), (1000, True, 1400), (1000, False, None)],
-)
-def test_a_window_that_holds_the_end_of_a_fault_names_no_other(
-    lasts: int, afresh: bool, named: int | None
-) -> None:
-    judge = Leading(STATES[CONTROL], sure=True)
-    classifier, found = FaultClassifier(judge), {}
-    for item in ticks(50, 4000):
-        at = (item.stamp_ns - BASE) // MS
-        is_other = 1000 <= at < 1000 + lasts
-        judge.state = STATES[CONTROL if at < 1000 else MOTOR if is_other else NORMAL]
-        judge.afresh = afresh or not is_other
-        diagnosis = classifier.classify(item)
-        if diagnosis is not None and diagnosis.changed:
-            found[diagnosis.state.name] = at
-    assert found.get("motor system fault 1") == named
-    assert found["normal"] == 1000 + lasts + 1000
 
 
 def test_without_enough_data_no_robot_is_said_to_ignore_its_commands() -> None:

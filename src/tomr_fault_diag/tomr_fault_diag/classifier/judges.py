@@ -52,7 +52,6 @@ Array = NDArray[np.float64]
 _SURE = 0.99
 _STRIKING_TICKS = 10  # in which one window must have been so
 _TICK = to_ns(0.05)
-WINDOW_TIME = WINDOW * _TICK
 _TOO_LONG = to_ns(0.5)  # between two frames that belong to one window
 _STAYS = 0.1  # of the share of a likelier fault of the same kind
 _STANDING = 6  # ticks
@@ -81,14 +80,13 @@ class Opinion:
     """Probabilities of NAMED, or of as many as a judge knows, and what leads.
 
     `sure`: whether to name it; `wheel`: that it concerns, if it has one; `state`: what leads, where
-    that is not just the likeliest; `afresh`: that the newest window alone speaks for it.
+    that is not just the likeliest.
     """
 
     probabilities: Array
     sure: bool
     wheel: int | None = None
     state: State | None = None
-    afresh: bool = True
 
     @property
     def leading(self) -> State:
@@ -183,8 +181,7 @@ class WindowJudge:
         if state in DRAGGING and _stands(self._window, best - DRAGS.start):
             state = STUCK[best - DRAGS.start]
         sure = bool(shares[group].sum() > _SURE) and self._is_striking(best)
-        afresh = bool(self._recent[-1][best] > self.settings.striking)
-        return Opinion(named_of(shares), sure, wheel, state, afresh)
+        return Opinion(named_of(shares), sure, wheel, state)
 
     def evidence(self) -> float:
         """Log odds of the likeliest fault against none, without the prior [decades].

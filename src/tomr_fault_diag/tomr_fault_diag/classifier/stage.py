@@ -2,7 +2,7 @@
 
 from attrs import evolve, field, frozen
 
-from tomr_fault_diag.classifier.judges import WINDOW_TIME, Judge, Opinion
+from tomr_fault_diag.classifier.judges import Judge, Opinion
 from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
 from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
@@ -170,18 +170,10 @@ class FaultClassifier:
                 self._enter(UNKNOWN, stamp, None)
         elif leading in _WELL or ((misfit.ignores_commands or is_blind) and self._state in _QUIET):
             self._settle(stamp, leading)
-        elif held and not is_blind and self._may_follow(leading, opinion, stamp):
+        elif held and not is_blind and (leading != self._state or opinion.wheel != self._wheel):
             self._enter(leading, self._candidate_since, opinion.wheel)
         elif self._state is None:
             self._enter(STALE, stamp, None)
-
-    def _may_follow(self, leading: State, opinion: Opinion, stamp: int) -> bool:
-        """Whether what leads is news, and not a window that holds the end of another fault."""
-        if leading == self._state and opinion.wheel == self._wheel:
-            return False
-        if self._state in _QUIET or self._state == UNKNOWN or _is_one_fault(leading, self._state):
-            return True
-        return opinion.afresh and stamp - self._candidate_since >= WINDOW_TIME
 
     def _is_held(self, sure: bool, stamp: int) -> bool:
         """Whether the judge has been sure of what leads for `raise_time`."""
@@ -225,11 +217,9 @@ class FaultClassifier:
             self._state, self._since = state, since
 
 
-def _is_one_fault(state: State, other: State | None) -> bool:
+def _is_one_fault(state: State, other: State) -> bool:
     """Whether two states are the same, or tell what ails one and the same motor."""
-    if other is None or state.paper is None:
-        return state == other
-    return state.paper == other.paper
+    return state == other or (state.paper is not None and state.paper == other.paper)
 
 
 def _is_waiting(frame: ResidualFrame) -> bool:
