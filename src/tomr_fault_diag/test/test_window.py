@@ -442,7 +442,45 @@ def test_what_a_motion_cannot_show() -> None:
 
 def test_a_wheel_that_moves_without_being_told_is_not_idle() -> None:
     found = run([frame(t, IDLE, speed=(2.0, 0.0, 0.0)) for t in range(60)])
-    assert 0 not in found[-1].unseen.wheels
+    assert found[-1].unseen.wheels == ()
+    assert found[-1].unseen.moved == (0,)
+    found = run([frame(t, ALL, speed=(2.0, 0.0, 0.0)) for t in range(60)])
+    assert found[-1].unseen.moved == ()
+
+
+@pytest.mark.parametrize("kind", [CONTROLS, ENCODERS, DRAGS, WEAKS])
+def test_who_turns_a_wheel_that_should_stand_is_no_fault_of_its_motor(kind: slice) -> None:
+    network = Saying()
+    network.likelihoods[:] = -30.0
+    network.likelihoods[[NORMAL, kind.start + 1, kind.start + 2]] = -20.0, 0.0, -0.5
+
+    def leading(unseen: Unseen) -> Opinion:
+        judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]
+        for tick in range(20):
+            opinion = judge.judge(frame(tick), 50 * MS, unseen)
+        return opinion
+
+    assert leading(Unseen()).wheel == 1
+    assert leading(Unseen(moved=(1,))).wheel == 2
+
+
+def test_a_robot_that_stands_says_the_same_again_and_again() -> None:
+    """Only what strikes counts there; slight evidence for a fault, or against it, does not."""
+    settings = ClassifierSettings()
+
+    def share(size: float, state: int, unseen: Unseen) -> float:
+        network = Saying()
+        judge = WindowJudge(network, settings)  # type: ignore[arg-type]
+        network.likelihoods[state] = size
+        for tick in range(200):
+            opinion = judge.judge(frame(tick), 50 * MS, unseen)
+        return float(opinion.probabilities[0])
+
+    still = Unseen((0, 1, 2), slip=True)
+    slight, striking = settings.striking - 0.5, settings.striking + 0.5
+    assert share(slight, ENCODERS.start, Unseen()) < 0.01
+    assert share(slight, ENCODERS.start, still) > 0.99
+    assert share(striking, ENCODERS.start, still) < 0.01
 
 
 def test_robots_that_lack_a_sensor_look_as_modelled_there() -> None:

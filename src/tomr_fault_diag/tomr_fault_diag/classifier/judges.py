@@ -167,6 +167,11 @@ class WindowJudge:
         for idle in unseen.wheels:  # what an idle wheel hides it cannot refute either
             faults = [kind.start + idle for kind in _HIDDEN]
             likelihoods[faults] = np.maximum(likelihoods[faults], likelihoods[NORMAL])
+        for moved in unseen.moved:  # no fault turns a wheel that stands: somebody pushes
+            likelihoods[[kind.start + moved for kind in _HIDDEN]] = likelihoods[NORMAL]
+        if unseen.everything:  # a robot that stands says the same again and again
+            slight = likelihoods - likelihoods[NORMAL] < self.settings.striking
+            likelihoods[slight] = likelihoods[NORMAL]
         for kind in _CREEPING:
             over = likelihoods[kind] - likelihoods[NORMAL]
             plain = np.sign(over) * np.maximum(np.abs(over) - _SLIGHT, 0.0)

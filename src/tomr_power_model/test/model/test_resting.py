@@ -91,3 +91,13 @@ def test_sums_that_had_nothing_in_common_have_when_the_wheel_turns_as_expected(
     drivers.voltages(path, (0.1, 0.0, 0.0), (1.5, 0.0, 0.0), 1.0)
     drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0)
     assert path.wheel(at.INTEGRAL)[0] < 0.0
+
+
+def test_a_simulated_wheel_that_creeps_takes_over_nothing(path: CommandPath) -> None:
+    assert path.state is not None
+    path.state[at.STATE_HEADER + at.SPEED] = 0.1  # asked to stand
+    assert _sum_after(path, 0.1, 0.0) == 0.0
+
+
+def test_an_angle_that_is_not_known_leaves_the_simulation_alone(path: CommandPath) -> None:
+    assert _sum_after(path, math.nan, 0.0) == 0.0

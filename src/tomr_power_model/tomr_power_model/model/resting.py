@@ -9,10 +9,11 @@ for simulation and driver are asked for the same, and both sum up. What a start 
 saturation left different fades while the wheel turns: there motion and simulation tell the sum.
 
 What a push leaves in a driver's sum stays while friction holds the wheel, seconds long, and what
-is expected of the wheel then would be wrong. So while a wheel is slow, in the simulation and as
-measured, the simulation's sum follows the driver's. Elsewhere it must not: what a faulty wheel
-does would be expected of it. No push makes a difference as large as an encoder that reads
-standstill: from such a one on the sums have nothing in common until the wheel turns as expected.
+is expected of the wheel then would be wrong. So while a wheel stands that in the simulation stands
+too, or turns slowly and no faster than it is asked to, the simulation's sum follows the driver's.
+Elsewhere it must not: what a faulty wheel does would be expected of it. No push makes a difference
+as large as an encoder that reads standstill: from such a one on the sums have nothing in common
+until the wheel turns as expected.
 """
 
 from collections.abc import Sequence
@@ -24,8 +25,9 @@ from tomr_power_model.robot import Controller
 _UNKNOWN = float("nan")
 MOVING = 1.0  # rad/s
 FADES = 0.01  # share of the difference in a tick in motion
+STANDS = 0.05  # rad/s
 SLOW = 0.5  # rad/s
-FOLLOWS = 0.2  # share of the difference in a tick
+FOLLOWS = 0.5  # share of the difference in a tick
 PUSHED = 0.25  # most that a push leaves, as a share of the supply's voltage
 
 
@@ -77,6 +79,7 @@ class RestingDrivers:
     ) -> list[float]:
         """What each driver's sum is over the simulation's [rad], NaN where not known."""
         turned, simulated = path.wheel(at.TURNED), path.wheel(at.SPEED)
+        asked = path.wheel(at.ASKED)
         found = []
         for wheel in range(self._wheels):
             ahead = turned[wheel] - angle[wheel]
@@ -90,8 +93,9 @@ class RestingDrivers:
                 self._strange[wheel] = True
             elif abs(speed[wheel]) > MOVING:
                 self._strange[wheel] = False
-            slow = max(abs(speed[wheel]), abs(simulated[wheel])) < SLOW
-            if slow and apart == apart and not self._strange[wheel]:
+            is_slow = abs(simulated[wheel]) < min(SLOW, abs(asked[wheel]) + STANDS)
+            stands = is_slow and abs(speed[wheel]) < STANDS
+            if stands and apart == apart and not self._strange[wheel]:
                 path.add_to_sum(wheel, FOLLOWS * apart)
                 self._offset[wheel] -= FOLLOWS * apart
         return found
