@@ -1,7 +1,7 @@
 """A picture of a drive: its path by wheels, as estimated and true; slip over time."""
 
 from collections.abc import Sequence
-from pathlib import Path
+from io import BytesIO
 
 import numpy as np
 
@@ -17,9 +17,9 @@ _WITHIN_95 = 5.991
 
 
 def draw(
-    file: Path, robot: Robot, items: Sequence[Estimate], wheels: Path2D, reference: Path2D | None
-) -> None:
-    """Write the picture as PNG."""
+    robot: Robot, items: Sequence[Estimate], wheels: Path2D, reference: Path2D | None
+) -> bytes:
+    """The picture as PNG."""
     ours = estimated_path(items)
     with sheet(2, 1, 4.2, heights=(2.0, 1.0)) as (page, (plane, over_time)):
         start = ours.pose[0]
@@ -46,4 +46,6 @@ def draw(
         over_time.set_xlabel("time [s]")
         over_time.set_ylabel("slip ratio")
         over_time.legend(fontsize=7)
-        page.savefig(file)
+        buffer = BytesIO()
+        page.savefig(buffer, format="png")
+        return buffer.getvalue()

@@ -7,6 +7,7 @@ import numpy as np
 
 from tomr_odometry.estimator import Estimate
 from tomr_odometry.reference import Path2D
+from tomr_power_model.errors import InputError
 from tomr_power_model.robot import Robot
 
 _TOGETHER = 0.5  # s: spells of slip that are nearer than this are one
@@ -25,11 +26,11 @@ def spells(items: Sequence[Estimate]) -> list[tuple[float, float]]:
 
 
 def _end_error(path: Path2D, reference: Path2D) -> float:
-    """Distance of the ends when the starts are laid on each other [m]."""
+    """Distance of the ends when the starts are laid on each other [m]. Raises InputError."""
     stamps = path.stamps[(path.stamps >= reference.stamps[0])]
     stamps = stamps[stamps <= reference.stamps[-1]]
     if len(stamps) < 2:
-        return float("nan")
+        raise InputError("the reference pose is of another time than the drive: no end in common")
     own, true = path.at(stamps[[0, -1]]), reference.at(stamps[[0, -1]])
     laid = Path2D(stamps[[0, -1]], true).laid_on(own[0], true[0]).pose
     return float(np.hypot(*(laid[1, :2] - own[1, :2])))

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from tomr_odometry.estimator import Estimate, SlipOdometry
 from tomr_odometry.settings import OdometrySettings
 from tomr_power_model.messages.intake import Unusable, WheelFinder, stamp_of, twist_of
-from tomr_power_model.messages.plain import Level, Plain, Status, diagnostics, header, joint_state
+from tomr_power_model.messages.motion import odometry, transform_of
+from tomr_power_model.messages.plain import Level, Plain, Status, diagnostics, joint_state
 from tomr_power_model.messages.types import (
     DIAGNOSTICS,
     IMU,
@@ -24,8 +25,9 @@ from tomr_power_model.robot import Robot
 from tomr_power_model.topics.inputs import Input, guarded, measured_inputs
 
 ODOM_TOPIC, SLIP_TOPIC, STATUS_TOPIC = "odom_slip", "slip", "/diagnostics"
-TF_TOPIC, TF = "/tf", "tf2_msgs/msg/TFMessage"
+TF_TOPIC = "/tf"
 STATUS_PERIOD = 100_000_000  # ns of data
+_OUT_OF_PLANE = 1e-6  # m^2, rad^2, and per second squared: a robot on wheels
 OUTPUTS = {ODOM_TOPIC: ODOMETRY, SLIP_TOPIC: JOINT_STATE, STATUS_TOPIC: DIAGNOSTICS}
 
 
@@ -72,60 +74,28 @@ def odometry_inputs(robot: Robot, core: SlipOdometry) -> tuple[Input, ...]:
     return tuple(inputs)
 
 
-def _covariance(planar: NDArray[Any], unknown: float) -> list[float]:
+def _covariance(planar: NDArray[Any]) -> list[float]:
     """A covariance over x, y, yaw as one over six coordinates, those out of plane fixed."""
     places = (0, 1, 5)
     full = [0.0] * 36
     for i in (2, 3, 4):
-        full[7 * i] = unknown
+        full[7 * i] = _OUT_OF_PLANE
     for i, row in zip(places, planar.tolist(), strict=True):
         for j, value in zip(places, row, strict=True):
             full[6 * i + j] = value
     return full
 
 
-def _vector(x: float, y: float, z: float) -> Plain:
-    return Plain("geometry_msgs/msg/Vector3", {"x": x, "y": y, "z": z})
-
-
-def _turn(yaw: float) -> Plain:
-    half = 0.5 * yaw
-    fields = {"x": 0.0, "y": 0.0, "z": math.sin(half), "w": math.cos(half)}
-    return Plain("geometry_msgs/msg/Quaternion", fields)
-
-
 def _odometry(item: Estimate, settings: OdometrySettings) -> Plain:
     x, y, yaw = item.pose.tolist()
-    vx, vy, wz = item.twist.tolist()
-    point = Plain("geometry_msgs/msg/Point", {"x": x, "y": y, "z": 0.0})
-    pose = Plain("geometry_msgs/msg/Pose", {"position": point, "orientation": _turn(yaw)})
-    twist = Plain(TWIST, {"linear": _vector(vx, vy, 0.0), "angular": _vector(0.0, 0.0, wz)})
-    return Plain(
-        ODOMETRY,
-        {
-            "header": header(item.stamp_ns, settings.odom_frame),
-            "child_frame_id": settings.base_frame,
-            "pose": Plain(
-                "geometry_msgs/msg/PoseWithCovariance",
-                {"pose": pose, "covariance": _covariance(item.pose_covariance, 1e-6)},
-            ),
-            "twist": Plain(
-                "geometry_msgs/msg/TwistWithCovariance",
-                {"twist": twist, "covariance": _covariance(item.twist_covariance, 1e-6)},
-            ),
-        },
+    v_x, v_y, omega_z = item.twist.tolist()
+    return odometry(
+        item.stamp_ns,
+        (settings.odom_frame, settings.base_frame),
+        (x, y, yaw),
+        (v_x, v_y, omega_z),
+        (_covariance(item.pose_covariance), _covariance(item.twist_covariance)),
     )
-
-
-def _transform(item: Estimate, settings: OdometrySettings) -> Plain:
-    x, y, yaw = item.pose.tolist()
-    moved = {"translation": _vector(x, y, 0.0), "rotation": _turn(yaw)}
-    stamped = {
-        "header": header(item.stamp_ns, settings.odom_frame),
-        "child_frame_id": settings.base_frame,
-        "transform": Plain("geometry_msgs/msg/Transform", moved),
-    }
-    return Plain(TF, {"transforms": [Plain("geometry_msgs/msg/TransformStamped", stamped)]})
 
 
 def _status(robot: Robot, item: Estimate) -> Status:
@@ -152,7 +122,8 @@ def estimate_messages(
     `slip` has for each wheel its slip ratio as position [-], how fast its contact slides as
     velocity [m/s], and the force that it transmits as effort [N], NaN where not known.
     """
-    yield Published(ODOM_TOPIC, item.stamp_ns, _odometry(item, settings))
+    pose = _odometry(item, settings)
+    yield Published(ODOM_TOPIC, item.stamp_ns, pose)
     yield Published(
         SLIP_TOPIC,
         item.stamp_ns,
@@ -164,8 +135,8 @@ def estimate_messages(
             effort=item.traction.tolist(),
         ),
     )
-    if item.stamp_ns % STATUS_PERIOD == 0:
+    if item.stamp_ns % STATUS_PERIOD < settings.ticks.period:
         message = diagnostics(item.stamp_ns, [_status(robot, item)])
         yield Published(STATUS_TOPIC, item.stamp_ns, message)
     if settings.publish_tf:
-        yield Published(TF_TOPIC, item.stamp_ns, _transform(item, settings))
+        yield Published(TF_TOPIC, item.stamp_ns, transform_of(pose))

@@ -2,8 +2,9 @@
 
 from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.settings import PARAMETERS, OdometrySettings
-from tomr_odometry.topics import OUTPUTS, TF, TF_TOPIC, estimate_messages, odometry_inputs
+from tomr_odometry.topics import OUTPUTS, TF_TOPIC, estimate_messages, odometry_inputs
 from tomr_power_model.errors import InputError
+from tomr_power_model.messages.types import TF
 from tomr_power_model.nodes.command_line import node_arguments
 from tomr_power_model.nodes.stage_node import StageNode, run_node
 from tomr_power_model.robot.parameters import CMD_VEL_TYPE
