@@ -8,7 +8,8 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_odometry.estimator import Estimate, SlipOdometry
+from tomr_odometry.estimate import Estimate
+from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.topics import odometry_inputs
 from tomr_power_model.messages.bag import to_bag

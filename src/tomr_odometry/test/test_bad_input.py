@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from odometry_drives import Change, Event, Recorded, as_it_is, contained, drive, ice, off, play
 
-from tomr_odometry.estimator import Estimate
+from tomr_odometry.estimate import Estimate
 
 POWER = ("wheel_1/power", "wheel_2/power", "wheel_3/power")
 SHOVE = Event("pushed", 2.0, 3.0, (("severity", 1.0), ("force", 8.0), ("azimuth", 1.57)))

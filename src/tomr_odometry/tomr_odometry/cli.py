@@ -8,7 +8,8 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from tomr_odometry.estimator import Estimate, SlipOdometry
+from tomr_odometry.estimate import Estimate
+from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.offline import estimates
 from tomr_odometry.picture import draw
 from tomr_odometry.reference import Path2D, reference_of, wheel_path
@@ -71,9 +72,9 @@ class _ListParameters(argparse.Action):
 
 
 def _play(
-    recording: Recording, robot: Robot, settings: OdometrySettings, options: argparse.Namespace
+    recording: Recording, core: SlipOdometry, robot: Robot, options: argparse.Namespace
 ) -> list[Estimate]:
-    core, complaints = SlipOdometry(robot, settings), Complaints()
+    complaints = Complaints()
     items = estimates(recording, robot, core, complaints, options.namespace)
     kept = list(tqdm(items, unit=" estimates", disable=None, delay=1.0))
     for (topic, problem), count in complaints.counts.items():
@@ -115,10 +116,11 @@ def _odometry(arguments: Sequence[str] | None) -> int:
         if options.reference is not None:
             reference = reference_of(recording, options.reference, options.namespace)
         wheels = wheel_path(recording, robot, options.namespace)
-        kept = _play(recording, robot, settings, options)
+        core = SlipOdometry(robot, settings)
+        kept = _play(recording, core, robot, options)
     found = summary(robot, kept, wheels, reference)
     text = json.dumps(found, indent=2, allow_nan=False)
-    picture = draw(robot, kept, wheels, reference)
+    picture = draw(robot, kept, wheels, reference, core.floor.grid())
     make_folder(options.out)
     write_together(
         {options.out / "odometry.json": f"{text}\n", options.out / "odometry.png": picture}

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from heapq import merge
 
 import numpy as np
-from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_odometry.estimate import SLIDES, Estimate
+from tomr_odometry.grip import Available, Floor
 from tomr_odometry.kernel import AX, CREEP, DRAG, FRICTION, GYRO, RIM, SLOPE, VX, WZ, YAW, step
 from tomr_odometry.rims import Rims
 from tomr_odometry.settings import OdometrySettings
@@ -30,9 +31,8 @@ _NO_IMU = np.full(6, np.nan)
 _NO_FORCES = np.zeros((0, 4))
 _TURNING = 0.02  # m/s: below it there is no slip ratio
 _CREEPING = 0.05  # m/s, the same of creep: a ratio to a wheel that hardly turns says nothing
-_SLIDES = 0.5  # probability from which a wheel is said to slide
 _SLIDES_ON = 2.0  # s, for which a slide may go on unseen
-_SLOW = 0.02  # m/s: sliding slower than that is none
+_GRID_NS = to_ns(1.0)  # of data, between two maps of the floor
 _TRACTION_TIME = 0.3  # s, over which traction is averaged where creep depends on it
 _GRAVITY_TIME = 0.5  # s, over which a new gravity would be taken for granted
 _AHEAD = 0.25  # s, for which the motion of the last encoder sample is taken to go on
@@ -44,36 +44,6 @@ _LIFTED = 1.5  # m/s^2 off the usual weight
 _LIFTED_TILT = 0.6  # rad/s of rolling or pitching
 _CARRIED_NS = to_ns(0.7)  # how long after such a moment the robot may still be carried
 _CARRIED_SPEED = 0.6  # m/s/sqrt(Hz)
-
-
-@frozen
-class Estimate:
-    """What is known at a tick."""
-
-    stamp_ns: int
-    pose: Array  # x, y [m], yaw [rad], in the odometry frame
-    pose_covariance: Array  # (3, 3)
-    twist: Array  # in base_link [m/s, m/s, rad/s]
-    twist_covariance: Array
-    slip: Array  # ratio of each wheel, signed
-    sliding: Array  # m/s, rim less ground
-    probability: Array  # that each wheel slides
-    traction: Array  # N, NaN where not known
-    available: Array  # N that a wheel was seen to transmit where it slid last, NaN before
-    is_slipping: bool
-    is_carried: bool
-    missing: tuple[str, ...]  # sensors that are silent
-    sensors: tuple[tuple[str, str], ...]
-    assumed: tuple[str, ...]
-    learnt: tuple[tuple[str, float], ...]
-
-    @property
-    def words(self) -> str:
-        """What it comes to, in words."""
-        if self.is_carried:
-            return "carried or lifted: the pose is not known"
-        said = "slipping" if self.is_slipping else "gripping"
-        return f"{said}; without {', '.join(self.missing)}" if self.missing else said
 
 
 class SlipOdometry:
@@ -92,6 +62,7 @@ class SlipOdometry:
         self._unaided = self._unsure._replace(slip_rate=0.0)
         # Magnitudes of currents are good for creep, but no evidence of what the body does.
         self._are_evidence = robot.measurement.signed
+        self.floor = Floor(robot)
         self._clear()
 
     def _clear(self) -> None:
@@ -104,10 +75,10 @@ class SlipOdometry:
         self._x, self._P = start(self._robot, self.settings.noise, self.settings.creep)
         self._rims = Rims(self._radius)
         self._stamps = RecentStamps()
-        self._forces = np.full(WHEELS, np.nan)
+        self._forces, self._force_std = np.full((2, WHEELS), np.nan)
         self._used = np.zeros(WHEELS)
         self._travel = np.zeros(2)
-        self._available = np.full(WHEELS, np.nan)
+        self._available = Available()
         self._inertial: list[tuple[float, ...]] = []
         self._tractive: list[Traction] = []
         self._heard: dict[str, int] = {}
@@ -214,7 +185,7 @@ class SlipOdometry:
         (time,) = self._stamps.times([stamp])
         if self._time:
             is_aided = self.settings.use_imu and self._is_fresh("imu", stamp)
-            if self._is_aided and not is_aided and self._mode[3] > _SLIDES:
+            if self._is_aided and not is_aided and self._mode[3] > SLIDES:
                 self._lose_sight()
             self._is_aided = is_aided
             # With an IMU the filter weighs itself whether encoders that repeat are frozen.
@@ -249,14 +220,18 @@ class SlipOdometry:
             lost = _CARRIED_SPEED**2 * dt
             for place in (0, 1, 2, VX, VX + 1, WZ):
                 self._P[place, place] += lost
-        sliding = self._mode[:3] > _SLIDES
-        self._available = np.where(sliding, np.abs(self._forces), self._available)
+        sliding = self._mode[:3] > SLIDES
+        self._available.take(self._forces, self._force_std, sliding, dt)
+        self.floor.take(self._x[:3], sliding, self._forces / self._body.load)
 
     def _evidence(self, dt: float) -> Array:
         """Forces for the filter, if they are evidence; keeps what creep and messages need."""
         noise, keep = self.settings.noise, math.exp(-dt / _TRACTION_TIME)
         for found in self._tractive:
-            self._forces[found.wheel] = found.force
+            self._forces[found.wheel], self._force_std[found.wheel] = found.force, found.std
+        for wheel in range(WHEELS):
+            if not self._is_fresh(f"power {wheel}", self._heard["encoders"]):
+                self._forces[wheel] = self._force_std[wheel] = math.nan
         known = np.nan_to_num(self._forces) / self._body.load
         self._used = known + keep * (self._used - known)
         if not self._tractive or not self._are_evidence or not self._is_aided:
@@ -300,30 +275,41 @@ class SlipOdometry:
         ground = body.rows @ twist
         rim = self._rims.speed
         creeps = x[CREEP] * self.settings.creep.shape(self._used) * math.hypot(*self._travel)
-        is_sliding = self._mode[:3] > _SLIDES
+        is_sliding = self._mode[:3] > SLIDES
         sliding = np.where(is_sliding, rim - ground, creeps)
         larger = np.maximum(np.abs(rim), np.abs(rim - sliding))
         least = np.where(is_sliding, _TURNING, _CREEPING)
         slip = np.where(larger > least, sliding / np.maximum(larger, least), 0.0)
         missing, sensors = self._sensors(tick)
+        is_due = self.settings.publish_floor and tick % _GRID_NS < self.settings.ticks.period
         return Estimate(
             stamp_ns=tick,
             pose=pose,
             pose_covariance=P[:3, :3] + lost * np.eye(3),
             twist=twist,
-            twist_covariance=P[VX : WZ + 1, VX : WZ + 1] + lost * np.eye(3),
+            twist_covariance=P[VX : WZ + 1, VX : WZ + 1] + lost * np.eye(3) + self._unseen(),
             slip=np.clip(slip, -1.0, 1.0),
             sliding=sliding,
+            creeping=creeps,
             probability=self._mode[:3].copy(),
             traction=self._forces.copy(),
-            available=self._available.copy(),
-            is_slipping=bool(np.any(is_sliding & (np.abs(sliding) > _SLOW))),
+            traction_std=self._force_std.copy(),
+            available=self._available.interval,
+            floor=self.floor.grid() if is_due else None,
             is_carried=tick < self._carried_until,
             missing=missing,
             sensors=sensors,
             assumed=self._assumed(missing),
             learnt=self._learnt(),
         )
+
+    def _unseen(self) -> Array:
+        """Variance of a velocity that nothing but the wheels tells."""
+        if self._is_aided and self._has_stood:
+            return np.zeros((3, 3))
+        noise, travel = self._unsure, math.hypot(*self._travel)
+        # What makes the pose spread as it does where slides last so long.
+        return np.diag(np.square((noise.way, noise.way, noise.turn)) * travel**2 / _SLIDES_ON)
 
     def _sensors(self, tick: int) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:
         """Sensors that are silent, and what is used of each."""

@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator
 
-from tomr_odometry.estimator import Estimate, SlipOdometry
+from tomr_odometry.estimate import Estimate
+from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.topics import odometry_inputs
 from tomr_power_model.recordings import Recording
 from tomr_power_model.robot import Robot

@@ -7,16 +7,27 @@ from typing import Any
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_odometry.estimator import Estimate, SlipOdometry
+from tomr_odometry.estimate import Estimate
+from tomr_odometry.estimator import SlipOdometry
+from tomr_odometry.grip import SIDE, Grid
 from tomr_odometry.settings import OdometrySettings
 from tomr_power_model.messages.intake import Unusable, WheelFinder, stamp_of, twist_of
-from tomr_power_model.messages.motion import odometry, transform_of
-from tomr_power_model.messages.plain import Level, Plain, Status, diagnostics, joint_state
+from tomr_power_model.messages.motion import odometry, quaternion, transform_of
+from tomr_power_model.messages.plain import (
+    Level,
+    Plain,
+    Status,
+    diagnostics,
+    header,
+    joint_state,
+    time,
+)
 from tomr_power_model.messages.types import (
     DIAGNOSTICS,
     IMU,
     JOINT_STATE,
     ODOMETRY,
+    TF,
     TWIST,
     TWIST_STAMPED,
 )
@@ -25,10 +36,18 @@ from tomr_power_model.robot import Robot
 from tomr_power_model.topics.inputs import Input, guarded, measured_inputs
 
 ODOM_TOPIC, SLIP_TOPIC, STATUS_TOPIC = "odom_slip", "slip", "/diagnostics"
-TF_TOPIC = "/tf"
+TF_TOPIC, FLOOR_TOPIC = "/tf", "floor_traction"
+FLOOR = "nav_msgs/msg/OccupancyGrid"
+_SIGMAS = 2.0  # of the interval of a traction
 STATUS_PERIOD = 100_000_000  # ns of data
 _OUT_OF_PLANE = 1e-6  # m^2, rad^2, and per second squared: a robot on wheels
 OUTPUTS = {ODOM_TOPIC: ODOMETRY, SLIP_TOPIC: JOINT_STATE, STATUS_TOPIC: DIAGNOSTICS}
+
+
+def outputs(settings: OdometrySettings) -> dict[str, str]:
+    """Types of what is published, by topic."""
+    asked = {TF_TOPIC: (settings.publish_tf, TF), FLOOR_TOPIC: (settings.publish_floor, FLOOR)}
+    return OUTPUTS | {topic: kind for topic, (is_asked, kind) in asked.items() if is_asked}
 
 
 @frozen
@@ -98,17 +117,42 @@ def _odometry(item: Estimate, settings: OdometrySettings) -> Plain:
     )
 
 
+def _floor(item: Estimate, grid: Grid, settings: OdometrySettings) -> Plain:
+    (x, y), (height, width) = grid.corner, grid.cells.shape
+    point = Plain("geometry_msgs/msg/Point", {"x": x, "y": y, "z": 0.0})
+    corner = {"position": point, "orientation": quaternion(0.0)}
+    info = {
+        "map_load_time": time(item.stamp_ns),
+        "resolution": SIDE,
+        "width": width,
+        "height": height,
+        "origin": Plain("geometry_msgs/msg/Pose", corner),
+    }
+    fields = {
+        "header": header(item.stamp_ns, settings.odom_frame),
+        "info": Plain("nav_msgs/msg/MapMetaData", info),
+        "data": grid.cells.ravel().tolist(),
+    }
+    return Plain(FLOOR, fields)
+
+
 def _status(robot: Robot, item: Estimate) -> Status:
     """What the estimate rests on; a number alone in each value, for PlotJuggler."""
     values = [("slipping", f"{float(item.is_slipping):g}")]
-    for name, probability, used, most in zip(
-        robot.wheel_topics, item.probability, item.traction, item.available, strict=True
-    ):
-        values += [
-            (f"{name}_slip_probability", f"{probability:.4g}"),
-            (f"{name}_traction_used", f"{used:.4g}"),
-            (f"{name}_traction_available", f"{most:.4g}"),
-        ]
+    for wheel, name in enumerate(robot.wheel_topics):
+        used, std = item.traction[wheel], _SIGMAS * item.traction_std[wheel]
+        low, high = item.available[wheel]
+        numbers = {
+            "slip_probability": item.probability[wheel],
+            "creeping": item.creeping[wheel],
+            "loss_of_traction": item.losing[wheel],
+            "traction_used": used,
+            "traction_used_low": used - std,
+            "traction_used_high": used + std,
+            "traction_available_low": low,
+            "traction_available_high": high,
+        }
+        values += [(f"{name}_{what}", f"{number:.4g}") for what, number in numbers.items()]
     values += [(name, f"{value:.5g}") for name, value in item.learnt]
     level = Level.WARN if item.is_slipping or item.missing else Level.OK
     return Status("slip_odometry", level, item.words, tuple(values), "tomr")
@@ -138,5 +182,8 @@ def estimate_messages(
     if item.stamp_ns % STATUS_PERIOD < settings.ticks.period:
         message = diagnostics(item.stamp_ns, [_status(robot, item)])
         yield Published(STATUS_TOPIC, item.stamp_ns, message)
+    if item.floor is not None:
+        message = _floor(item, item.floor, settings)
+        yield Published(FLOOR_TOPIC, item.stamp_ns, message)
     if settings.publish_tf:
         yield Published(TF_TOPIC, item.stamp_ns, transform_of(pose))

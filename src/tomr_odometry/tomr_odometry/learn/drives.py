@@ -6,7 +6,8 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_odometry.estimator import Estimate, SlipOdometry
+from tomr_odometry.estimate import Estimate
+from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.offline import estimates
 from tomr_odometry.reference import Path2D, reference_of
 from tomr_odometry.settings import OdometrySettings
