@@ -1,6 +1,7 @@
 """The odometry on simulated drives: exact where nothing slides, honest where sensors fail."""
 
 import math
+from collections.abc import Callable
 from copy import deepcopy
 from typing import Any
 
@@ -96,18 +97,69 @@ def test_what_is_missing_is_said(gripping: Recorded) -> None:
     assert any("without an IMU" in text for text in items[-1].assumed)
 
 
-def test_a_lifted_robot_is_told_from_one_that_slips(gripping: Recorded) -> None:
+def _heavy(message: Any) -> None:
+    message.linear_acceleration.z += 3.0
+
+
+def _tilting(message: Any) -> None:
+    message.angular_velocity.x += 1.0
+
+
+def _tilting_without_weight(message: Any) -> None:
+    message.angular_velocity.x += 1.0
+    message.linear_acceleration_covariance[0] = -1.0
+
+
+@pytest.mark.parametrize("every", [1, 4], ids=["100 Hz", "25 Hz"])
+@pytest.mark.parametrize("lift", [_heavy, _tilting, _tilting_without_weight])
+def test_a_lifted_robot_is_told_from_one_that_slips(
+    gripping: Recorded, lift: Callable[[Any], None], every: int
+) -> None:
+    count = 0
+
     def lifted(time: float, topic: str, message: Any) -> Any:
-        if topic != "imu/data" or not 3.0 < time < 3.3:
+        nonlocal count
+        if topic != "imu/data":
+            return message
+        count += 1
+        if count % every:
+            return None
+        if not 3.0 < time < 3.3:
             return message
         copy = deepcopy(message)
-        copy.linear_acceleration.z += 3.0
+        lift(copy)
         return copy
 
     items = list(play(gripping, lifted))
     assert any(item.is_carried for item in items)
+    assert "carried" in next(item for item in items if item.is_carried).words
     before = next(item for item in items if item.is_carried).pose_covariance[0, 0]
     assert items[-1].pose_covariance[0, 0] > before + 0.05
+
+
+def test_slip_ratios_are_the_true_ones(slippery: Recorded) -> None:
+    body, radius = body_of(ROBOT)
+    samples = [(t, m.position[:3]) for t, topic, m in slippery.messages if topic == "joint_states"]
+    times = np.array([time for time, _ in samples])
+    angles = np.array([angle for _, angle in samples])
+    off, largest = [], 0.0
+    for item in play(slippery):
+        time = 1e-9 * (item.stamp_ns - START)
+        if not 0.1 < time < 8.8:
+            continue
+        before, after = (
+            np.array([np.interp(time + step, times, column) for column in angles.T])
+            for step in (-0.05, 0.0)
+        )
+        rim = (after - before) / 0.05 * radius
+        twist = [np.interp(time, slippery.times, column) for column in slippery.twist.T]
+        ground = body.rows @ np.array(twist)
+        larger = np.maximum(np.abs(rim), np.abs(ground))
+        true = np.where(larger > 0.05, (rim - ground) / np.maximum(larger, 0.05), 0.0)
+        off.append(np.where(larger > 0.05, item.slip - np.clip(true, -1.0, 1.0), 0.0))
+        largest = max(largest, float(np.abs(true).max()))
+    assert largest > 0.8
+    assert np.sqrt(np.mean(np.square(off))) < 0.05
 
 
 def test_messages_hold_ratios_and_a_covariance(slippery: Recorded) -> None:
