@@ -26,7 +26,6 @@ from tomr_fault_diag.diagnosis.replayed import (
 from tomr_fault_diag.diagnosis.settings import (
     STAGE_NODES,
     DiagnosisSettings,
-    parse_assignments,
 )
 from tomr_fault_diag.diagnosis.words import (
     as_json,
@@ -43,6 +42,7 @@ from tomr_power_model.errors import InputError
 from tomr_power_model.files import make_folder
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.robot import load_robot, read_node_sections, shipped_robots
+from tomr_power_model.robot.parameters import parse_assignments
 
 EXIT_UNDECIDED = 3
 _MOST_PHASES = 50
