@@ -1,5 +1,7 @@
 """Learnt terms: their tables, what they do, how they stand in robot.yaml, and how they run."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from attrs import evolve
@@ -8,7 +10,9 @@ from hypothesis import strategies as st
 
 from tomr_power_model.errors import InputError
 from tomr_power_model.geometry.kinematics import twist_to_wheels, wheels_to_twist
+from tomr_power_model.messages.plain import Level
 from tomr_power_model.model.commanded import CommandPath, CommandTiming, Seen
+from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import read_description, robot_from_parameters, shipped_robot
 from tomr_power_model.unmodelled import FAMILIES, LearntTerm, Motion, motion_of
 from tomr_power_model.unmodelled.described import parameters_of, terms_of
@@ -157,5 +161,39 @@ def test_beyond_its_table_a_term_fades_and_says_so() -> None:
     online = OnlineTerms((term,), wheels_to_twist(ROBOT), TICK)
     speed = twist_to_wheels(ROBOT) @ np.array([0.6, 0.0, 0.0])
     found = online.over(speed.tolist(), (0.0,) * 3, NAN, 0.0)
-    assert found.outside
+    assert found.outside == ("torque.speed",)
     assert found.torque[1] == 0.0
+
+
+def test_a_term_is_outside_where_its_own_wheel_is() -> None:
+    """Straight on wheel 1 stands, within the table that the others are beyond."""
+    motion = _motion((0.6, 0.0, 0.0))
+    assert _term("torque.speed", [[0.0, 1.0, 2.0]], [[0.1] * 3], 0).outside(motion) == 0.0
+    assert _term("torque.speed", [[0.0, 1.0, 2.0]], [[0.1] * 3], 1).outside(motion) == 1.0
+
+
+def test_nodes_say_once_a_term_fades_and_once_it_is_back() -> None:
+    """Slow, fast and slow again, with a table that ends between."""
+    term = _term("torque.speed", [[0.0, 4.0, 8.0]], [[0.01] * 3], 1)
+    predictor = PowerPredictor(evolve(ROBOT, unmodelled=(term,)))
+    said = []
+    for at_ms in range(0, 5950, 50):
+        speed = 0.6 if 2000 <= at_ms < 4000 else 0.2
+        predictor.command(at_ms * 1_000_000, (speed, 0.0, 0.0))
+        predictor.due()
+        said += [report.statuses[-1] for report in predictor.reports()]
+    assert {status.name for status in said} == {"inputs: learnt terms"}
+    words = [(status.level, status.message) for status in said]
+    inside = (Level.OK, "within their tables")
+    beyond = (Level.WARN, "fading beyond the table of torque.speed")
+    changed = [later for earlier, later in pairwise([None, *words]) if earlier != later]
+    assert changed == [inside, beyond, inside]
+    assert len(said) == 8  # each second, and at both changes
+
+
+def test_a_robot_without_learnt_terms_says_nothing_of_them() -> None:
+    predictor = PowerPredictor(ROBOT)
+    for at_ms in range(0, 500, 50):
+        predictor.command(at_ms * 1_000_000, (0.2, 0.0, 0.0))
+        predictor.due()
+    assert [len(report.statuses) for report in predictor.reports()] == [1]

@@ -19,7 +19,7 @@ class Besides:
     torque: Sequence[float] = (0.0, 0.0, 0.0)  # that resists at the wheels [N m]
     driver: Sequence[float] = (0.0, 0.0, 0.0)  # drawn besides by the drivers [W]
     supply: float = 0.0  # drawn besides at the supply [W]
-    outside: bool = False  # beyond some table
+    outside: tuple[str, ...] = ()  # families of the terms that are beyond their tables
 
 
 NOTHING = Besides()
@@ -97,7 +97,7 @@ class OnlineTerms:
             _summed([item.torque[0] for item in found]),
             _summed([item.driver[0] for item in found]),
             sum(float(item.supply[0]) for item in found),
-            any(term.outside(motion) > 0.0 for term in self._terms),
+            tuple(term.family.family_id for term in self._terms if term.outside(motion) > 0.0),
         )
 
 

@@ -62,21 +62,27 @@ class LearntTerm:
         else:
             found = torque if self.family.acts == "torque" else driver
             for wheel, values in zip(self.wheels, self.values, strict=True):
-                place = min(wheel, coordinates.shape[1] - 1)
-                found[:, wheel] = factor[:, wheel] * self._at(values, coordinates[:, place])
+                at = _of_place(coordinates, wheel)
+                found[:, wheel] = factor[:, wheel] * self._at(values, at)
         return Actions(torque, driver, supply)
 
     def _at(self, values: Array, at: Array) -> Array:
         return value_at(self.family, self.knots, values, at)
 
     def outside(self, motion: Motion) -> float:
-        """Share of a drive that lies beyond the table."""
+        """Share of a drive that lies beyond the table, where the term acts."""
         ones = np.ones(math.prod(len(points) for points in self.knots))
+        coordinates = self.family.coordinates(motion)
         found = [
-            self._at(ones, column) < 1.0 - _ROUNDING
-            for column in np.moveaxis(self.family.coordinates(motion), 1, 0)
+            self._at(ones, _of_place(coordinates, wheel)) < 1.0 - _ROUNDING
+            for wheel in self.wheels or (0,)
         ]
         return float(np.mean(found))
+
+
+def _of_place(coordinates: Array, wheel: int) -> Array:
+    """Those of a wheel, or of the body where wheels share them, (n, axes)."""
+    return coordinates[:, min(wheel, coordinates.shape[1] - 1)]
 
 
 def basis_at(family: type[Family], knots: tuple[Array, ...], at: Array) -> Array:
