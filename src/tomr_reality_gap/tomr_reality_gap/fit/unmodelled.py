@@ -5,6 +5,7 @@ of what the named model leaves there. What changes with time alone can predict n
 judged by moments left out between others, and called not repeatable.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -32,6 +33,7 @@ _MOMENTS = 4
 _INEXACT = 0.01  # of a channel's standard deviation, besides its noise
 _SHOWS = 1.0  # eigenvalue of a nuisance's information beyond which it is fitted
 _WHEEL_SHARE = 0.1  # of the wheel that shows most
+_SURELY = 3.0  # standard deviations of a sum of squares of noise
 _TOLD = 0.3  # share of what is left that a term must predict
 _SMALL = 0.02  # of a channel's standard deviation: less is not worth a word
 _LAGS = 80
@@ -88,7 +90,7 @@ class Unmodelled:
     learnt: LearntTerm  # the table
     laws: tuple[FittedLaw, ...]  # that explain about as much, simplest first
     term: LearntTerm  # what is simulated: the first law, or else the table
-    share: float  # of what is left that it predicts where it was not fitted
+    share: float  # see `predicted_share`
     is_repeatable: bool
     evidence: float  # log, correlation of what is left accounted for
     is_large: bool  # in some channel, against what it shows in all
@@ -111,7 +113,10 @@ class Tried:
 
 
 def predicted_share(rest: Remainder, columns: Sequence[Array], labels: NDArray[np.intp]) -> float:
-    """Share of what is left, beyond noise, that columns predict of blocks left out one by one."""
+    """Share of what is left, beyond noise, that columns predict of blocks left out one by one.
+
+    At most 1, at least -1: predicted worse than by nothing. NaN where no more than noise is left.
+    """
     own = np.concatenate(columns, axis=1) * rest.weight[:, None]
     joined, q = np.concatenate([rest.base, own], axis=1), rest.base.shape[1]
     grams = [
@@ -130,7 +135,11 @@ def predicted_share(rest: Remainder, columns: Sequence[Array], labels: NDArray[n
             part = gram.matrix[:count, :count]
             error += gram.square - 2.0 * float(at @ gram.vector[:count]) + float(at @ part @ at)
         left.append(error)
-    return (left[0] - left[1]) / max(left[0] - len(rest.residual), 1e-9)
+    count = len(rest.residual)
+    beyond = left[0] - count
+    if beyond < _SURELY * math.sqrt(2.0 * count):
+        return math.nan
+    return max(-1.0, min(1.0, (left[0] - left[1]) / beyond))
 
 
 def unmodelled_effect(
@@ -162,7 +171,7 @@ def unmodelled_effect(
 def families_tried(
     rest: Remainder, robot: Robot, scales: Scales, motions: Sequence[Motion]
 ) -> list[Tried]:
-    """All families that the recordings can show, best first."""
+    """All families that the recordings can show, best first; none where only noise is left."""
     stretch, moment = rest.blocks
     kinds = {channel.kind for channel in rest.dataset.channels}
     found = []
@@ -173,7 +182,9 @@ def families_tried(
             continue
         labels = moment if family.is_event else stretch
         columns = table.columns(rest.dataset, robot, motions, is_exact=False)
-        found.append(Tried(table, predicted_share(rest, columns, labels)))
+        share = predicted_share(rest, columns, labels)
+        if not math.isnan(share):
+            found.append(Tried(table, share))
     most = max((item.share for item in found), default=0.0)
     for number, item in enumerate(found):
         family = item.table.family
