@@ -1,5 +1,6 @@
 """Learnt terms: their tables, what they do, how they stand in robot.yaml, and how they run."""
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -65,6 +66,108 @@ def test_a_force_takes_its_power_from_the_wheels() -> None:
     term = _term("force.place", grid, [[-3.0] * 4, [0.0] * 4])
     power = (term.actions(motion).torque * motion.speed).sum(axis=1)
     np.testing.assert_allclose(power, 3.0 * motion.velocity_x[:, 0], atol=5e-3)
+
+
+def _wandering() -> Motion:
+    """All ways and headings for 12 s, with a stand from 5 to 6 s."""
+    time = np.arange(0.0, 12.0, 0.005)
+    twist = np.stack([0.4 * np.cos(time), 0.3 * np.sin(0.7 * time), 0.8 * np.cos(0.4 * time)], 1)
+    speed = (twist * ~((time > 5.0) & (time < 6.0))[:, None]) @ twist_to_wheels(ROBOT).T
+    current = 0.3 * speed + 0.5 * np.sin(3.0 * time)[:, None]
+    return motion_of(
+        wheels_to_twist(ROBOT),
+        time,
+        speed=speed,
+        current=current,
+        angle=np.cumsum(speed, 0) * 0.005,
+    )
+
+
+def _own_variable(name: str) -> LearntTerm:
+    """A term whose table holds its variable itself, or a sine of an angle."""
+    family = FAMILIES[name]
+    points = [np.array([-99.0, 99.0])] * len(family.axes)
+    grid = np.meshgrid(*points, indexing="ij")
+    if family.axes[0].is_periodic:
+        points = [np.linspace(0.0, 2.0 * np.pi, 360, endpoint=False)]
+        grid = [np.sin(points[0])]
+    wheels = {"torque": (0, 1, 2), "driver": (0, 1, 2)}.get(family.acts, ())
+    rows = [grid[0].ravel()] * max(len(wheels), 1)
+    if family.acts == "force":
+        rows = [grid[0].ravel(), grid[-1].ravel()]
+    return LearntTerm(family, wheels, tuple(points), np.array(rows))
+
+
+# What each family's term does whose table holds its variable itself: in torques N m, (n, 3), forces
+# N, (n, 2), powers W. Of angles, whose tables are periodic, the table holds a wave.
+FAMILY_ACTIONS: dict[str, Callable[[Motion], np.ndarray]] = {
+    "driver.current": lambda m: np.abs(m.current),
+    "driver.speed": lambda m: np.abs(m.speed),
+    "driver.time": lambda m: np.tile(m.time, 3),
+    "force.place": lambda m: np.hstack([m.x, m.y]),
+    "force.time": lambda m: np.hstack([m.time, m.time]),
+    "force.velocity": lambda m: np.hstack([m.velocity_x, m.velocity_y]),
+    "supply.current": lambda m: np.abs(m.current).sum(axis=1),
+    "supply.time": lambda m: m.time[:, 0],
+    "torque.angle": lambda m: np.sin(m.angle),
+    "torque.current": lambda m: m.sign * np.abs(m.current),
+    "torque.direction": lambda m: m.sign * np.sin(m.direction),
+    "torque.heading": lambda m: m.sign * np.sin(m.heading),
+    "torque.place": lambda m: m.sign * m.x,
+    "torque.signed_speed": lambda m: np.abs(m.sign) * m.speed,
+    "torque.since_stand": lambda m: m.sign * np.minimum(m.since_stand, 8.0),
+    "torque.speed": lambda m: m.sign * np.abs(m.speed),
+    "torque.time": lambda m: m.sign * m.time,
+    "torque.turned": lambda m: m.sign * np.minimum(m.turned, 12.0),
+}
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_each_family_acts_as_it_says(name: str) -> None:
+    family, motion = FAMILIES[name], _wandering()
+    found = _own_variable(name).actions(motion)
+    none = np.zeros_like(motion.speed)
+    expected = {"torque": none, "driver": none, "supply": none[:, 0]}
+    acted = FAMILY_ACTIONS[name](motion)
+    if family.acts == "force":
+        expected["torque"] = motion.resisting(acted[:, 0], acted[:, 1])
+    else:
+        expected[family.acts] = acted
+    for kind, value in expected.items():
+        np.testing.assert_allclose(getattr(found, kind), value, atol=2e-4, err_msg=kind)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_nodes_know_the_motion_as_the_fit_does(name: str) -> None:
+    """Tick by tick as in a whole drive, but for how far it goes in a tick."""
+    motion, term = _wandering(), _own_variable(name)
+    whole = term.actions(motion)
+    online, errors = OnlineTerms((term,), wheels_to_twist(ROBOT), TICK), []
+    for row in range(0, len(motion.time), 10):
+        given = (motion.speed[row], motion.current[row], motion.angle[row])
+        found = online.over(*(part.tolist() for part in given), float(motion.heading[row, 0]))
+        errors.append(
+            [
+                *(found.torque - whole.torque[row]),
+                *(found.driver - whole.driver[row]),
+                found.supply - whole.supply[row],
+            ]
+        )
+    size = max(np.abs(part).max() for part in (whole.torque, whole.driver, whole.supply))
+    assert np.median(np.abs(errors), axis=0).max() < 0.05 * size
+    assert np.quantile(np.abs(errors), 0.95, axis=0).max() < 0.1 * size
+
+
+def test_a_motion_is_what_it_is_in_the_world() -> None:
+    """Sideways at a heading of 90 degrees is backwards along x; the direction is the robot's."""
+    time = np.arange(0.0, 6.0, 0.005)
+    twist = np.where((time < 1.0)[:, None], [0.0, 0.0, 0.5 * np.pi], [0.0, 0.3, 0.0])
+    speed = twist @ twist_to_wheels(ROBOT).T
+    angle = np.cumsum(speed, axis=0) * 0.005
+    motion = motion_of(wheels_to_twist(ROBOT), time, speed=speed, current=speed, angle=angle)
+    last = [motion.velocity_x[-1, 0], motion.velocity_y[-1, 0], motion.direction[-1, 0]]
+    np.testing.assert_allclose(last, [-0.3, 0.0, 0.5 * np.pi], atol=5e-3)
+    assert motion.time[-1, 0] == pytest.approx(5.995)
 
 
 def test_place_and_heading_are_reckoned_from_the_start() -> None:

@@ -1,6 +1,7 @@
 """What a term predicts of blocks that it was not fitted to, on residuals made by hand."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,12 +9,18 @@ import pytest
 from tomr_reality_gap.fit.unmodelled import Remainder, predicted_share
 
 SAMPLES, BLOCKS = 4000, 8
-LABELS = np.arange(SAMPLES) * BLOCKS // SAMPLES
+LABELS = np.tile(np.arange(SAMPLES // 2) * 2 * BLOCKS // SAMPLES, 2)  # of two channels alike
 
 
 def _share(residual: np.ndarray, column: np.ndarray) -> float:
     """One column, nothing else that is not exactly known."""
-    rest = Remainder(None, residual, np.empty((SAMPLES, 0)), np.ones(SAMPLES))  # type: ignore[arg-type]
+    half = SimpleNamespace(time=np.arange(SAMPLES // 2))
+    rest = Remainder(
+        SimpleNamespace(channels=(half, half)),  # type: ignore[arg-type]
+        residual,
+        np.empty((SAMPLES, 0)),
+        np.ones(SAMPLES),
+    )
     return predicted_share(rest, [column[:, None]], LABELS)
 
 
@@ -35,6 +42,15 @@ def test_of_noise_alone_no_share_is_stated(scale: float) -> None:
     """Nor where its size was taken for larger than it is."""
     noise, column = _made()
     assert math.isnan(_share(scale * noise, column))
+
+
+def test_a_channel_known_better_than_its_noise_hides_nothing_of_another() -> None:
+    """The first half hardly differs at all: less is left on the whole than noise would."""
+    noise, column = _made()
+    known = np.arange(SAMPLES) < SAMPLES // 2
+    residual = np.where(known, 0.01 * noise, noise + 0.5 * column)
+    assert residual @ residual < SAMPLES
+    assert _share(residual, np.where(known, 0.0, column)) == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_share_is_bounded_either_way() -> None:

@@ -32,6 +32,7 @@ class _Memory:
     time: float = 0.0  # s
     x: float = 0.0  # m
     y: float = 0.0
+    speed: Array = field(factory=lambda: np.zeros(3))  # of the wheels [rad/s]
     since: Array = field(factory=lambda: np.full(3, LONG_AGO))  # s
     turned: Array = field(factory=lambda: np.full(3, LONG_AGO))  # rad
 
@@ -64,11 +65,13 @@ class OnlineTerms:
         middle = heading + 0.5 * wz * tick
         cos, sin = np.cos(middle), np.sin(middle)
         velocity = cos * vx - sin * vy, sin * vx + cos * vy
-        moves = np.abs(wheels) >= STANDING
+        # A wheel that has turned about stood in between.
+        moves = (np.abs(wheels) >= STANDING) & (wheels * before.speed >= 0.0)
         now = _Memory(
             before.time + tick,
             before.x + tick * velocity[0],
             before.y + tick * velocity[1],
+            wheels,
             np.where(moves, np.minimum(before.since + tick, LONG_AGO), 0.0),
             np.where(moves, np.minimum(before.turned + tick * np.abs(wheels), LONG_AGO), 0.0),
         )

@@ -118,28 +118,34 @@ def predicted_share(rest: Remainder, columns: Sequence[Array], labels: NDArray[n
     At most 1, at least -1: predicted worse than by nothing. NaN where no more than noise is left.
     """
     own = np.concatenate(columns, axis=1) * rest.weight[:, None]
-    joined, q = np.concatenate([rest.base, own], axis=1), rest.base.shape[1]
-    grams = [
-        Gram.of(joined[labels == label], rest.residual[labels == label])
-        for label in np.unique(labels)
-    ]
+    without, beside = (
+        _squares_unfitted(rest.residual, part, labels)
+        for part in (rest.base, np.concatenate([rest.base, own], axis=1))
+    )
+    # Channel by channel: one that the model knows better than its noise hides none of the others'.
+    parts = rows_of(rest.dataset.channels)
+    sums = [(float(without[part].sum()), part.stop - part.start) for part in parts]
+    beyond = sum(
+        square - count
+        for square, count in sums
+        if square - count > _SURELY * math.sqrt(2.0 * count)
+    )
+    if not beyond:
+        return math.nan
+    return max(-1.0, min(1.0, float((without - beside).sum()) / beyond))
+
+
+def _squares_unfitted(residual: Array, columns: Array, labels: NDArray[np.intp]) -> Array:
+    """Squares of what columns leave of each block, fitted to the others, (n,)."""
+    blocks = [labels == label for label in np.unique(labels)]
+    grams = [Gram.of(columns[rows], residual[rows]) for rows in blocks]
     matrix = np.sum([gram.matrix for gram in grams], axis=0)
     vector = np.sum([gram.vector for gram in grams], axis=0)
-    square = float(rest.residual @ rest.residual)
-    left = []
-    for count in (q, joined.shape[1]):
-        error = 0.0
-        for gram in grams:
-            others = Gram(matrix - gram.matrix, vector - gram.vector, square)
-            at = solve(others, range(count)).mean
-            part = gram.matrix[:count, :count]
-            error += gram.square - 2.0 * float(at @ gram.vector[:count]) + float(at @ part @ at)
-        left.append(error)
-    count = len(rest.residual)
-    beyond = left[0] - count
-    if beyond < _SURELY * math.sqrt(2.0 * count):
-        return math.nan
-    return max(-1.0, min(1.0, (left[0] - left[1]) / beyond))
+    left = residual.copy()
+    for rows, gram in zip(blocks, grams, strict=True):
+        others = Gram(matrix - gram.matrix, vector - gram.vector, 0.0)
+        left[rows] -= columns[rows] @ solve(others, range(columns.shape[1])).mean
+    return np.asarray(left**2)
 
 
 def unmodelled_effect(
