@@ -22,6 +22,7 @@ from tomr_power_model.unmodelled.term import basis_at
 
 ROBOT = shipped_robot("reference")
 NAMES = ROBOT.wheel_names
+VALUES = dict(read_description("reference"))
 TICK = 0.05  # s
 NAN = (float("nan"),) * 3
 
@@ -208,7 +209,7 @@ def test_time_and_angle_count_since_the_last_stand() -> None:
     ids=lambda term: term.family.family_id,
 )
 def test_a_term_stands_in_a_description_and_is_read_again(term: LearntTerm) -> None:
-    values = {**read_description("reference"), **parameters_of("term_1", term, NAMES)}
+    values = {**VALUES, **parameters_of("term_1", term, NAMES, VALUES)}
     (read,) = robot_from_parameters(values, "made").unmodelled
     assert (read.family, read.wheels) == (term.family, term.wheels)
     np.testing.assert_allclose(read.values, term.values)
@@ -219,6 +220,10 @@ def test_a_term_stands_in_a_description_and_is_read_again(term: LearntTerm) -> N
 @pytest.mark.parametrize(
     ("field", "value", "message"),
     [
+        ("version", 2, r"version = 2: only 1 is understood"),
+        ("version", None, r"version = None: only 1"),
+        ("robot", [17.0, 0.2, 0.05], r"robot = .* is not this one"),
+        ("robot", [15.0, 0.2], r"robot = .* is not this one"),
         ("family", "torque.moon", r"unmodelled\.term_1\.family = 'torque\.moon': give one of"),
         ("wheels", ["left"], r"left is no wheel: give some of"),
         ("wheels", [], r"acts elsewhere: name them"),
@@ -226,14 +231,66 @@ def test_a_term_stands_in_a_description_and_is_read_again(term: LearntTerm) -> N
         ("values", [0.1, 0.2], r"values: has 2 numbers: give 3"),
         ("values", ["a"], r"give a list of finite numbers"),
         ("unit", "W", r"unit = 'W': give N m"),
-        ("colour", "red", r"colour is unknown: give family"),
+        ("colour", "red", r"colour is unknown: give version"),
     ],
 )
 def test_a_table_that_does_not_fit_is_refused(field: str, value: object, message: str) -> None:
     term = _term("torque.speed", [[0.0, 1.0, 2.0]], [0.0, 0.1, 0.2], 1)
-    values = parameters_of("term_1", term, NAMES) | {f"unmodelled.term_1.{field}": value}
+    values = VALUES | parameters_of("term_1", term, NAMES, VALUES)
     with pytest.raises(InputError, match=message):
-        terms_of(values, NAMES, "made")
+        terms_of(values | {f"unmodelled.term_1.{field}": value}, NAMES, "made")
+
+
+def test_a_robot_that_was_measured_anew_keeps_its_tables() -> None:
+    term = _term("torque.speed", [[0.0, 1.0, 2.0]], [0.0, 0.1, 0.2], 1)
+    values = VALUES | parameters_of("term_1", term, NAMES, VALUES)
+    mass = values["robot.mass"]
+    assert terms_of(values | {"robot.mass": 1.05 * mass}, NAMES, "made")
+    with pytest.raises(InputError, match="is not this one"):
+        terms_of(values | {"robot.mass": 1.15 * mass}, NAMES, "made")
+
+
+# Curves whose steepest part is 1 N m s/rad, 0.6 N m/A or 671 N s/m, scaled to what drivers hold.
+@pytest.mark.parametrize("stable", [True, False])
+@pytest.mark.parametrize(
+    ("family", "knots", "values", "wheels"),
+    [
+        ("torque.speed", [[0.0, 1.0, 2.0]], [0.0, 0.0, -1.0], (0,)),
+        ("torque.speed", [[1.0, 2.0, 3.0]], [1.0, 0.5, 0.2], (1,)),  # it fades below
+        ("torque.signed_speed", [[-2.0, 0.0, 2.0]], [-0.1, 1.9, 1.9], (2,)),
+        ("torque.current", [[0.0, 1.0, 2.0]], [0.2, 0.8, 0.6], (0,)),
+        ("force.velocity", [[-0.5, 0.5], [-0.5, 0.5]],
+         [[300.0, 300.0, -300.0, -300.0], [0.0] * 4], ()),
+    ],
+)  # fmt: skip
+def test_a_curve_steeper_than_the_drivers_hold_is_refused(
+    family: str,
+    knots: list[list[float]],
+    values: list[float],
+    wheels: tuple[int, ...],
+    stable: bool,
+) -> None:
+    """By a tenth over or under what they hold."""
+    size = {"torque.current": 0.6, "force.velocity": float(np.hypot(600.0, 300.0))}.get(family, 1.0)
+    term = _term(family, knots, values, *wheels)
+    held = _held(family)
+    term = evolve(term, values=term.values * held / size * (0.9 if stable else 1.1))
+    described = VALUES | parameters_of("term_1", term, NAMES, VALUES)
+    if stable:
+        assert robot_from_parameters(described, "made").unmodelled
+        return
+    with pytest.raises(InputError, match=r"learnt term 1 .* steep .* the loop would not be stable"):
+        robot_from_parameters(described, "made")
+
+
+def _held(family: str) -> float:
+    """What the drivers of the reference robot hold."""
+    motor = ROBOT.motors[0]
+    if family == "torque.current":
+        return motor.wheel_constant
+    own = motor.wheel_constant * (ROBOT.controller.proportional + motor.wheel_constant)
+    own /= motor.resistance
+    return own * 1.5 / ROBOT.wheel_radius**2 if family == "force.velocity" else own
 
 
 def test_a_simulation_draws_and_resists_what_was_learnt() -> None:

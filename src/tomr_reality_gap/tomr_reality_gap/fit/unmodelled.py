@@ -124,7 +124,7 @@ def predicted_share(rest: Remainder, columns: Sequence[Array], labels: NDArray[n
     )
     # Channel by channel: one that the model knows better than its noise hides none of the others'.
     parts = rows_of(rest.dataset.channels)
-    sums = [(float(without[part].sum()), part.stop - part.start) for part in parts]
+    sums = [(float(without[part].sum()), int(part.stop - part.start)) for part in parts]
     beyond = sum(
         square - count
         for square, count in sums
