@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tomr_power_model.unmodelled import LearntTerm
-from tomr_reality_gap.explanation import Estimate, FittedLaw
+from tomr_reality_gap.explanation import FittedLaw
 from tomr_reality_gap.fit.learnt import Table
+from tomr_reality_gap.rules import estimate_of
 
 Array = NDArray[np.float64]
 
@@ -227,9 +228,10 @@ class LawAt:
         for (name, unit), value, sigma in zip(
             self.law.units.items(), self.parameters.tolist(), self.sigma.tolist(), strict=True
         ):
-            value = abs(value) if name in _POSITIVE else value
+            value, least = (abs(value), 0.0) if name in _POSITIVE else (value, -math.inf)
             unit = {"*": self.learnt.unit, "variable": variable}.get(unit, unit)
-            estimates[name] = Estimate(value, value - 1.96 * sigma, value + 1.96 * sigma, unit)
+            bounds = (least, math.inf)
+            estimates[name] = estimate_of(value, sigma, offset=value, unit=unit, bounds=bounds)
         return FittedLaw(self.law.name, self.law.words, estimates, self.share)
 
 
