@@ -96,7 +96,7 @@ def test_what_has_no_name_is_found_with_its_wheel_and_variable(
     assert effect.is_repeatable
     assert effect.is_large
     shape = shape_of(effect, robot)
-    assert abs(shape.at[np.argmax(np.abs(shape.value))]) == pytest.approx(4.0, abs=1.2)
+    assert abs(shape.at[np.argmax(np.abs(shape.value))]) == pytest.approx(4.0, abs=1.0)
     # A simulation of the user's that has the same is no other than reality in this.
     plain, resisting = simulation.predict([robot])[0], next(simulation.respond(robot, torque))
     for theirs, expected in ((resisting, True), (plain, False)):
