@@ -1,0 +1,71 @@
+"""Which family is taken for what no name explains, from what each of them predicts."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from tomr_power_model.unmodelled import FAMILIES
+from tomr_reality_gap.fit import unmodelled
+from tomr_reality_gap.fit.unmodelled import unmodelled_effect
+
+PLACE, SPEED, TIME = "force.place", "torque.speed", "supply.time"
+
+
+def _chosen(
+    monkeypatch: pytest.MonkeyPatch,
+    shares: dict[str, float],
+    *,
+    law: float = 0.0,
+    is_sure: bool = False,
+) -> str | None:
+    """The family that is fitted; what depends on place is a law that explains `law`."""
+
+    def fitted(rest: object, item: SimpleNamespace, *_: object) -> SimpleNamespace:
+        family = item.table.family
+        laws = ("a law",) if family.is_strange and law else ()
+        return SimpleNamespace(family=family, laws=laws, explained=law)
+
+    tried = [
+        SimpleNamespace(table=SimpleNamespace(family=FAMILIES[name]), share=share)
+        for name, share in sorted(shares.items(), key=lambda item: -item[1])
+    ]
+    monkeypatch.setattr(unmodelled, "families_tried", lambda *_: tried)
+    monkeypatch.setattr(unmodelled, "fitted", fitted)
+    rest = SimpleNamespace(dataset=SimpleNamespace(simulations=()))
+    found = unmodelled_effect(rest, None, None, is_sure=is_sure)  # type: ignore[arg-type]
+    return None if found is None else found.family.family_id
+
+
+@pytest.mark.parametrize(
+    ("shares", "expected"),
+    [
+        ({PLACE: 0.9, SPEED: 0.8, TIME: 0.95}, PLACE),  # what predicts a stretch comes first
+        ({PLACE: 0.42, TIME: 0.9}, PLACE),  # 0.45 of what time explains: repeatable
+        ({PLACE: 0.39, TIME: 0.9}, TIME),
+        ({PLACE: 0.29, TIME: 0.31}, TIME),  # too little to be told
+        ({PLACE: 0.29, TIME: 0.29}, None),
+        ({SPEED: 0.31}, SPEED),
+        ({SPEED: 0.29}, None),
+        ({TIME: 0.31}, TIME),
+        ({}, None),
+    ],
+)
+def test_what_predicts_stretches_is_repeatable_and_what_only_follows_time_is_not(
+    monkeypatch: pytest.MonkeyPatch, shares: dict[str, float], expected: str | None
+) -> None:
+    assert _chosen(monkeypatch, shares) == expected
+
+
+def test_where_something_is_there_for_sure_little_is_told_as_well(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert _chosen(monkeypatch, {SPEED: 0.1}, is_sure=True) == SPEED
+    assert _chosen(monkeypatch, {}, is_sure=True) is None
+
+
+@pytest.mark.parametrize(("law", "expected"), [(0.81, PLACE), (0.79, TIME)])
+def test_a_law_of_place_that_explains_nearly_all_is_no_event(
+    monkeypatch: pytest.MonkeyPatch, law: float, expected: str
+) -> None:
+    """Few stretches of one drive meet again."""
+    assert _chosen(monkeypatch, {PLACE: 0.1, TIME: 0.9}, law=law) == expected
