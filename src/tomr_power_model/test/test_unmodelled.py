@@ -13,6 +13,7 @@ from tomr_power_model.errors import InputError
 from tomr_power_model.geometry.kinematics import twist_to_wheels, wheels_to_twist
 from tomr_power_model.messages.plain import Level
 from tomr_power_model.model.commanded import CommandPath, CommandTiming, Seen
+from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import read_description, robot_from_parameters, shipped_robot
 from tomr_power_model.unmodelled import FAMILIES, LearntTerm, Motion, motion_of
@@ -311,6 +312,57 @@ def test_a_simulation_draws_and_resists_what_was_learnt() -> None:
             before = torque
     np.testing.assert_allclose(powers["draws"] - powers["none"], [0.0, 2.0, 0.0], atol=1e-9)
     assert abs(torque) - abs(before) == pytest.approx(0.05, rel=0.02)
+
+
+def _predicted(term: LearntTerm) -> Prediction:
+    """Of a node at the end of two seconds at 0.6 m/s, with encoders that follow."""
+    predictor = PowerPredictor(evolve(ROBOT, unmodelled=(term,)))
+    twist, found = (0.6, 0.0, 0.0), []
+    speed = twist_to_wheels(ROBOT) @ np.array(twist)
+    for at_ms in range(10, 2050, 10):
+        if at_ms % 50 == 0:
+            predictor.command(at_ms * 1_000_000, twist)
+        first, second, third = (float(value) for value in 1e-3 * at_ms * speed)
+        predictor.encoders(at_ms * 1_000_000, (first, second, third), (*NAN,))
+        found += predictor.due()
+    return found[-1]
+
+
+def test_a_node_has_what_was_learnt_in_the_power_of_both_paths_and_of_the_whole() -> None:
+    """2 W at a driver, 0.05 N m at a wheel, 3 W at the supply; nothing."""
+    anywhere = [[0.0, 50.0]]
+    none, draws, resists, supply = (
+        _predicted(term)
+        for term in (
+            _term("driver.speed", anywhere, [0.0, 0.0], 1),
+            _term("driver.speed", anywhere, [2.0, 2.0], 1),
+            _term("torque.speed", anywhere, [0.05, 0.05], 1),
+            _term("supply.current", anywhere, [3.0, 3.0]),
+        )
+    )
+
+    def more(found: Prediction) -> tuple[list[float], list[float], float]:
+        paths = [
+            [one.power - other.power for one, other in zip(mine, plain, strict=True)]
+            for mine, plain in (
+                (found.motors, none.motors),
+                (found.from_encoders, none.from_encoders),
+            )
+        ]
+        return paths[0], paths[1], found.total.power - none.total.power
+
+    for commanded, measured, total, expected in (
+        (*more(draws), 2.0),
+        (*more(supply), 0.0),
+    ):
+        assert commanded == pytest.approx([0.0, expected, 0.0], abs=1e-3)
+        assert measured == pytest.approx([0.0, expected, 0.0], abs=1e-3)
+        assert total == pytest.approx(expected or 3.0, abs=1e-2)
+    # 0.05 N m at 10.4 rad/s, and the copper loss of its current.
+    commanded, measured, _ = more(resists)
+    assert measured[1] == pytest.approx(commanded[1], rel=0.02)
+    assert measured[1] > 0.05 * 0.6 * np.sqrt(0.75) / 0.05
+    assert abs(measured[0]) + abs(measured[2]) < 0.01
 
 
 def test_beyond_its_table_a_term_fades_and_says_so() -> None:
