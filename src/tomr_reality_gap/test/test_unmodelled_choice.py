@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from tomr_power_model.unmodelled import FAMILIES
+from tomr_reality_gap import explain
 from tomr_reality_gap.fit import unmodelled
 from tomr_reality_gap.fit.unmodelled import unmodelled_effect
 
@@ -69,3 +70,32 @@ def test_a_law_of_place_that_explains_nearly_all_is_no_event(
 ) -> None:
     """Few stretches of one drive meet again."""
     assert _chosen(monkeypatch, {PLACE: 0.1, TIME: 0.9}, law=law) == expected
+
+
+@pytest.mark.parametrize(
+    ("share", "size", "has_names", "looked"),
+    [
+        (0.5, 0.03, True, True),  # names that leave much are doubted, however little that is
+        (0.5, 0.03, False, False),
+        (0.2, 0.03, True, False),
+        (0.2, 0.16, False, True),
+        (0.2, 0.14, True, False),
+    ],
+)
+def test_what_is_left_is_looked_into_where_it_is_large_or_names_leave_much(
+    monkeypatch: pytest.MonkeyPatch, share: float, size: float, has_names: bool, looked: bool
+) -> None:
+    asked = []
+    model = SimpleNamespace(
+        described=SimpleNamespace(robot=None), hypotheses=("a name",) * has_names
+    )
+    best = SimpleNamespace(model=model, evidence=0.0)
+    found = SimpleNamespace(best=best, without=best)
+    dataset = SimpleNamespace(predict=lambda _: (None, None), value=())
+    ready = SimpleNamespace(base=SimpleNamespace(robot=None), scales=None)
+    monkeypatch.setattr(explain, "residuals_of", lambda *_: ())
+    monkeypatch.setattr(explain, "unexplained", lambda _: (share, size))
+    monkeypatch.setattr(explain, "_remainder", lambda *_: None)
+    monkeypatch.setattr(explain, "unmodelled_effect", lambda *_, is_sure: asked.append(is_sure))
+    assert explain._unmodelled(dataset, found, ready) is None  # type: ignore[arg-type]
+    assert asked == [False] * looked
