@@ -377,6 +377,16 @@ def test_beyond_its_table_a_term_fades_and_says_so() -> None:
     assert found.torque[1] == 0.0
 
 
+def test_where_an_angle_is_not_known_nothing_ripples_and_nothing_fades() -> None:
+    """As an effect's ripple; the wheel whose angle is known ripples on."""
+    knots = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False).tolist()
+    term = _term("torque.angle", [knots], [[0.3] * 12] * 3, 0, 1, 2)
+    online = OnlineTerms((term,), wheels_to_twist(ROBOT), TICK)
+    found = online.over((1.0, 1.0, 1.0), (0.0,) * 3, (NAN[0], 2.0, NAN[0]), 0.0)
+    assert list(found.torque) == pytest.approx([0.0, 0.3, 0.0])
+    assert found.outside == ()
+
+
 def test_a_term_is_outside_where_its_own_wheel_is() -> None:
     """Straight on wheel 1 stands, within the table that the others are beyond."""
     motion = _motion((0.6, 0.0, 0.0))

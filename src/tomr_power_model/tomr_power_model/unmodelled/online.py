@@ -84,7 +84,7 @@ class OnlineTerms:
             time=body(now.time),
             speed=wheels[None],
             current=np.array([current], dtype=np.float64),
-            angle=np.nan_to_num(np.array([angle], dtype=np.float64)),
+            angle=np.array([angle], dtype=np.float64),
             heading=body(middle),
             x=body(now.x),
             y=body(now.y),

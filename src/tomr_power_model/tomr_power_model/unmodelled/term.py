@@ -67,15 +67,18 @@ class LearntTerm:
         return Actions(torque, driver, supply)
 
     def _at(self, values: Array, at: Array) -> Array:
-        return value_at(self.family, self.knots, values, at)
+        """Nothing where the variables are not known."""
+        known = np.isfinite(at).all(axis=1, keepdims=True)
+        found = value_at(self.family, self.knots, values, np.where(known, at, 0.0))
+        return np.where(known[:, 0], found, 0.0)
 
     def outside(self, motion: Motion) -> float:
         """Share of a drive that lies beyond the table, where the term acts."""
         ones = np.ones(math.prod(len(points) for points in self.knots))
         coordinates = self.family.coordinates(motion)
         found = [
-            self._at(ones, _of_place(coordinates, wheel)) < 1.0 - _ROUNDING
-            for wheel in self.wheels or (0,)
+            (self._at(ones, at) < 1.0 - _ROUNDING) & np.isfinite(at).all(axis=1)
+            for at in (_of_place(coordinates, wheel) for wheel in self.wheels or (0,))
         ]
         return float(np.mean(found))
 
