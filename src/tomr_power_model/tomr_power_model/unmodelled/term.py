@@ -68,7 +68,7 @@ class LearntTerm:
 
     def _at(self, values: Array, at: Array) -> Array:
         """Nothing where the variables are not known."""
-        known = np.isfinite(at).all(axis=1, keepdims=True)
+        known = np.all(np.isfinite(at), axis=1, keepdims=True)
         found = value_at(self.family, self.knots, values, np.where(known, at, 0.0))
         return np.where(known[:, 0], found, 0.0)
 
@@ -77,7 +77,7 @@ class LearntTerm:
         ones = np.ones(math.prod(len(points) for points in self.knots))
         coordinates = self.family.coordinates(motion)
         found = [
-            (self._at(ones, at) < 1.0 - _ROUNDING) & np.isfinite(at).all(axis=1)
+            (self._at(ones, at) < 1.0 - _ROUNDING) & np.all(np.isfinite(at), axis=1)
             for at in (_of_place(coordinates, wheel) for wheel in self.wheels or (0,))
         ]
         return float(np.mean(found))
