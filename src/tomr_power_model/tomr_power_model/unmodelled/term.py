@@ -27,12 +27,6 @@ class Actions:
     driver: Array  # power drawn besides by the drivers [W], (n, 3)
     supply: Array  # power drawn besides at the supply alone [W], (n,)
 
-    def plus(self, other: "Actions") -> "Actions":
-        """Both together."""
-        return Actions(
-            self.torque + other.torque, self.driver + other.driver, self.supply + other.supply
-        )
-
 
 @frozen(eq=False)
 class LearntTerm:
