@@ -19,10 +19,11 @@ from tomr_power_model.estimation.statistics import autocorrelation_time, robust_
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_power_model.unmodelled import FAMILIES, Family, LearntTerm, Motion
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
+from tomr_reality_gap.alignment.motion import motion_in
 from tomr_reality_gap.explanation import FittedLaw, Shape
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.laws import Evidence, laws_of
-from tomr_reality_gap.fit.learnt import Table, motion_in
+from tomr_reality_gap.fit.learnt import Table
 from tomr_reality_gap.fit.polish import polished
 
 Array = NDArray[np.float64]
