@@ -45,7 +45,9 @@ def test_a_spring_is_told_with_its_anchor_and_reaches_beyond_the_table() -> None
     found, term = _laws(_table("force.place", line, line), _spring(x, y))["spring"]
     expected = {"stiffness": 4.0, "slack": 0.5, "x": 0.3, "y": -0.2}
     assert found == pytest.approx(expected, abs=0.02)
-    assert [(points[0], points[-1]) for points in term.knots] == [(-3.0, pytest.approx(3.0, abs=0.2))] * 2
+    assert [(points[0], points[-1]) for points in term.knots] == [
+        (-3.0, pytest.approx(3.0, abs=0.2))
+    ] * 2
     far = np.array([2.5, 2.5])
     at = np.argmin([np.hypot(a - far[0], b - far[1]) for a in term.knots[0] for b in term.knots[1]])
     place = np.array([(a, b) for a in term.knots[0] for b in term.knots[1]])[at]

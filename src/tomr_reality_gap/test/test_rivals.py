@@ -94,9 +94,9 @@ def test_what_spans_nearly_the_same_is_a_rival_with_the_size_that_stands_in() ->
 
 
 def test_what_only_nuisances_tell_apart_is_a_rival() -> None:
-    found, beside = map(_hypothesis, ("found", "beside"))
-    tried = _nearest((found, SHOWN), (beside, SHOWN + NUISANCE))
-    assert [model.hypotheses[0].effect for model in tried] == ["beside"]
+    found, beside, near = map(_hypothesis, ("found", "beside", "near"))
+    tried = _nearest((found, SHOWN), (beside, SHOWN + NUISANCE), (near, SHOWN + 0.03 * OTHER))
+    assert [model.hypotheses[0].effect for model in tried] == ["beside", "near"]
 
 
 @pytest.mark.parametrize(
