@@ -10,6 +10,7 @@ from tomr_reality_gap.fit import unmodelled
 from tomr_reality_gap.fit.unmodelled import unmodelled_effect
 
 PLACE, SPEED, TIME = "force.place", "torque.speed", "supply.time"
+SIGNED = "torque.signed_speed"
 
 
 def _chosen(
@@ -46,6 +47,10 @@ def _chosen(
         ({PLACE: 0.29, TIME: 0.31}, TIME),  # too little to be told
         ({PLACE: 0.29, TIME: 0.29}, None),
         ({SPEED: 0.31}, SPEED),
+        ({SPEED: 0.59, SIGNED: 0.61}, SPEED),  # the way it turns tells no more
+        ({SPEED: 0.57, SIGNED: 0.61}, SIGNED),
+        ({SPEED: 0.61, SIGNED: 0.59}, SPEED),
+        ({SIGNED: 0.61, PLACE: 0.6}, SIGNED),
         ({SPEED: 0.29}, None),
         ({TIME: 0.31}, TIME),
         ({}, None),

@@ -39,6 +39,7 @@ _TOLD = 0.3  # share of what is left that a term must predict
 _SMALL = 0.02  # of a channel's standard deviation: less is not worth a word
 _LAGS = 80
 _LAW = 0.8  # of the squares that are left: a law that explains so much is no chance
+_AS_MUCH = 0.95  # of what a wider family predicts
 _NEAR = 0.35  # of the best share: worth a closer look
 _EVENT = 0.45  # of what a term of time explains: as much of it, and it is repeatable
 
@@ -160,7 +161,7 @@ def unmodelled_effect(
     tried = families_tried(rest, robot, scales, motions)
     if not tried:
         return None
-    lasting = next((item for item in tried if not item.table.family.is_event), None)
+    lasting = _narrowest([item for item in tried if not item.table.family.is_event])
     events = next((item for item in tried if item.table.family.is_event), None)
     best = lasting or events
     if lasting and events and lasting.share < max(_EVENT * events.share, _TOLD):
@@ -173,6 +174,15 @@ def unmodelled_effect(
             if found.laws and found.explained > _LAW:
                 return found
     return fitted(rest, best, robot, motions)
+
+
+def _narrowest(tried: Sequence[Tried]) -> Tried | None:
+    """The best, or the family within it that predicts as much."""
+    best = tried[0] if tried else None
+    for item in tried:
+        if best is not None and item.table.family.family_id == best.table.family.holds:
+            return item if item.share > _AS_MUCH * best.share else best
+    return best
 
 
 def families_tried(

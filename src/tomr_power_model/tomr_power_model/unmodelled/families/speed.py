@@ -27,6 +27,7 @@ class TorqueBySignedSpeed(Family):
     acts = "torque"
     axes: ClassVar = (Axis("signed wheel speed", "rad/s", 16, lambda m: m.speed),)
     words = "a torque that depends on the wheel's speed and the way it turns"
+    holds = "torque.speed"
 
     @staticmethod
     def factor(motion: Motion) -> Array:
