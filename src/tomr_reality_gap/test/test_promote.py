@@ -1,5 +1,6 @@
 """From a learnt term's law to an effect: its file, its test, and how it joins the vocabulary."""
 
+import argparse
 import json
 import math
 import re
@@ -17,8 +18,10 @@ from tomr_power_model.errors import InputError
 from tomr_power_model.robot import read_description, robot_from_parameters
 from tomr_power_model.unmodelled import FAMILIES, LearntTerm
 from tomr_power_model.unmodelled.described import parameters_of
+from tomr_reality_gap.arguments import add_inputs, inputs_of
 from tomr_reality_gap.cli import main
 from tomr_reality_gap.fit.laws import LAWS, SMOOTH
+from tomr_reality_gap.promote.learnt_law import learnt_law
 
 WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
 CUBE = {
@@ -104,6 +107,9 @@ def test_a_promoted_law_is_an_effect_that_passes_its_own_test(
     assert made.__doc__ is not None
     assert "with 95 % intervals" in made.__doc__
     assert made.prior is not None
+    size = made.parameters["size"]
+    assert made.prior.sign == (1 if size.start > 0.0 else -1)
+    assert (size.minimum < 0.0, size.maximum > 0.0) == (size.start < 0.0, size.start > 0.0)
 
 
 def test_units_ranges_and_priors_are_those_of_the_intervals(tmp_path: Path) -> None:
@@ -155,6 +161,17 @@ def test_what_cannot_be_promoted_is_refused_with_one_line(
     assert said.count("\n") == 1
     assert re.search(message, said)
     assert not (tmp_path / "effects").exists()
+
+
+def test_laws_are_those_of_the_terms_own_family(tmp_path: Path) -> None:
+    explained = _explained(tmp_path)
+    report = json.loads(explained.with_name("report.json").read_text(encoding="utf-8"))
+    laws = [{"law": "power law", "parameters": _told(size=9.0, exponent=0.5)}]
+    other = {"effect": "unknown", "learnt": {"family": "driver.current", "laws": laws}}
+    both = {"findings": [other, *report["findings"], other, {"effect": "friction.coulomb"}]}
+    explained.with_name("report.json").write_text(json.dumps(both), encoding="utf-8")
+    found = learnt_law(explained).parameters
+    assert {name: item.value for name, item in found.items()} == {"size": 1e-4, "exponent": 3.0}
 
 
 def test_a_description_without_a_report_or_a_term_is_refused(
@@ -226,3 +243,14 @@ def test_effects_of_a_user_join_only_where_their_folder_is_named(
     assert load_effects(tmp_path) == ["own.x"]  # the same file again is no clash
     with pytest.raises(InputError, match="holds no effects"):
         load_effects(tmp_path / "nowhere")
+
+
+def test_an_option_names_the_folder(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(OWN.format(effect_id="own.x", names=["a"]), encoding="utf-8")
+    parser = argparse.ArgumentParser()
+    add_inputs(parser)
+    given = ["--robot", "reference", "--real", str(tmp_path)]
+    inputs_of(parser.parse_args(given))
+    assert "own.x" not in EFFECTS
+    inputs_of(parser.parse_args([*given, "--effects", str(tmp_path)]))
+    assert "own.x" in EFFECTS
