@@ -257,11 +257,11 @@ def test_a_robot_that_was_measured_anew_keeps_its_tables() -> None:
     ("family", "knots", "values", "wheels"),
     [
         ("torque.speed", [[0.0, 1.0, 2.0]], [0.0, 0.0, -1.0], (0,)),
-        ("torque.speed", [[1.0, 2.0, 3.0]], [1.0, 0.5, 0.2], (1,)),  # it fades below
+        ("torque.speed", [[1.0, 2.0, 3.0]], [8.0, 8.5, 9.5], (1,)),  # it ends, and that is all
         ("torque.signed_speed", [[-2.0, 0.0, 2.0]], [-0.1, 1.9, 1.9], (2,)),
         ("torque.current", [[0.0, 1.0, 2.0]], [0.2, 0.8, 0.6], (0,)),
         ("force.velocity", [[-0.5, 0.5], [-0.5, 0.5]],
-         [[300.0, 300.0, -300.0, -300.0], [0.0] * 4], ()),
+         [[300.0, 0.0, -300.0, -600.0], [0.0] * 4], ()),
     ],
 )  # fmt: skip
 def test_a_curve_steeper_than_the_drivers_hold_is_refused(

@@ -54,11 +54,13 @@ def too_steep(
 
 
 def _steepest(term: LearntTerm) -> float:
-    """Largest slope of a table, its fading included: norm of the derivative, by its axes."""
+    """Largest slope of a table: norm of the derivative, by its axes.
+
+    That with which it fades does not count: it jumps by no more than the last value, and laws end
+    far beyond where their robot was.
+    """
     shape = [len(points) for points in term.knots]
-    # Below a knot at 0 there is nothing: speeds and currents count by their size.
-    ends = [(int(points[0] != 0.0), 1) for points in term.knots]
-    table = np.stack([np.pad(row.reshape(shape), ends) for row in term.values])
+    table = np.stack([row.reshape(shape) for row in term.values])
     steps = [float(points[1] - points[0]) for points in term.knots]
     if len(shape) == 1:
         return float(np.abs(np.diff(table, axis=1)).max()) / steps[0]
