@@ -76,9 +76,14 @@ def is_unmodelled(evidence: float, named: float, cost: float) -> bool:
     return evidence > max(_UNMODELLED_COST, cost, SIMULATOR.unmodelled * named)
 
 
+def leaves_much(share: float) -> bool:
+    """Whether what was named is not the whole story, from the share that is left."""
+    return share > _MUCH
+
+
 def is_doubted(share: float, size: float, has_findings: bool) -> bool:
     """Whether too much is left (see `unexplained`) for what was named, or for a match."""
-    return share > _MUCH and size > (1.0 if has_findings else _GROSS)
+    return leaves_much(share) and size > (1.0 if has_findings else _GROSS)
 
 
 def energy_shares(lost: Sequence[float], left: float) -> list[float]:
