@@ -185,16 +185,21 @@ def described(robot: Robot) -> str:
 
 
 class StopRequest:
-    """Set by SIGINT or SIGTERM. rclpy's own handlers can lose a signal that comes early, and a
-    signal to the process group comes twice and would interrupt the clean-up."""
+    """Set by SIGINT or SIGTERM. rclpy's own handlers can lose a signal that comes early. What comes
+    after the first is ignored: a signal to the process group comes twice, and the second would
+    interrupt the clean-up, or meet an interpreter that has put its handlers away."""
+
+    _NUMBERS = (signal.SIGINT, signal.SIGTERM)
 
     def __init__(self) -> None:
         self.is_set = False
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in self._NUMBERS:
             signal.signal(number, self._set)
 
     def _set(self, *_: object) -> None:
         self.is_set = True
+        for number in self._NUMBERS:
+            signal.signal(number, signal.SIG_IGN)
 
 
 def make_executor() -> Executor:
