@@ -9,11 +9,13 @@ import rclpy
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
+from tomr_fault_diag.diagnosis.settings import STAGE_NODES, DiagnosisSettings
 from tomr_fault_diag.nodes.diagnosis_node import DiagnosisNode
 from tomr_fault_diag.nodes.fault_classifier_node import FaultClassifierNode
 from tomr_fault_diag.nodes.power_residuals_node import PowerResidualsNode
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.nodes.stage_node import StageNode
+from tomr_power_model.robot import read_node_sections
 
 KINDS = {
     "residuals": PowerResidualsNode,
@@ -80,12 +82,16 @@ def test_one_process_takes_the_sections_of_the_stages(tmp_path: Path) -> None:
         reference
         + "power_residuals:\n  ros__parameters:\n    band.power: 2.2\n"
         + "tomr_diagnosis:\n  ros__parameters:\n    recovery_time: 2.5\n"
+        + "    intermediate_topics: false\n"
     )
     rclpy.init(args=["--ros-args", "--params-file", str(file), "-p", "band.current:=0.3"])
     node = DiagnosisNode([str(file)])
-    settings = node.pipeline.settings
+    settings, values = node.pipeline.settings, dict(node.values)
     node.destroy_node()
     rclpy.shutdown()
     assert settings.residuals.bands.power == 2.2
     assert settings.residuals.bands.current == 0.3
     assert settings.classifier.recovery_time == to_ns(2.5)
+    assert values["intermediate_topics"] is False
+    read = DiagnosisSettings.of(read_node_sections(file, STAGE_NODES), "a tool")
+    assert read.classifier.recovery_time == to_ns(2.5)

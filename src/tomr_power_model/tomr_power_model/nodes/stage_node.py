@@ -75,6 +75,7 @@ class StageNode(Node):
             self.values["hardware_id"] = self._namespace or NAMELESS
         self._complaints = Complaints()
         self._outlets: dict[str, Any] = {}
+        self._ends: list[Callable[[], object]] = []  # of what it listens to
         self._topics: dict[str, list[str]] = {"listens to": [], "publishes": []}
 
     def listen(
@@ -105,9 +106,18 @@ class StageNode(Node):
             )
 
         if item.other_types:
-            CommandType(self, item.topic, str(self.values["cmd_vel_type"]), subscribe)
+            setting = str(self.values["cmd_vel_type"])
+            self._ends.append(CommandType(self, item.topic, setting, subscribe).close)
         else:
-            subscribe(item.type_name)
+            subscription = subscribe(item.type_name)
+            self._ends.append(lambda: self.destroy_subscription(subscription))
+
+    def unlisten(self) -> None:
+        """Take back all subscriptions."""
+        for end in self._ends:
+            end()
+        self._ends.clear()
+        self._topics["listens to"].clear()
 
     def _note(self, what: str, topic: str, type_name: str) -> None:
         kind = type_name.rpartition("/")[2]
@@ -117,7 +127,8 @@ class StageNode(Node):
         """Log robot, topics and types, once."""
         self.get_logger().info(described(self._robot))
         for what, topics in self._topics.items():
-            self.get_logger().info(f"{what} {', '.join(topics)}")
+            if topics:
+                self.get_logger().info(f"{what} {', '.join(topics)}")
 
     def on_change(self, apply: Callable[[dict[str, Value]], None]) -> None:
         """Apply all values anew when some of them are set while the node runs."""
@@ -149,6 +160,13 @@ class StageNode(Node):
             STAGE_QOS,
             event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
         )
+
+    def withdraw(self) -> None:
+        """Take back all that was offered."""
+        for outlet in self._outlets.values():
+            self.destroy_publisher(outlet)
+        self._outlets.clear()
+        self._topics["publishes"].clear()
 
     def send(self, message: Outgoing) -> None:
         """Publish a record on its topic, if anybody listens."""
