@@ -17,6 +17,7 @@ from attrs import frozen
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import KeyValue
 from rclpy.node import Node
+from rclpy.serialization import serialize_message
 
 from tomr_fault_diag.classifier.messages import NAME
 from tomr_fault_diag.nodes.diagnosis_node import DiagnosisNode
@@ -108,6 +109,6 @@ def test_a_node_survives_whatever_it_hears(node: Node) -> None:
         for stamp_ns in (0, start + count * SECOND // 50, *((LAST,) if count % 100 == 99 else ())):
             for subscription in heard:
                 message = Hostile(*case, stamp_ns).message(subscription.msg_type)
-                subscription.callback(message)
+                subscription.callback(serialize_message(message) if subscription.raw else message)
         for timer in node.timers:
             timer.callback()

@@ -7,6 +7,7 @@ from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from struct import Struct
 from typing import Any
 
 import rclpy
@@ -17,12 +18,13 @@ from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_OK
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.outgoing import TYPES, DiagnosticMessage, Outgoing
-from tomr_power_model.messages.plain import Plain, build
+from tomr_power_model.messages.plain import NANOSECONDS, Plain, build
 from tomr_power_model.nodes.command_type import CommandType
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
 from tomr_power_model.robot import Robot
@@ -34,6 +36,8 @@ from tomr_power_model.topics.inputs import Complaints, Input
 SENSOR_QOS = QoSProfile(depth=500, reliability=ReliabilityPolicy.BEST_EFFORT)
 STAGE_QOS = QoSProfile(depth=500, reliability=ReliabilityPolicy.RELIABLE)
 
+_STAMP = Struct("<iI")
+_CDR_HEAD = 4  # bytes before the first field
 _SIGNAL_CHECK_S = 0.2  # the longest that a signal waits while no message comes
 
 
@@ -95,12 +99,17 @@ class StageNode(Node):
                 self.complain(item.topic, problem)
             advance()
 
+        def receive_bytes(data: bytes) -> None:
+            if item.is_too_close is None or not item.is_too_close(_stamp_of_bytes(data)):
+                receive(deserialize_message(data, message_class(item.type_name)))
+
         def subscribe(type_name: str) -> Any:
             return self.create_subscription(
                 message_class(type_name),
                 item.topic,
-                receive,
+                receive if item.is_too_close is None else receive_bytes,
                 qos,
+                raw=item.is_too_close is not None,
                 # Each default event adds to every wait: together a sixth of the nodes' CPU.
                 event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
             )
@@ -184,6 +193,12 @@ class StageNode(Node):
         """Whether a topic is offered and anybody listens to it."""
         outlet = self._outlets.get(topic)
         return outlet is not None and outlet.get_subscription_count() > 0
+
+
+def _stamp_of_bytes(data: bytes) -> int:
+    """Stamp [ns] of a serialised message that begins with a header, 0 if it is big-endian."""
+    seconds, nanoseconds = _STAMP.unpack_from(data, _CDR_HEAD) if data[1] & 1 else (0, 0)
+    return int(seconds) * NANOSECONDS + int(nanoseconds)
 
 
 def _of_robot(message: DiagnosticMessage, namespace: str) -> DiagnosticMessage:
