@@ -23,7 +23,6 @@ It takes an hour on two cores; --first-seed 500000 --drives 10 --healthy-hours 0
 """
 
 import argparse
-import json
 import os
 import pickle
 import sys
@@ -36,7 +35,7 @@ from typing import TypeVar
 
 import numpy as np
 from attrs import evolve, frozen
-from diagnosis_report import NAMES, Codes, Onset, Outcome, report
+from diagnosis_report import NAMES, Codes, Onset, Outcome, publish, report
 from stages import as_arrays
 from tqdm import tqdm
 
@@ -298,10 +297,7 @@ def _main(arguments: Sequence[str] | None) -> int:
         name: report([item[name] for item in sick], [item[name] for item in well])
         for name in kinds()
     }
-    text = json.dumps(found, indent=2)
-    print(text)
-    if options.json:
-        options.json.write_text(text + "\n", encoding="utf-8")
+    publish(found, options.json)
     return 0
 
 

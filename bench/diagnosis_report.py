@@ -1,7 +1,9 @@
 """What `diagnosis.py` prints: confusion, recall, precision, delays and false alarms."""
 
+import json
 from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from attrs import frozen
@@ -155,3 +157,11 @@ def _alarms(outcomes: Sequence[Outcome]) -> dict[str, object]:
         "ci95_per_hour": [round(low / max(hours, 1e-9), 4), round(high / max(hours, 1e-9), 4)],
         "slip_named_where_a_wheel_slipped": sum(outcome.excused for outcome in outcomes),
     }
+
+
+def publish(found: object, file: Path | None) -> None:
+    """Print a report as JSON, and write it to a file as well if one is given."""
+    text = json.dumps(found, indent=2)
+    print(text)
+    if file is not None:
+        file.write_text(text + "\n", encoding="utf-8")

@@ -14,7 +14,6 @@ its wheel turns. Decisions count from 1 s after it first shows. Figures are thos
 """
 
 import argparse
-import json
 import math
 import os
 import sys
@@ -26,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 from attrs import evolve, frozen
+from diagnosis_report import publish
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.judges import make_judge
@@ -38,8 +38,8 @@ from tomr_fault_diag.diagnosis.score import (
     WRONG,
     Scores,
     Seen,
-    binomial_interval,
     seen,
+    with_interval,
 )
 from tomr_fault_diag.diagnosis.track import Track, Tracker
 from tomr_power_model.cli import run_main
@@ -269,16 +269,9 @@ def targets(found: Sequence[Seen]) -> dict[str, object]:
             "a wrong fault": counts[WRONG],
         }
         report[name] = {"faults": total} | {
-            words: _with_interval(part, total) for words, part in told.items()
+            words: with_interval(part, total) for words, part in told.items()
         }
     return report
-
-
-def _with_interval(part: int, whole: int) -> dict[str, object]:
-    if not whole:
-        return {"share": None, "ci95": None}
-    low, high = binomial_interval(part, whole)
-    return {"share": round(part / whole, 4), "ci95": [round(low, 4), round(high, 4)]}
 
 
 def _main(arguments: Sequence[str] | None) -> int:
@@ -309,10 +302,7 @@ def _main(arguments: Sequence[str] | None) -> int:
         "targets": targets(scored),
         **Scores(tuple(scored)).as_dict(),
     }
-    text = json.dumps(report, indent=2)
-    print(text)
-    if options.json:
-        options.json.write_text(text + "\n", encoding="utf-8")
+    publish(report, options.json)
     return 0
 
 

@@ -4,107 +4,133 @@ bench/flood.py --rate 5000 --seconds 20
 """
 
 import argparse
-import struct
-import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from importlib.resources import as_file, files
 from pathlib import Path
+from struct import Struct
 from typing import Any
 
-import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import TwistStamped
-from processes import command_path, resident_mb, running
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-from rclpy.serialization import serialize_message
-from sensor_msgs.msg import BatteryState, JointState
+from attrs import frozen
+from drive import ROBOT, Raw
+from feeder_node import Feeder, feeder
+from online import LISTENER, ONE, Command, all_run, noted_pairs, suite_commands
+from processes import resident_mb, running
 
-from tomr_fault_diag.classifier.messages import NAME
+from tomr_fault_diag.classifier.messages import TOPIC as DIAGNOSTICS
 from tomr_power_model.cli import EXIT_OK, run_main
-from tomr_power_model.messages.intake import header_stamp_ns
-from tomr_power_model.nodes.stage_node import SENSOR_QOS
+from tomr_power_model.errors import InputError
+from tomr_power_model.messages.bag import bag_header, bag_message, jazzy_typestore
+from tomr_power_model.messages.plain import NANOSECONDS
+from tomr_power_model.messages.types import BATTERY, JOINT_STATE, TWIST_STAMPED
 from tomr_power_model.robot import shipped_robot
 
 USUAL = 100.0  # Hz of encoders
 POWER, COMMANDS = 50.0, 20.0  # Hz
 SETTLING, AFTER = 4.0, 5.0  # s of usual rates before and after the flood
-_STAMP = struct.Struct("<iI")  # of a serialised message, after four bytes
+_LEAD_NS = NANOSECONDS // 5
+_STAMP = Struct("<iI")  # of a serialised message, after four bytes
 
 
-class Robot(Node):
-    """A robot at rest, which hears what is said of it."""
+@frozen
+class Flood:
+    """Encoders at `rate` [Hz] for `seconds`, between spells of the usual rate."""
 
-    def __init__(self) -> None:
-        super().__init__("flooder")
-        wheels = shipped_robot("reference").wheel_names
-        zeros = [0.0] * len(wheels)
-        encoders = JointState(name=list(wheels), position=zeros, velocity=zeros)
-        supply = BatteryState(voltage=24.0, current=-0.05)
-        self.encoders = self._outlet("joint_states", encoders)
-        self.supplies = [
-            self._outlet(f"{wheel.removesuffix('_joint')}/power", supply) for wheel in wheels
+    rate: float
+    seconds: float
+    start_ns: int
+
+    @property
+    def begin_ns(self) -> int:
+        return self.start_ns + round(SETTLING * NANOSECONDS)
+
+    @property
+    def end_ns(self) -> int:
+        return self.begin_ns + round(self.seconds * NANOSECONDS)
+
+    @property
+    def last_ns(self) -> int:
+        return self.end_ns + round(AFTER * NANOSECONDS)
+
+    def messages(self) -> list[Raw]:
+        """What a robot at rest publishes, in the order of stamps."""
+        robot = shipped_robot(ROBOT)
+        zeros = [0.0] * len(robot.wheel_names)
+        encoders = {"name": list(robot.wheel_names), "position": zeros, "velocity": zeros}
+        supply = {"voltage": 24.0, "current": -0.05}
+        found = [
+            *_stream("/joint_states", JOINT_STATE, encoders, self.start_ns, self.begin_ns, USUAL),
+            *_stream("/joint_states", JOINT_STATE, encoders, self.begin_ns, self.end_ns, self.rate),
+            *_stream("/joint_states", JOINT_STATE, encoders, self.end_ns, self.last_ns, USUAL),
+            *_stream("/cmd_vel", TWIST_STAMPED, {}, self.start_ns, self.last_ns, COMMANDS),
         ]
-        self.commands = self._outlet("cmd_vel", TwistStamped())
-        self.verdicts: list[tuple[float, float]] = []  # heard at, of [s]
-        self.create_subscription(DiagnosticArray, "/diagnostics", self._hear, 100)
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self)
-
-    def _outlet(self, topic: str, message: Any) -> Callable[[float], None]:
-        data = bytearray(serialize_message(message))
-        publisher = self.create_publisher(type(message), topic, SENSOR_QOS)
-
-        def publish(stamp: float) -> None:
-            _STAMP.pack_into(data, 4, int(stamp), int(1e9 * (stamp % 1.0)))
-            publisher.publish(bytes(data))
-
-        return publish
-
-    def _hear(self, message: DiagnosticArray) -> None:
-        if any(status.name == NAME for status in message.status):
-            self.verdicts.append((time.time(), 1e-9 * (header_stamp_ns(message) or 0)))
-
-    def spin(self) -> None:
-        """Take what has come in."""
-        for _ in range(8):
-            self._executor.spin_once(0.0)
-
-    def run(self, rate: float, seconds: float) -> None:
-        """Publish for a time, encoders at a rate [Hz]."""
-        begin = time.time()
-        sent = dict.fromkeys(("encoders", "supplies", "commands"), 0)
-        while (passed := time.time() - begin) < seconds:
-            while sent["encoders"] < passed * rate:
-                self.encoders(begin + sent["encoders"] / rate)
-                sent["encoders"] += 1
-            if sent["supplies"] < passed * POWER:
-                sent["supplies"] += 1
-                for supply in self.supplies:
-                    supply(begin + passed)
-                self.spin()
-            if sent["commands"] < passed * COMMANDS:
-                sent["commands"] += 1
-                self.commands(begin + passed)
-            time.sleep(0.0005)
+        for wheel in robot.wheel_topics:
+            topic = f"/{wheel}/power"
+            found += _stream(topic, BATTERY, supply, self.start_ns, self.last_ns, POWER)
+        return sorted(found, key=lambda message: message.stamp_ns)
 
 
-def _flooded(robot: Robot, node: "subprocess.Popen[bytes]", rate: float, seconds: float) -> None:
-    while not robot.verdicts:
-        robot.run(USUAL, 0.5)
-    robot.run(USUAL, SETTLING)
-    memory = resident_mb(node.pid)
-    robot.run(rate, seconds)
-    end = time.time()
-    robot.run(USUAL, AFTER)
-    late = [heard - of for heard, of in robot.verdicts if of > end]
-    print(
-        f"{rate:g} Hz for {seconds:g} s: of {len(late)} verdicts in the {AFTER:g} s after it the "
-        f"latest came {max(late):.2f} s after its stamp; memory {memory:.0f} MB before, "
-        f"{resident_mb(node.pid):.0f} MB after"
+def _stream(
+    topic: str, type_name: str, fields: dict[str, Any], begin_ns: int, end_ns: int, rate: float
+) -> Iterator[Raw]:
+    """One message over and over, stamped anew."""
+    message = bag_message(type_name, header=bag_header(0), **fields)
+    data = bytearray(jazzy_typestore().serialize_cdr(message, type_name))
+    for number in range(round((end_ns - begin_ns) * rate / NANOSECONDS)):
+        stamp_ns = begin_ns + round(number * NANOSECONDS / rate)
+        _STAMP.pack_into(data, 4, *divmod(stamp_ns, NANOSECONDS))
+        yield Raw(topic, type_name, bytes(data), stamp_ns)
+
+
+def _play(source: Feeder, flood: Flood, messages: Sequence[Raw], pid: int) -> tuple[int, str]:
+    """When the first message was due on the monotonic clock [ns], and how the flood went."""
+    timed = [(message.stamp_ns - flood.start_ns, message) for message in messages]
+    begin, end = (
+        next(n for n, message in enumerate(messages) if message.stamp_ns >= stamp_ns)
+        for stamp_ns in (flood.begin_ns, flood.end_ns)
+    )
+    start = time.monotonic_ns() + _LEAD_NS
+    source.play(timed[:begin], start)
+    before = resident_mb(pid)
+    handed = source.play(timed[begin:end], start)
+    source.play(timed[end:], start)
+    late = (handed[-1] - start - timed[end - 1][0]) / NANOSECONDS
+    after = resident_mb(pid)
+    return start, (
+        f"its last message handed over {late:.2f} s late; memory {before:.0f} MB before, "
+        f"{after:.0f} MB after"
+    )
+
+
+def _flooded(flood: Flood) -> str:
+    """The figures, as a line."""
+    messages = flood.messages()
+    described = files("tomr_power_model").joinpath("robots").joinpath(f"{ROBOT}.yaml")
+    with (
+        tempfile.TemporaryDirectory(prefix="tomr-bench-") as folder,
+        as_file(described) as file,
+        feeder(messages) as source,
+    ):
+        noted = Path(folder, "arrivals")
+        commands = suite_commands(file, {"report_period": 0.05}, ONE)
+        listener: dict[str, Command] = {"listener": [sys.executable, LISTENER, noted]}
+        with running(commands | listener, Path(folder)) as nodes:
+            readers = dict.fromkeys((DIAGNOSTICS, *(m.topic for m in messages)), 1)
+            source.wait_for(readers, lambda: all_run(nodes))
+            start, words = _play(source, flood, messages, nodes[ONE[0]].pid)
+        pairs = noted_pairs(noted)
+    delays = [
+        (arrival - start - (stamp - flood.start_ns)) / NANOSECONDS
+        for stamp, arrival in pairs
+        if stamp > flood.end_ns
+    ]
+    if not delays:
+        raise InputError("no verdict came after the flood")
+    return (
+        f"{flood.rate:g} Hz for {flood.seconds:g} s: of {len(delays)} verdicts in the {AFTER:g} s "
+        f"after it the latest came {max(delays):.2f} s after its stamp; {words}"
     )
 
 
@@ -113,15 +139,7 @@ def _bench(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--rate", type=float, default=5000.0, help="Hz (default: %(default)s)")
     parser.add_argument("--seconds", type=float, default=20.0, help="default: %(default)s")
     options = parser.parse_args(arguments)
-    described = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")
-    with tempfile.TemporaryDirectory() as folder, as_file(described) as file:
-        ros = ["--ros-args", "--params-file", str(file), "-p", "report_period:=0.05"]
-        commands = {"tomr_diagnosis": [str(command_path("tomr_diagnosis")), *ros]}
-        rclpy.init()
-        robot = Robot()
-        with running(commands, Path(folder)) as nodes:
-            _flooded(robot, nodes["tomr_diagnosis"], options.rate, options.seconds)
-        rclpy.shutdown()
+    print(_flooded(Flood(options.rate, options.seconds, time.time_ns())))
     return EXIT_OK
 
 

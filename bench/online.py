@@ -26,6 +26,7 @@ ONE = ("tomr_diagnosis",)
 # What is measured: our nodes, and their baseline with callbacks that do nothing.
 SUITES = {"three nodes": NODES, "one process": ONE, "empty nodes": NODES}
 _BENCH = Path(__file__).resolve().parent
+LISTENER = _BENCH / "listener_node.py"
 _LEAD_NS = NANOSECONDS // 5  # between "all connected" and the first message
 
 Command = Sequence[str | Path]
@@ -94,7 +95,7 @@ def measure_cost(drive: Drive, warmup_s: float, suite: str) -> dict[str, Cost]:
     ):
         commands = empty_commands() if empty else suite_commands(robot_path, {}, names)
         with running(commands, Path(folder)) as nodes:
-            source.wait_for(_listeners({}, names), lambda: _all_run(nodes))
+            source.wait_for(_listeners({}, names), lambda: all_run(nodes))
             start = time.monotonic_ns() + _LEAD_NS
             source.play(timed[:warm], start)
             before, since = _cpu(nodes), time.monotonic()
@@ -104,12 +105,13 @@ def measure_cost(drive: Drive, warmup_s: float, suite: str) -> dict[str, Cost]:
     return {name: Cost((used[name] - before[name]) / seconds, memory[name]) for name in names}
 
 
-def _all_run(processes: Mapping[str, subprocess.Popen[bytes]]) -> bool:
+def all_run(processes: Mapping[str, subprocess.Popen[bytes]]) -> bool:
+    """Whether none has ended."""
     return all(process.poll() is None for process in processes.values())
 
 
 def _cpu(nodes: Mapping[str, subprocess.Popen[bytes]]) -> dict[str, float]:
-    if not _all_run(nodes):
+    if not all_run(nodes):
         return dict.fromkeys(nodes, 0.0)  # `running` tells which one ended, and why
     return {name: cpu_seconds(process.pid) for name, process in nodes.items()}
 
@@ -143,15 +145,14 @@ def measure_latency(drive: Drive, warmup_s: float, suite: str) -> Latencies:
         feeder(drive.sensors) as source,
     ):
         noted = Path(folder, "arrivals")
-        program = _BENCH / "listener_node.py"
-        listener: dict[str, Command] = {"listener": [sys.executable, program, noted]}
+        listener: dict[str, Command] = {"listener": [sys.executable, LISTENER, noted]}
         with running(
             suite_commands(robot_path, PROMPT, names) | listener, Path(folder)
         ) as processes:
-            source.wait_for(_listeners({DIAGNOSTICS: 1}, names), lambda: _all_run(processes))
+            source.wait_for(_listeners({DIAGNOSTICS: 1}, names), lambda: all_run(processes))
             handed = source.play(timed, time.monotonic_ns() + _LEAD_NS)
             time.sleep(0.5)  # the last answers
-        arrived = dict(_pairs(noted))
+        arrived = dict(noted_pairs(noted))
     first = drive.sensors[0].stamp_ns + round(warmup_s * NANOSECONDS)
     wanted = {stamp: index for stamp, index in drive.completing.items() if stamp >= first}
     seconds = {
@@ -168,7 +169,7 @@ def measure_latency(drive: Drive, warmup_s: float, suite: str) -> Latencies:
     )
 
 
-def _pairs(noted: Path) -> list[tuple[int, int]]:
+def noted_pairs(noted: Path) -> list[tuple[int, int]]:
     """(stamp, arrival) of what the listener noted, the first arrival of each stamp."""
     lines = [line.split() for line in noted.read_text(encoding="ascii").splitlines()]
     return [(int(stamp), int(arrival)) for arrival, stamp in reversed(lines)]

@@ -63,7 +63,7 @@ def test_a_folder_without_recordings_is_bad_input(
     assert "holds no recording" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("arguments", [["--phases", "0"], ["--jobs", "-1"]])
+@pytest.mark.parametrize("arguments", [["--phases", "0"], ["--phases", "51"], ["--jobs", "-1"]])
 def test_bad_counts_are_refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(HEALTHY), *arguments]) == 2
     assert arguments[0] in capsys.readouterr().err

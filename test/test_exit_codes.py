@@ -86,9 +86,8 @@ def test_names_that_the_terminal_lacks_letters_for(tmp_path: Path) -> None:
 
 
 _SLOW = """
-import signal, sys, threading, _thread, time, types
+import os, signal, sys
 from importlib import abc, machinery
-import os
 # A shell that starts tests in the background has SIGINT ignored.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 class Slow(abc.MetaPathFinder, abc.Loader):
@@ -96,7 +95,7 @@ class Slow(abc.MetaPathFinder, abc.Loader):
         return machinery.ModuleSpec(name, self) if name == "slow" else None
     def exec_module(self, module):
         os.kill(os.getpid(), {number})
-        time.sleep(60)
+        signal.pause()
 sys.meta_path.insert(0, Slow())
 from tomr_power_model.cli import run_module
 sys.exit(run_module("slow"))
@@ -115,6 +114,25 @@ def test_a_signal_while_modules_load(number: int, code: int) -> None:
         env=_environment(),
     )
     assert (run.returncode, run.stderr) == (code, "interrupted\n")
+
+
+_TWICE = """
+import os, signal
+from tomr_power_model.nodes.stage_node import StopRequest
+class Last:
+    def __del__(self, kill=os.kill, pid=os.getpid()):
+        kill(pid, {number})
+stop = StopRequest()
+os.kill(os.getpid(), {number})
+assert stop.is_set
+last = Last()  # goes when the interpreter has put its handlers away
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["INT", "TERM"])
+def test_a_second_signal_does_not_spoil_the_end_of_a_node(number: int) -> None:
+    run = subprocess.run([sys.executable, "-c", _TWICE.format(number=int(number))], timeout=30)
+    assert run.returncode == 0
 
 
 def _environment(**more: str) -> dict[str, str]:

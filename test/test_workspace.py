@@ -12,6 +12,7 @@ import sysconfig
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 from unittest.mock import patch
 
@@ -245,6 +246,45 @@ def test_launch_files_start_commands_that_exist() -> None:
     }
     assert {command for _, command in started} == nodes
     assert started <= known
+
+
+class _Said:
+    """Something of `launch` or `launch_ros`, which need a ROS installation: keeps what it hears."""
+
+    def __init__(self, *given: Any, **named: Any) -> None:
+        self.given, self.named = given, named
+
+
+class _Launch(ModuleType):
+    def __getattr__(self, name: str) -> type[_Said]:
+        return type(name, (_Said,), {})
+
+
+def test_the_diagnosis_is_launched_as_three_nodes_or_as_one() -> None:
+    names = ["", ".actions", ".conditions", ".substitutions", ".parameter_descriptions"]
+    modules = [f"{package}{name}" for package in ("launch", "launch_ros") for name in names]
+    file = ROOT / "src/tomr_fault_diag/launch/diagnosis.launch.py"
+    with patch.dict(sys.modules, {name: _Launch(name) for name in modules}):
+        (told,) = runpy.run_path(str(file))["generate_launch_description"]().given
+    nodes = [action.named for action in told if type(action).__name__ == "Node"]
+    started: dict[str, set[str]] = {"IfCondition": set(), "UnlessCondition": set()}
+    for node in nodes:
+        (switch,) = node["condition"].given
+        assert switch.given == ("composition",)
+        started[type(node["condition"]).__name__].add(node["executable"])
+        # The robot comes first, then settings, which may change its values; arguments count most.
+        own = [name for values in node["parameters"][2:] for name in values]
+        assert {"use_sim_time", "hardware_id"} <= set(own)
+        assert ("managed" in own) == (node["executable"] == "tomr_diagnosis")
+    assert started == {
+        "IfCondition": {"tomr_diagnosis"},
+        "UnlessCondition": {"power_model", "power_residuals", "fault_classifier"},
+    }
+    arguments = {action.given[0] for action in told if "default_value" in action.named}
+    used = {
+        value.given[0].given[0] for n in nodes for v in n["parameters"][2:] for value in v.values()
+    }
+    assert used <= arguments
 
 
 def test_launch_files_name_files_that_are_installed() -> None:

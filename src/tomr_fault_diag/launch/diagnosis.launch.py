@@ -48,6 +48,12 @@ ARGUMENTS = (
         description="true: the three stages in one process, at half the cost",
     ),
     DeclareLaunchArgument(
+        "managed",
+        default_value="false",
+        description="true: with composition, a managed node that a lifecycle manager configures "
+        "and activates",
+    ),
+    DeclareLaunchArgument(
         "decision_rate", default_value="20.0", description="decisions per second [Hz]"
     ),
 )
@@ -85,7 +91,12 @@ def generate_launch_description() -> LaunchDescription:
             stage(rate, name, package="tomr_fault_diag", executable="power_residuals"),
             stage(name, package="tomr_fault_diag", executable="fault_classifier"),
             stage(
-                rate, name, package="tomr_fault_diag", executable="tomr_diagnosis", composed=True
+                rate,
+                name,
+                argument("managed", bool),
+                package="tomr_fault_diag",
+                executable="tomr_diagnosis",
+                composed=True,
             ),
         ]
     )

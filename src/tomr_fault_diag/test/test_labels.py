@@ -5,13 +5,19 @@ from pathlib import Path
 import pytest
 
 from tomr_fault_diag.diagnosis.labels import (
+    TRUTH_TOPIC,
     Label,
     known_states,
     load_labels,
+    recorded_labels,
     simulated,
     split_state,
 )
 from tomr_power_model.errors import InputError
+from tomr_power_model.messages.bag import to_bag
+from tomr_power_model.messages.plain import Level, Status, diagnostics
+from tomr_power_model.messages.types import DIAGNOSTICS
+from tomr_power_model.recordings import RecordingWriter
 
 SAME = {
     "labels.yaml": "- {bag: a, state: motor system fault 2, onset: 8.0, end: 14.0, severity: 0.6, "
@@ -66,6 +72,24 @@ def test_faults_of_the_simulator_have_their_states() -> None:
     towed = simulated("b", "load_towed", {})
     assert towed.is_right("unknown", 0)
     assert not towed.is_right("slip", 0)
+
+
+def test_recorded_faults_begin_when_they_were_not_yet_there(tmp_path: Path) -> None:
+    """In force at 1 s, at 2 s, which is the same fault, and at 4 s, another."""
+    path = tmp_path / "drive"
+    with RecordingWriter(path) as writer:
+        for number in range(10):
+            stamp_ns = 1_700_000_000_000_000_000 + number * 500_000_000
+            active = str(int(number in (2, 4, 8)))
+            values = (("active", active), ("severity", "0.7"), ("wheel", "2"))
+            status = Status("bearing_dragging", Level.OK, "", values, "simulator")
+            message = to_bag(diagnostics(stamp_ns, [status]))
+            writer.write(TRUTH_TOPIC, DIAGNOSTICS, message, stamp_ns)
+    labels = recorded_labels(path) or ()
+    assert [(label.onset, label.end) for label in labels] == [(0.5, 2.0), (3.5, 4.0)]
+    assert {(label.state, label.wheel, label.severity) for label in labels} == {
+        ("dragging wheel", 2, 0.7)
+    }
 
 
 def test_states_without_their_wheel() -> None:

@@ -9,11 +9,16 @@ import rclpy
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
+from tomr_fault_diag.classifier.stage import FaultClassifier
+from tomr_fault_diag.diagnosis.settings import STAGE_NODES, DiagnosisSettings
 from tomr_fault_diag.nodes.diagnosis_node import DiagnosisNode
 from tomr_fault_diag.nodes.fault_classifier_node import FaultClassifierNode
 from tomr_fault_diag.nodes.power_residuals_node import PowerResidualsNode
+from tomr_power_model.messages.outgoing import DiagnosticMessage
+from tomr_power_model.messages.plain import Level, Status
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.nodes.stage_node import StageNode
+from tomr_power_model.robot import read_node_sections
 
 KINDS = {
     "residuals": PowerResidualsNode,
@@ -63,14 +68,22 @@ def test_one_process_is_retuned_as_its_stages_are(node: DiagnosisNode) -> None:
     assert node.pipeline._classifier.settings.recovery_time == to_ns(2.5)
 
 
+@pytest.fixture
+def named(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The fault that is named, empty: none."""
+    monkeypatch.setattr(FaultClassifier, "release", lambda _: request.param)
+    return str(request.param)
+
+
 @pytest.mark.parametrize("node", ["classifier", "diagnosis"], indirect=True)
-def test_a_fault_is_cleared_by_service(node: StageNode) -> None:
+@pytest.mark.parametrize("named", ["", "slip"], indirect=True)
+def test_a_fault_is_cleared_by_service(named: str, node: StageNode) -> None:
     client = node.create_client(Trigger, "~/clear")
     assert client.wait_for_service(10.0)
     answer = client.call_async(Trigger.Request())
     rclpy.spin_until_future_complete(node, answer, timeout_sec=10.0)
     assert answer.result().success
-    assert answer.result().message == "no fault was named"
+    assert answer.result().message == (f"{named} is cleared" if named else "no fault was named")
 
 
 def test_one_process_takes_the_sections_of_the_stages(tmp_path: Path) -> None:
@@ -80,12 +93,37 @@ def test_one_process_takes_the_sections_of_the_stages(tmp_path: Path) -> None:
         reference
         + "power_residuals:\n  ros__parameters:\n    band.power: 2.2\n"
         + "tomr_diagnosis:\n  ros__parameters:\n    recovery_time: 2.5\n"
+        + "    intermediate_topics: false\n"
     )
     rclpy.init(args=["--ros-args", "--params-file", str(file), "-p", "band.current:=0.3"])
     node = DiagnosisNode([str(file)])
-    settings = node.pipeline.settings
+    settings, offered = node.pipeline.settings, set(node._outlets)
     node.destroy_node()
     rclpy.shutdown()
     assert settings.residuals.bands.power == 2.2
     assert settings.residuals.bands.current == 0.3
     assert settings.classifier.recovery_time == to_ns(2.5)
+    assert offered == {"/diagnostics"}
+    read = DiagnosisSettings.of(read_node_sections(file, STAGE_NODES), "a tool")
+    assert read.classifier.recovery_time == to_ns(2.5)
+
+
+def test_a_namespace_is_the_name_of_a_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = str(files("tomr_power_model").joinpath("robots").joinpath("reference.yaml"))
+    rclpy.init(args=["--ros-args", "--params-file", robot, "-r", "__ns:=/fleet/r1"])
+    node = FaultClassifierNode()
+    sent: dict[str, str] = {}
+    monkeypatch.setattr(node, "is_heard", lambda topic: True)
+    monkeypatch.setattr(
+        node,
+        "publish",
+        lambda topic, plain: sent.update({topic: plain.fields["status"][0].fields["name"]}),
+    )
+    status = Status("inputs: cmd_vel", Level.OK, "", (), "")
+    for topic in ("/diagnostics", "residuals"):
+        node.send(DiagnosticMessage(topic, 0, (status,)))
+    hardware_id = node.classifier.settings.hardware_id
+    node.destroy_node()
+    rclpy.shutdown()
+    assert hardware_id == "fleet/r1"
+    assert sent == {"/diagnostics": "/fleet/r1/inputs: cmd_vel", "residuals": "inputs: cmd_vel"}

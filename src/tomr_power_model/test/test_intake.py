@@ -3,7 +3,7 @@
 import math
 import sys
 from typing import Any
-from unittest.mock import call, patch
+from unittest.mock import MagicMock, call, patch
 
 import numpy as np
 import pytest
@@ -31,9 +31,9 @@ from tomr_power_model.messages.plain import Level, Status, battery_state
 from tomr_power_model.messages.readings import SupplyReading
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.ticks import Arrival
-from tomr_power_model.nodes.stage_node import message_class, to_ros
+from tomr_power_model.nodes.stage_node import _stamp_of_bytes, message_class, to_ros
 from tomr_power_model.robot import shipped_robot
-from tomr_power_model.topics.inputs import Complaints, measured_inputs, model_inputs
+from tomr_power_model.topics.inputs import CLOSEST, Complaints, measured_inputs, model_inputs
 
 STAMP = 1_700_000_000_500_000_000
 WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
@@ -169,6 +169,38 @@ class TestInputsOfAStage:
         assert len(readings) == 2
         assert "started afresh" in str(joints.take(message, STAMP))
         assert len(readings) == 4
+
+
+@pytest.mark.parametrize(
+    ("period_us", "taken"),
+    [(10_000, 100), (1_000, 100), (200, 34), (50, 10)],  # a sample each 0.5 ms is enough
+)
+def test_a_flood_of_encoders_is_thinned(period_us: int, taken: int) -> None:
+    stamps: list[int] = []
+    joints, *_ = measured_inputs(
+        shipped_robot("reference"),
+        lambda stamp_ns, *_: stamps.append(stamp_ns) or Arrival.TAKEN,  # type: ignore[func-returns-value]
+        lambda _: Arrival.TAKEN,
+    )
+    for number in range(100):
+        stamp_ns = STAMP + 1000 * period_us * number
+        message = _joints(list(WHEELS), position=[1, 2, 3])
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 10**9)
+        assert joints.take(message, stamp_ns) is None
+        data = jazzy_typestore().serialize_cdr(message, "sensor_msgs/msg/JointState")
+        assert _stamp_of_bytes(bytes(data)) == stamp_ns
+        # Told by the stamp alone, before and after: the answer is the same.
+        assert joints.is_too_close is not None
+        assert joints.is_too_close(stamp_ns) == (stamp_ns not in stamps)
+    assert len(stamps) == taken
+    assert min(np.diff(stamps)) >= CLOSEST
+
+
+def test_what_repeats_or_goes_back_is_not_thinned_but_told() -> None:
+    joints = model_inputs(shipped_robot("reference"), MagicMock())[1]
+    assert joints.is_too_close is not None
+    answers = [joints.is_too_close(STAMP + shift) for shift in (0, 100, 0, -100, 0, 10**6)]
+    assert answers == [False, True, False, False, True, False]
 
 
 def test_complaints_thin_out() -> None:

@@ -1,8 +1,10 @@
 """The URDF of a robot, against its description."""
 
+import math
 from xml.etree import ElementTree
 
 import pytest
+from attrs import evolve
 
 from tomr_power_model.robot import shipped_robot, shipped_robots
 from tomr_power_model.robot.urdf import urdf_of
@@ -23,6 +25,13 @@ def test_wheels_stand_and_turn_as_the_geometry_says() -> None:
     # Outwards: a wheel at +x that turns so drives towards -y, r omega = -v_y.
     assert joints["wheel_2_joint"].find("axis").get("xyz") == "1 0 0"
     assert joints["wheel_2_joint"].get("type") == "continuous"
+
+
+def test_wheels_turn_with_their_offset() -> None:
+    robot = evolve(shipped_robot("reference"), wheel_offset=math.pi / 6)
+    joint = ElementTree.fromstring(urdf_of(robot)).find("joint/origin")
+    assert numbers(joint.get("xyz")) == pytest.approx([0.1732051, 0.1, 0.05])
+    assert numbers(joint.get("rpy")) == pytest.approx([0.0, 0.0, math.pi / 6])
 
 
 @pytest.mark.parametrize("name", shipped_robots())

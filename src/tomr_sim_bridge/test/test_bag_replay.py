@@ -13,7 +13,7 @@ import pytest
 import rclpy
 from rcl_interfaces.srv import SetParameters
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -70,7 +70,9 @@ class Listener:
 
     def __init__(self, context: Context, namespace: str = "") -> None:
         self.node = Node("listener", context=context)
-        self._executor = SingleThreadedExecutor(context=context)
+        # Takes messages in the order of their arrival. A wait set takes one of each topic in turn:
+        # the clock would be rounds ahead of topics that a busy machine has heaped up.
+        self._executor = EventsExecutor(context=context)
         self._executor.add_node(self.node)
         self.raw: dict[str, list[bytes]] = {}
         self.clock: list[int] = []
@@ -154,7 +156,7 @@ def test_a_loop_jumps_back_and_ends_cleanly_on_a_signal(
     assert received[per_round : 2 * per_round] == received[:per_round]
     assert received[:per_round] == recorded(bag, "joint_states")[per_round:]
     jumps = [after - before for before, after in pairwise(listener.clock) if after < before]
-    assert jumps  # the clock may be rounds ahead of what else was received
+    assert len(jumps) in (1, 2)
     assert set(jumps) == {jumps[0]}
     assert listener.clock[0] == START_NS + 1_000_000_000
     replay.signal(number, group=True)

@@ -6,12 +6,13 @@ import time
 from collections.abc import Callable, Iterator
 from importlib.resources import files
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import Twist, TwistStamped, Vector3
 from nav_msgs.msg import Odometry
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -22,7 +23,11 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, Imu, JointState
 
+from tomr_sim_bridge.nodes import sim_bridge_node
+from tomr_sim_bridge.nodes.sim_bridge_node import SimBridge
+
 BEST_EFFORT = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 TYPES = {
     "joint_states": JointState,
     "wheel_1/power": BatteryState,
@@ -52,7 +57,8 @@ class Operator:
         self._executor.add_node(self.node)
         self.heard: dict[str, list[Any]] = {topic: [] for topic in TYPES}
         for topic, kind in TYPES.items():
-            self.node.create_subscription(kind, topic, self.heard[topic].append, BEST_EFFORT)
+            qos = RELIABLE if topic == "odom" else BEST_EFFORT  # as who navigates asks for
+            self.node.create_subscription(kind, topic, self.heard[topic].append, qos)
         self._parameters = AsyncParameterClient(self.node, "sim_bridge")
 
     def spin(self) -> None:
@@ -106,6 +112,7 @@ def test_robot_on_topics(operator: Operator, spawn: Callable, wait_until: Callab
     assert 100 <= operator.heard["joint_states"][0].header.stamp.sec < 115
     assert operator.heard["joint_states"][0].name == [f"wheel_{n}_joint" for n in (1, 2, 3)]
     assert operator.heard["wheel_2/power"][-1].current == pytest.approx(-0.05, abs=0.03)
+    assert min(operator.heard["odom"][0].pose.covariance[::7]) > 0.0
 
     outlet = operator.node.create_publisher(TwistStamped, "cmd_vel", 10)
     message = TwistStamped()
@@ -164,6 +171,39 @@ def test_twist_without_stamp(
         lambda: (heard := operator.commanding(outlet, message)) and heard.velocity[0] < -3.8,
         "wheels at -4 rad/s",
     )
+
+
+@pytest.fixture
+def bridge(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[SimBridge, list[str]]]:
+    """The node in this process, as where tf2_msgs is installed, and the topics that it fills."""
+    topics: list[str] = []
+    monkeypatch.setattr(sim_bridge_node, "find_spec", lambda name: name)
+    monkeypatch.setattr(sim_bridge_node, "to_ros", lambda message: message)
+    rclpy.init(args=["--ros-args", "--params-file", ROBOT])
+    made = SimBridge()
+    outlet = SimpleNamespace(publish=lambda _: None)
+    monkeypatch.setattr(made, "_outlet", lambda topic, _: topics.append(topic) or outlet)
+    yield made, topics
+    made.destroy_node()
+    rclpy.shutdown()
+
+
+def test_it_stops_when_commands_stop(bridge: tuple[SimBridge, list[str]]) -> None:
+    node, topics = bridge
+    simulation = node._simulation
+    start = simulation.stamp_ns
+    node._command(Twist(linear=Vector3(x=0.2)))
+
+    def speed(until: float) -> float:
+        samples = simulation.step_to(start + round(until * 1e9))
+        for sample in samples:
+            node._publish(sample)
+        (last,) = [s for s in samples if s.topic == "odom"][-1:]
+        return float(last.message.fields["twist"].fields["twist"].fields["linear"].fields["x"])
+
+    assert speed(0.4) == pytest.approx(0.2, abs=0.05)
+    assert speed(1.5) == pytest.approx(0.0, abs=0.01)
+    assert topics.count("tf") == topics.count("odom") > 20
 
 
 def test_commands_of_a_type_that_is_not_heard(operator: Operator, spawn: Callable) -> None:

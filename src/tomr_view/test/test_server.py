@@ -93,27 +93,32 @@ def test_the_page_loads_nothing_from_elsewhere(server: Server) -> None:
 
 
 @pytest.mark.parametrize(
-    "garbage",
+    ("garbage", "code"),
     [
-        "not json",
-        b"\x00\xff",
-        "[1, 2]",
-        '{"ask": "everything"}',
-        '{"ask": "pictures"}',
-        '{"ask": "pictures", "first": -1, "count": 2}',
-        '{"ask": "pictures", "first": true, "count": 2}',
-        '{"ask": "pictures", "first": 0, "count": 1e99}',
-        "[" * 1000,
-        "x" * 100_000,
+        ("not json", 1008),
+        (b"\x00\xff", 1008),
+        ("[1, 2]", 1008),
+        ('{"ask": "everything"}', 1008),
+        ('{"ask": "pictures"}', 1008),
+        ('{"ask": "pictures", "first": -1, "count": 2}', 1008),
+        ('{"ask": "pictures", "first": true, "count": 2}', 1008),
+        ('{"ask": "pictures", "first": 0, "count": 1e99}', 1008),
+        ("[" * 1000, 1008),
+        ('{"ask": "pictures", "first": 0, "count": 1, "x": "' + 1000 * "x" + '"}', 1009),
+        ("x" * 100_000, 1009),
     ],
 )
-def test_garbage_ends_its_own_connection_only(server: Server, garbage: str | bytes) -> None:
+def test_garbage_ends_its_own_connection_only(
+    server: Server, garbage: str | bytes, code: int
+) -> None:
     with page(server) as other, page(server) as client:
         received(other), received(other)
         client.send(garbage)
         received(client), received(client)
-        with pytest.raises(ConnectionClosed):
+        with pytest.raises(ConnectionClosed) as closed:
             client.recv(WAIT)
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == code
         server.show({"t": 9})
         assert received(other)["picture"] == {"t": 9}
 
@@ -151,10 +156,25 @@ def test_a_server_that_only_shows_takes_no_wishes() -> None:
             client.send('{"ask": "pictures", "first": 99999, "count": 5}')
             assert received(client)["pictures"] == []
             client.send('{"ask": "fault", "id": "encoder_lost"}')
-            with pytest.raises(ConnectionClosed):
+            with pytest.raises(ConnectionClosed, match="nothing that can be asked for"):
                 client.recv(WAIT)
     finally:
         server.close()
+
+
+def deaf_page(server: Server) -> socket.socket:
+    """A page that does not read."""
+    host, port = at(server).split(":")
+    deaf = socket.create_connection((host, int(port)), timeout=WAIT)
+    deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    upgrade = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+    key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+    deaf.sendall(f"GET /socket HTTP/1.1\r\nHost: {host}\r\n{upgrade}{key}\r\n".encode())
+    assert deaf.recv(12) == b"HTTP/1.1 101"
+    return deaf
+
+
+LARGE = {"t": 0, "padding": "x" * 50_000}
 
 
 def test_a_hundred_pages_and_one_that_does_not_read(
@@ -171,21 +191,27 @@ def test_a_hundred_pages_and_one_that_does_not_read(
                 await client.close()
         return sum(item.get("picture") == {"t": 1} for item in heard)
 
-    host, port = at(server).split(":")
-    deaf = socket.create_connection((host, int(port)), timeout=WAIT)
-    deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    upgrade = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-    key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
-    deaf.sendall(f"GET /socket HTTP/1.1\r\nHost: {host}\r\n{upgrade}{key}\r\n".encode())
-    assert deaf.recv(12) == b"HTTP/1.1 101"
-    large = {"t": 0, "padding": "x" * 50_000}
-    for _ in range(200):  # 10 MB: more than any buffer on the way
-        server.show(large)
-    assert asyncio.run(hundred()) == 100
-    waiting = [c.transport.get_write_buffer_size() for c in server._clients]
-    assert max(waiting, default=0) < 1_000_000  # the deaf one's pictures are not heaped up
-    deaf.close()
+    with deaf_page(server):
+        for _ in range(200):  # 10 MB: more than any buffer on the way
+            server.show(LARGE)
+        assert asyncio.run(hundred()) == 100
+        waiting = [c.transport.get_write_buffer_size() for c in server._clients]
+        assert max(waiting, default=0) < 1_000_000  # the deaf one's pictures are not heaped up
     wait_until(lambda: not server._clients, "all pages gone")
+
+
+def test_a_page_that_never_reads_loses_its_place(
+    server: Server, wait_until: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tomr_view.server._PATIENCE", 0.0)
+
+    def gone() -> bool:
+        server.show(LARGE)
+        return not server._clients
+
+    with deaf_page(server):
+        wait_until(lambda: server._clients, "the page")
+        wait_until(gone, "the page is sent away")
 
 
 def test_more_pages_than_it_serves_are_turned_away(server: Server) -> None:

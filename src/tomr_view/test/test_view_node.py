@@ -5,7 +5,14 @@ from collections.abc import Callable
 from importlib.resources import files
 from typing import Any
 
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from websockets.sync.client import ClientConnection, connect
+
+from tomr_fault_diag.classifier.messages import NAME
+from tomr_power_model.robot import shipped_robot
+from tomr_view.nodes.view_node import ViewNode
 
 ROBOT = str(files("tomr_power_model").joinpath("robots").joinpath("reference.yaml"))
 NAMESPACE = ["-r", "__ns:=/r1"]
@@ -51,3 +58,18 @@ def test_a_page_sees_a_robot_and_switches_a_fault_of_the_simulator(
         while picture["faults"]:
             picture = next_of(client, "picture")["picture"]
     assert "wheel = 9: out of range" in view.output
+
+
+@pytest.mark.parametrize(("namespace", "shown"), [("/r1", "of r1"), ("/", "of no namespace")])
+def test_what_is_said_of_other_robots_is_not_shown(namespace: str, shown: str) -> None:
+    names = {"/r1/": "of r1", "/r2/": "of r2", "/r1/r2/": "of another fleet", "": "of no namespace"}
+    rclpy.init(args=["--ros-args", "-r", f"__ns:={namespace}"])
+    node = ViewNode(shipped_robot("reference"), "127.0.0.1", 0)
+    statuses = [DiagnosticStatus(name=prefix + NAME, message=m) for prefix, m in names.items()]
+    seen = []
+    for order in (statuses, statuses[::-1]):
+        node._diagnosis(DiagnosticArray(status=order), 0)
+        seen.append(node._gatherer.status)
+    node.destroy_node()
+    rclpy.shutdown()
+    assert [status and status.message for status in seen] == [shown, shown]

@@ -24,6 +24,8 @@ from tomr_sim_bridge.faults import all_parameters, fault_ids
 PICTURE_PERIOD = NANOSECONDS // 10
 _LONGEST_STEP = 0.5  # s, between two ticks of one motion
 _TRUTH_AGE = NANOSECONDS  # after which the truth about faults is not known any more
+_FASTEST = 1e4  # rad/s: no wheel turns so fast
+_MOST_INPUTS = 64  # anybody may publish on /diagnostics
 
 Json = dict[str, Any]
 
@@ -75,6 +77,7 @@ class Gatherer:
     robot: Robot
     frame: ResidualFrame | None = None
     status: Status | None = None
+    shares: Mapping[str, float | None] = field(factory=dict)  # probability of each state
     inputs: dict[str, Status] = field(factory=dict)
     faults: tuple[Json, ...] = ()
     _faults_ns: int = 0
@@ -91,17 +94,24 @@ class Gatherer:
             self._move(min(step, _LONGEST_STEP))
         self.frame = frame
         self._speeds = tuple(
-            0.0 if math.isnan(speed) else speed
+            speed if abs(speed) < _FASTEST else 0.0
             for speed in (_measured_speed(frame.residuals[index]) for index in SPEEDS)
         )
 
     def diagnosis(self, statuses: Iterable[Status]) -> None:
-        """Take what /diagnostics says of this robot."""
+        """Take what /diagnostics says of this robot. Raises ValueError for what is no number."""
         for status in statuses:
             if status.name.endswith(NAME):
+                self.shares = {
+                    key.removeprefix("p "): number(float(value))
+                    for key, value in status.values.items()
+                    if key.startswith("p ")
+                }
                 self.status = status
             elif "inputs: " in status.name:
-                self.inputs[status.name.rpartition("inputs: ")[2]] = status
+                topic = status.name.rpartition("inputs: ")[2]
+                if topic in self.inputs or len(self.inputs) < _MOST_INPUTS:
+                    self.inputs[topic] = status
 
     def truth(self, statuses: Iterable[Status], stamp_ns: int) -> None:
         """Take what a simulator says of its faults."""
@@ -145,22 +155,17 @@ class Gatherer:
     def _words(self) -> Json:
         status = self.status
         inputs = [
-            {"topic": topic, "level": item.level, "message": item.message, **item.values}
+            {**item.values, "topic": topic, "level": item.level, "message": item.message}
             for topic, item in sorted(self.inputs.items())
         ]
         if status is None:
             return {"state": "", "level": 3, "message": "no diagnosis yet", "inputs": inputs}
-        shares = {
-            key.removeprefix("p "): float(value)
-            for key, value in status.values.items()
-            if key.startswith("p ")
-        }
         return {
             "state": status.values.get("state", ""),
             "level": status.level,
             "message": status.message,
             "unseen": status.values.get("not_observable", ""),
-            "shares": shares,
+            "shares": self.shares,
             "evidence": [
                 text for key, text in status.values.items() if key.startswith("evidence ")
             ],

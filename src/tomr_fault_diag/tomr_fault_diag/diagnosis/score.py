@@ -188,8 +188,8 @@ class Scores:
         verdicts = _total(case.verdicts for case in cases)
         return {
             "count": count // self._phases,
-            "found": _share(found, count, self._phases),
-            "any_alarm": _share(
+            "found": with_interval(found, count, self._phases),
+            "any_alarm": with_interval(
                 sum(math.isfinite(case.delay_any) for case in cases), count, self._phases
             ),
             "delay_s": delays([case.delay for case in cases], self._phases),
@@ -216,7 +216,7 @@ def _rate(count: float, hours: float) -> float | None:
     return round(count / hours, 3) if hours else None
 
 
-def _share(part: int, whole: int, phases: int) -> dict[str, Any]:
+def with_interval(part: int, whole: int, phases: int = 1) -> dict[str, Any]:
     """A share with its exact 95 % interval, for as many cases as there are recordings."""
     if not whole:
         return {"share": None, "ci95": None}

@@ -15,9 +15,32 @@ from tomr_power_model.robot.parameters import ParameterSpec, check_all
 # Whose sections of a robot.yaml hold settings of the diagnosis; a later one counts more.
 STAGE_NODES = ("power_model", "power_residuals", "fault_classifier", "tomr_diagnosis")
 
+# Of the node that holds all stages; tools read them in its section and have no use for them.
+_NODE_PARAMETERS = (
+    ParameterSpec(
+        "intermediate_topics",
+        "of tomr_diagnosis: publish predictions and residuals too, as the three nodes do, where "
+        "anybody listens",
+        "bool",
+        True,
+    ),
+    ParameterSpec(
+        "managed",
+        "of tomr_diagnosis: be a managed node, which waits for the transitions configure and "
+        "activate of a lifecycle manager",
+        "bool",
+        False,
+    ),
+)
 # The stages share some parameters by name and meaning; a name stands once.
 PARAMETERS: Mapping[str, ParameterSpec] = {
-    spec.name: spec for spec in (*MODEL_PARAMETERS, *RESIDUAL_PARAMETERS, *CLASSIFIER_PARAMETERS)
+    spec.name: spec
+    for spec in (
+        *MODEL_PARAMETERS,
+        *RESIDUAL_PARAMETERS,
+        *CLASSIFIER_PARAMETERS,
+        *_NODE_PARAMETERS,
+    )
 }
 
 

@@ -21,7 +21,7 @@ from tomr_power_model.nodes.stage_node import STAGE_QOS, StageNode, run_node
 from tomr_power_model.topics.inputs import Input, guarded
 
 
-def offer_clearing(node: Node, release: Callable[[], str]) -> None:
+def offer_clearing(node: Node, release: Callable[[], str]) -> Any:
     """A service ~/clear; `release` lets go of a named fault and returns its name, if any."""
 
     def clear(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -30,7 +30,7 @@ def offer_clearing(node: Node, release: Callable[[], str]) -> None:
         response.message = f"{named} is cleared" if named else "no fault was named"
         return response
 
-    node.create_service(Trigger, "~/clear", clear)
+    return node.create_service(Trigger, "~/clear", clear)
 
 
 class FaultClassifierNode(StageNode):

@@ -36,7 +36,14 @@ class CommandType:
         self._subscription = subscribe(self._type)
         self._unheard: set[str] = set()
         # Time of a simulation may stand still before its first command.
-        node.create_timer(_LOOK_PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = node.create_timer(_LOOK_PERIOD, self._look, clock=steady)
+
+    def close(self) -> None:
+        """Listen no longer."""
+        self._node.destroy_timer(self._timer)
+        if self._subscription is not None:
+            self._node.destroy_subscription(self._subscription)
 
     def _look(self) -> None:
         if self._subscription is None:

@@ -7,6 +7,7 @@ from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from struct import Struct
 from typing import Any
 
 import rclpy
@@ -17,12 +18,13 @@ from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_OK
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.outgoing import TYPES, DiagnosticMessage, Outgoing
-from tomr_power_model.messages.plain import Plain, build
+from tomr_power_model.messages.plain import NANOSECONDS, Plain, build
 from tomr_power_model.nodes.command_type import CommandType
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
 from tomr_power_model.robot import Robot
@@ -34,6 +36,8 @@ from tomr_power_model.topics.inputs import Complaints, Input
 SENSOR_QOS = QoSProfile(depth=500, reliability=ReliabilityPolicy.BEST_EFFORT)
 STAGE_QOS = QoSProfile(depth=500, reliability=ReliabilityPolicy.RELIABLE)
 
+_STAMP = Struct("<iI")
+_CDR_HEAD = 4  # bytes before the first field
 _SIGNAL_CHECK_S = 0.2  # the longest that a signal waits while no message comes
 
 
@@ -75,6 +79,7 @@ class StageNode(Node):
             self.values["hardware_id"] = self._namespace or NAMELESS
         self._complaints = Complaints()
         self._outlets: dict[str, Any] = {}
+        self._ends: list[Callable[[], object]] = []  # of what it listens to
         self._topics: dict[str, list[str]] = {"listens to": [], "publishes": []}
 
     def listen(
@@ -94,20 +99,34 @@ class StageNode(Node):
                 self.complain(item.topic, problem)
             advance()
 
+        def receive_bytes(data: bytes) -> None:
+            if item.is_too_close is None or not item.is_too_close(_stamp_of_bytes(data)):
+                receive(deserialize_message(data, message_class(item.type_name)))
+
         def subscribe(type_name: str) -> Any:
             return self.create_subscription(
                 message_class(type_name),
                 item.topic,
-                receive,
+                receive if item.is_too_close is None else receive_bytes,
                 qos,
+                raw=item.is_too_close is not None,
                 # Each default event adds to every wait: together a sixth of the nodes' CPU.
                 event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
             )
 
         if item.other_types:
-            CommandType(self, item.topic, str(self.values["cmd_vel_type"]), subscribe)
+            setting = str(self.values["cmd_vel_type"])
+            self._ends.append(CommandType(self, item.topic, setting, subscribe).close)
         else:
-            subscribe(item.type_name)
+            subscription = subscribe(item.type_name)
+            self._ends.append(lambda: self.destroy_subscription(subscription))
+
+    def unlisten(self) -> None:
+        """Take back all subscriptions."""
+        for end in self._ends:
+            end()
+        self._ends.clear()
+        self._topics["listens to"].clear()
 
     def _note(self, what: str, topic: str, type_name: str) -> None:
         kind = type_name.rpartition("/")[2]
@@ -117,7 +136,8 @@ class StageNode(Node):
         """Log robot, topics and types, once."""
         self.get_logger().info(described(self._robot))
         for what, topics in self._topics.items():
-            self.get_logger().info(f"{what} {', '.join(topics)}")
+            if topics:
+                self.get_logger().info(f"{what} {', '.join(topics)}")
 
     def on_change(self, apply: Callable[[dict[str, Value]], None]) -> None:
         """Apply all values anew when some of them are set while the node runs."""
@@ -150,6 +170,13 @@ class StageNode(Node):
             event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
         )
 
+    def withdraw(self) -> None:
+        """Take back all that was offered."""
+        for outlet in self._outlets.values():
+            self.destroy_publisher(outlet)
+        self._outlets.clear()
+        self._topics["publishes"].clear()
+
     def send(self, message: Outgoing) -> None:
         """Publish a record on its topic, if anybody listens."""
         if not self.is_heard(message.topic):
@@ -166,6 +193,12 @@ class StageNode(Node):
         """Whether a topic is offered and anybody listens to it."""
         outlet = self._outlets.get(topic)
         return outlet is not None and outlet.get_subscription_count() > 0
+
+
+def _stamp_of_bytes(data: bytes) -> int:
+    """Stamp [ns] of a serialised message that begins with a header, 0 if it is big-endian."""
+    seconds, nanoseconds = _STAMP.unpack_from(data, _CDR_HEAD) if data[1] & 1 else (0, 0)
+    return int(seconds) * NANOSECONDS + int(nanoseconds)
 
 
 def _of_robot(message: DiagnosticMessage, namespace: str) -> DiagnosticMessage:
@@ -185,16 +218,21 @@ def described(robot: Robot) -> str:
 
 
 class StopRequest:
-    """Set by SIGINT or SIGTERM. rclpy's own handlers can lose a signal that comes early, and a
-    signal to the process group comes twice and would interrupt the clean-up."""
+    """Set by SIGINT or SIGTERM. rclpy's own handlers can lose a signal that comes early. What comes
+    after the first is ignored: a signal to the process group comes twice, and the second would
+    interrupt the clean-up, or meet an interpreter that has put its handlers away."""
+
+    _NUMBERS = (signal.SIGINT, signal.SIGTERM)
 
     def __init__(self) -> None:
         self.is_set = False
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in self._NUMBERS:
             signal.signal(number, self._set)
 
     def _set(self, *_: object) -> None:
         self.is_set = True
+        for number in self._NUMBERS:
+            signal.signal(number, signal.SIG_IGN)
 
 
 def make_executor() -> Executor:

@@ -20,15 +20,19 @@ from tomr_power_model.messages.intake import (
     Triple,
     Unusable,
     WheelFinder,
+    header_stamp_ns,
     stamp_of,
     twist_of,
     yaw_rate_of,
 )
+from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.messages.types import IMU, JOINT_STATE, TWIST, TWIST_STAMPED
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.robot import Robot
 
+# Samples closer than this to the one before tell nothing more: a flood costs little so.
+CLOSEST = NANOSECONDS // 2000
 _MOST_KINDS = 200  # of complaints that are told apart: their words may be a message's
 Take = Callable[[Any, int], Arrival | str | None]
 
@@ -42,6 +46,32 @@ class Input:
     type_name: str
     take: Callable[[Any, int], str | None]
     other_types: tuple[str, ...] = ()
+    # Whether a message of this stamp [ns] is left out, told before the rest of it is read.
+    is_too_close: Callable[[int], bool] | None = None
+
+
+class Thinning:
+    """Leaves out samples that follow one another too closely."""
+
+    def __init__(self) -> None:
+        self._last = 0
+
+    def is_too_close(self, stamp_ns: int) -> bool:
+        """Whether to leave out a sample; what goes back or repeats is for others to judge."""
+        if 0 < stamp_ns - self._last < CLOSEST:
+            return True
+        self._last = stamp_ns
+        return False
+
+    def around(self, take: Take) -> Take:
+        """The same as `take`, of the samples that are left."""
+
+        def thinned(message: Any, receive_ns: int) -> Arrival | str | None:
+            if self.is_too_close(header_stamp_ns(message) or 0):
+                return None
+            return take(message, receive_ns)
+
+        return thinned
 
 
 def guarded(
@@ -122,8 +152,10 @@ def measured_inputs(
         else:
             taker = guarded(_power(source, power), partial(refused, source.topic))
             inputs.append(Input(source.topic, source.type_name, taker))
-    encoder_taker = guarded(take, partial(refused, ENCODER_TOPIC))
-    return (Input(ENCODER_TOPIC, JOINT_STATE, encoder_taker), *inputs)
+    thinning = Thinning()
+    taker = guarded(thinning.around(take), partial(refused, ENCODER_TOPIC))
+    encoder_input = Input(ENCODER_TOPIC, JOINT_STATE, taker, is_too_close=thinning.is_too_close)
+    return (encoder_input, *inputs)
 
 
 def _power(source: PowerTopic, power: Callable[[PowerReading], Arrival | str]) -> Take:

@@ -72,9 +72,8 @@ class ViewNode(Node):
         self._gatherer.diagnosis(mine)
 
     def _is_mine(self, name: str) -> bool:
-        if self._prefix:
-            return name.startswith(f"{self._prefix}/")
-        return name == NAME or name.startswith("inputs: ")
+        prefix = f"{self._prefix}/" if self._prefix else ""
+        return name == prefix + NAME or name.startswith(f"{prefix}inputs: ")
 
     def _truth(self, message: Any, stamp_ns: int) -> None:
         self._gatherer.truth(map(Status.of_message, message.status), stamp_ns)

@@ -1,0 +1,145 @@
+"""The page of a recording and what is said of it in lines, from a track of four ticks."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from tomr_fault_diag.cli.diagnose import EXIT_UNDECIDED, _exit_code
+from tomr_fault_diag.diagnosis.heard import Heard
+from tomr_fault_diag.diagnosis.labels import Label
+from tomr_fault_diag.diagnosis.page import colour_of, index_page, time_line
+from tomr_fault_diag.diagnosis.replayed import Failed, Phase, Replayed, Task
+from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
+from tomr_fault_diag.diagnosis.summary import Episode, Summary
+from tomr_fault_diag.diagnosis.track import Health, Said, Track, Tracker
+from tomr_fault_diag.diagnosis.words import as_json, bag_line, phases_line, verdict
+from tomr_fault_diag.residuals.frame import MOTORS, SPEEDS
+from tomr_power_model.messages.outgoing import DiagnosticMessage
+from tomr_power_model.messages.plain import Level, Status
+
+S = 1_000_000_000
+START = 1_700_000_000 * S
+WHEELS = ("wheel_1", "wheel_2", "wheel_3")
+TASK = Task(Path("a <b>drive.mcap"), "reference", DiagnosisSettings.of({}, "test"))
+
+
+def summary(*faults: tuple[str, float]) -> Summary:
+    """Normal from the start; faults named at times [s]."""
+    named = [("normal", 0.0), *faults]
+    episodes = [
+        Episode(state, START + round(t * S), START + 4 * S, START + round(t * S) - S // 10)
+        for state, t in named
+    ]
+    return Summary(80, {state: 1 / len(named) for state, _ in named}, (0.0,) * 10, tuple(episodes))
+
+
+def replayed(*phases: Summary) -> Replayed:
+    shares = [number / len(phases) for number in range(len(phases))]
+    found = tuple(Phase(share, phase) for share, phase in zip(shares, phases, strict=True))
+    return Replayed(TASK, START, START + 4 * S, found, {})
+
+
+def track() -> Track:
+    """One tick a second: normal, normal, slip, slip; motor 1 leaves its band at the third, wheel 1
+    turns backwards and 1 rad/s slower than expected."""
+    residual, modelled = np.zeros((4, 10)), np.zeros((4, 10))
+    residual[2, MOTORS[0]] = 9.0
+    residual[:, SPEEDS[0]], modelled[:, SPEEDS[0]] = -1.0, -5.0
+    said = (*[Said("normal", 0)] * 2, *[Said("slip", 0)] * 2)
+    stamps = START + S * np.arange(4)
+    inputs = {
+        "joint_states": (Health(START, Level.OK, "fine"), Health(START + S, Level.WARN, "bad"))
+    }
+    return Track(stamps, said, np.full(4, 0.9), residual, np.full((4, 10), 2.0), modelled, inputs)
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    labels = [Label("drive", "motor system fault", 2, onset=1.5, end=9.0)]
+    return time_line(replayed(summary(("slip", 2.0))), [track()], labels, WHEELS)
+
+
+def test_states_labels_and_inputs_stand_where_they_were(page: str) -> None:
+    for words in (
+        "normal: 0.00 to 2.00 s",
+        "slip: 2.00 to 3.00 s",
+        "motor system fault: 1.50 to 4.00 s",  # no longer than the recording
+        "joint_states: fine, 0.00 to 1.00 s",
+        "joint_states: bad, 1.00 to 4.00 s",
+    ):
+        assert page.count(words) == 1, words
+    bars = re.findall(r"<rect[^>]*>(?=<title>joint_states)", page)
+    assert [bar.count("#f77f00") for bar in bars] == [0, 1]  # a warning has its colour
+
+
+def test_what_is_out_of_its_band_is_drawn_apart(page: str) -> None:
+    drawn = [path for path in re.findall(r'class="outside" d="([^"]*)"', page) if path]
+    assert len(drawn) == 1
+    assert drawn[0].startswith("M2000 ")
+
+
+def test_a_wheel_that_lags_turns_slower_whichever_way(page: str) -> None:
+    """Expected -5 rad/s and behind by 1 rad/s: it turns at -4 rad/s."""
+    assert '["measured",[-4.0,-4.0,-4.0,-4.0]],["modelled",[-5.0,-5.0,-5.0,-5.0]]' in page
+
+
+def test_names_are_text(page: str) -> None:
+    assert "<b>drive" not in page
+    assert "&lt;b&gt;drive" in page
+    index = index_page([replayed(summary())], [Failed(TASK, "<i>bad</i>")], None)
+    assert "<b>drive" not in index
+    assert "<i>bad" not in index
+
+
+def test_a_state_has_one_colour_on_every_page() -> None:
+    assert colour_of("motor system fault 1") == colour_of("motor system fault 3")
+    assert len({colour_of(state) for state in ("normal", "slip", "unknown", "stale")}) == 4
+
+
+def test_a_fault_in_one_phase_only_is_a_fault() -> None:
+    found = replayed(summary(), summary(("slip", 2.0)))
+    assert found.has_fault
+    assert verdict(found) == "slip at 2.00 s (1 of 2 phases)"
+    assert bag_line(found).endswith("4.0 s  slip at 2.00 s (1 of 2 phases)")
+    assert phases_line(found) == "2 phases: slip in 1, first named at 2.00 to 2.00 s"
+    assert [len(phase["faults"]) for phase in as_json(found)["phases"]] == [0, 1]
+    assert _exit_code([found], []) == 1
+
+
+def test_a_fault_in_all_phases_is_told_from_the_first() -> None:
+    found = replayed(summary(("slip", 2.3), ("slip", 3.0)), summary(("slip", 2.0)))
+    assert verdict(found) == "slip at 2.00 s"
+    assert phases_line(found) == "2 phases: slip in 2, first named at 2.00 to 2.30 s"
+    assert phases_line(replayed(summary(), summary())) == "2 phases: no fault in any"
+
+
+def test_what_is_wrong_outweighs_what_is_not_known() -> None:
+    well, sick = replayed(summary()), replayed(summary(("slip", 2.0)))
+    blind = evolve(well, undecided="no cmd_vel")
+    assert _exit_code([well], []) == 0
+    assert _exit_code([well, blind], []) == EXIT_UNDECIDED == 3
+    assert _exit_code([blind, sick], []) == 1
+    assert _exit_code([sick], [Failed(TASK, "")]) == 2
+
+
+def test_the_longest_silence_of_a_topic_counts() -> None:
+    heard = Heard()
+    for stamp in (0, 1, 4, 6):
+        heard.note("x", None, stamp * S)
+    assert (heard.streams["x"].count, heard.streams["x"].silence_ns) == (4, 3 * S)
+
+
+def test_only_changes_of_an_input_are_kept() -> None:
+    tracker = Tracker(detail=True)
+    for t, level in enumerate((Level.OK, Level.OK, Level.WARN, Level.WARN, Level.OK)):
+        status = Status("inputs: odd", level, f"at {t}", (), "")
+        tracker.report(DiagnosticMessage("/diagnostics", t, (status,)))
+    changes = tracker.track().inputs["odd"]
+    assert [(item.stamp_ns, item.words) for item in changes] == [
+        (0, "at 0"),
+        (2, "at 2"),
+        (4, "at 4"),
+    ]
