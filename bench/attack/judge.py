@@ -1,6 +1,7 @@
 """Running a try in a process of its own, and what to say of how it ended."""
 
 import contextlib
+import gc
 import io
 import json
 import os
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from attrs import frozen
+from tqdm import tqdm
 
 from attack.case import Attack
 from tomr_power_model.errors import InputError
@@ -42,6 +44,7 @@ class Outcome:
 
     code: int
     seconds: float
+    cpu: float  # s, of the command and of making its input
     memory: int  # kB
     problem: str
     line: str  # the last on stderr
@@ -51,13 +54,25 @@ def load_tools(recording: Path) -> None:
     """Import what all tries need and compile what they share, once: they are forked."""
     for module in MODULES.values():
         import_module(module)
+    tqdm.monitor_interval = 0  # no thread that might hold a lock while this process forks
+    given = str(recording)
     with contextlib.redirect_stdout(io.StringIO()):
-        import_module(MODULES["tomr_diagnose"]).main([str(recording), "--json"])
+        import_module(MODULES["tomr_diagnose"]).main([given, "--json"])
+        import_module(MODULES["tomr_calibrate"]).main(
+            [given, "--robot", "reference", "--fit", "robot.mass"]
+        )
+        import_module(MODULES["tomr_gap"]).main(
+            ["check", "--robot", "reference", "--real", given, "--quiet"]
+        )
+    gc.collect()
+    gc.freeze()  # a collection in a child would copy all that it shares with this process
 
 
 def run(make: Callable[[], Attack], folder: Path) -> tuple[Attack | None, Outcome]:
     """Make a try and run it, in a child each."""
+    making = time.process_time()
     given = make()
+    making = time.process_time() - making
     begun = time.monotonic()
     child = os.fork()
     if child == 0:
@@ -71,7 +86,9 @@ def run(make: Callable[[], Attack], folder: Path) -> tuple[Attack | None, Outcom
     problem = "hang" if hung else _problem(given, code, errors, output)
     if not problem and memory > MOST_MEMORY:
         problem = "memory"
-    return given, Outcome(code, seconds, memory, problem, errors.strip().rpartition("\n")[2][:300])
+    last = errors.strip().rpartition("\n")[2][:300]
+    cpu = making + usage.ru_utime + usage.ru_stime
+    return given, Outcome(code, seconds, cpu, memory, problem, last)
 
 
 def _wait(child: int, given: Attack, begun: float) -> tuple[int, Any, bool]:

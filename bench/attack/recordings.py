@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from attrs import evolve
 
-from attack.case import HEALTHY, Attack, Base, Raw, attack, reading
+from attack.case import Attack, Base, Raw, attack, reading
 from tomr_power_model.messages.bag import jazzy_typestore
-from tomr_power_model.recordings import RecordingWriter, open_recording
+from tomr_power_model.recordings import RecordingWriter
 
 Raws = Iterable[Raw]
 SECOND = 1_000_000_000
@@ -272,9 +272,8 @@ def folders(dice: random.Random, folder: Path, base: Base) -> Attack:
 
 @attack("a recorder that is killed")
 def unclosed(dice: random.Random, folder: Path, base: Base) -> Attack:
-    with open_recording(HEALTHY):
-        pass
-    data = (HEALTHY / "square.mcap").read_bytes()
+    raws = base.healthy if dice.random() < 0.1 else base.healthy[: dice.choice((1200, 2400))]
+    data = (write(folder / "bag", raws) / "bag.mcap").read_bytes()
     path = folder / "cut.mcap"
     path.write_bytes(data[: dice.randrange(len(data))])
     tool, arguments = reading(dice, path)
