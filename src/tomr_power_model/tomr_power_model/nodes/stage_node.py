@@ -20,7 +20,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_OK
-from tomr_power_model.errors import InputError
+from tomr_power_model.errors import InputError, one_line
 from tomr_power_model.messages.outgoing import TYPES, DiagnosticMessage, Outgoing
 from tomr_power_model.messages.plain import Plain, build
 from tomr_power_model.nodes.command_type import CommandType
@@ -217,12 +217,13 @@ def run_node(make: Callable[[], Node], arguments: list[str] | None = None) -> in
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         node = make()
     except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(one_line(f"error: {error}"), file=sys.stderr)
         rclpy.try_shutdown()
         return EXIT_BAD_INPUT
     except RCLError as error:
         # A parameter file that rcl cannot read; its text ends with where it was in C.
-        print(f"error: {str(error).partition(', at ')[0]}: mend the file", file=sys.stderr)
+        reason = str(error).partition(", at ")[0]
+        print(one_line(f"error: {reason}: mend the file"), file=sys.stderr)
         return EXIT_BAD_INPUT
     if isinstance(node, StageNode):
         node.introduce()
