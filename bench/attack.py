@@ -29,9 +29,10 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy is loaded
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "OFF"  # nodes of tries are alone
 sys.path.insert(0, str(ROOT / "test"))  # mcap_records
 
-from attack import recordings, texts  # noqa: E402 the package beside this file
+from attack import live, recordings, stores, texts  # noqa: E402 the package beside this file
 from attack.case import GENERATORS, HEALTHY, Base, read_base  # noqa: E402
 from attack.judge import load_tools, run  # noqa: E402
 
@@ -39,7 +40,7 @@ from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK, run_main  # noqa: E402
 from tomr_power_model.errors import InputError, one_line  # noqa: E402
 from tomr_power_model.files import make_folder  # noqa: E402
 
-KINDS = (recordings, texts)  # they register their attacks
+KINDS = (live, recordings, stores, texts)  # they register their attacks
 
 
 def _parser() -> argparse.ArgumentParser:

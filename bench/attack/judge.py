@@ -10,7 +10,7 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from typing import Any
 from attrs import frozen
 from tqdm import tqdm
 
+from attack import live
 from attack.case import Attack
 from tomr_power_model.errors import InputError
 from tomr_power_model.recordings import open_recording
@@ -33,7 +34,21 @@ MODULES = {
     "tomr_gap": "tomr_reality_gap.cli",
     "tomr_simulate": "tomr_sim_bridge.cli.simulate",
     "tomr_import_robotino": "tomr_sim_bridge.cli.import_robotino",
+    "tomr_commission": "tomr_commission.cli",
+    "tomr_odometry": "tomr_odometry.cli",
+    "tomr_train": "tomr_training.train",
 }
+FURTHER: dict[str, Callable[[Sequence[str]], int]] = {
+    "parameters": live.set_parameters,
+    "live view": live.serve_clients,
+}  # no commands of their own
+_NODES = (
+    "tomr_sim_bridge.nodes.sim_bridge_node",
+    "tomr_power_model.nodes.power_model_node",
+    "tomr_fault_diag.nodes.diagnosis_node",
+    "tomr_fault_diag.nodes.power_residuals_node",
+    "tomr_fault_diag.nodes.fault_classifier_node",
+)
 _ANSWERS = (0, 1, 2, 3)  # 3: nothing could be decided
 _QUIET = ("note:", "warning:", "error:", "usage:", "interrupted")
 
@@ -52,7 +67,7 @@ class Outcome:
 
 def load_tools(recording: Path) -> None:
     """Import what all tries need and compile what they share, once: they are forked."""
-    for module in MODULES.values():
+    for module in (*MODULES.values(), *_NODES, "tomr_view.server", "rclpy"):
         import_module(module)
     tqdm.monitor_interval = 0  # no thread that might hold a lock while this process forks
     given = str(recording)
@@ -123,7 +138,8 @@ def _be_the_command(given: Attack, folder: Path) -> None:
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (given.largest_file, given.largest_file))
         sys.argv = [given.tool, *given.arguments]
-        code = int(import_module(MODULES[given.tool]).main(list(given.arguments)))
+        main = FURTHER.get(given.tool) or import_module(MODULES[given.tool]).main
+        code = int(main(list(given.arguments)))
         sys.stdout.flush()
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else _MADE

@@ -3,6 +3,7 @@
 import math
 import random
 import shutil
+import struct
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from tomr_power_model.messages.bag import jazzy_typestore
 from tomr_power_model.recordings import RecordingWriter
 
 Raws = Iterable[Raw]
+_STAMP = struct.Struct("<4xiI")  # after what tells the encoding
 SECOND = 1_000_000_000
 EXTREMES = (math.nan, math.inf, -math.inf, 1e308, -1e308, 1e30, -1e30, 1e6, 0.0, 5e-324)
 _SENSORS = ("/joint_states", "/wheel_1/power", "/wheel_2/power", "/wheel_3/power")
@@ -40,15 +42,11 @@ def changed(raw: Raw, change: Callable[[Any], None]) -> Raw:
 
 
 def restamped(raw: Raw, stamp_ns: int) -> Raw:
-    """A message with another stamp in its header, if it has one."""
-
-    def change(message: Any) -> None:
-        if hasattr(message, "header"):
-            stamp = message.header.stamp
-            stamp.sec, stamp.nanosec = divmod(max(-(2**31) * SECOND, stamp_ns), SECOND)
-            stamp.sec = min(stamp.sec, 2**31 - 1)
-
-    return changed(raw, change)
+    """A message with another stamp in its header, with which each of the base begins."""
+    seconds, rest = divmod(max(-(2**31) * SECOND, stamp_ns), SECOND)
+    data = bytearray(raw.data)
+    _STAMP.pack_into(data, 0, min(seconds, 2**31 - 1), rest)
+    return evolve(raw, data=bytes(data))
 
 
 @attack("bytes of a file")
