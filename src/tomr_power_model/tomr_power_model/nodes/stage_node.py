@@ -17,6 +17,7 @@ from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_OK
@@ -27,6 +28,7 @@ from tomr_power_model.nodes.command_type import CommandType
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
 from tomr_power_model.robot import Robot
 from tomr_power_model.robot.parameters import NAMELESS, ParameterSpec, Value
+from tomr_power_model.topics.flow import Flow
 from tomr_power_model.topics.inputs import Complaints, Input
 
 # Sensors are best effort: a late sample is worth less than the next one. The depth bridges the
@@ -88,18 +90,25 @@ class StageNode(Node):
         clock = self.get_clock()
         self._note("listens to", item.topic, item.type_name)
 
-        def receive(message: Any) -> None:
-            problem = item.take(message, clock.now().nanoseconds)
-            if problem is not None:
-                self.complain(item.topic, problem)
-            advance()
-
         def subscribe(type_name: str) -> Any:
+            kind = message_class(type_name)
+            flow = Flow(has_header="header" in kind.get_fields_and_field_types())
+
+            def receive(data: bytes) -> None:
+                now = clock.now().nanoseconds
+                problem = flow.refuses(data, now)
+                if problem is None:
+                    problem = item.take(deserialize_message(data, kind), now)
+                if problem is not None:
+                    self.complain(item.topic, problem)
+                advance()
+
             return self.create_subscription(
-                message_class(type_name),
+                kind,
                 item.topic,
                 receive,
                 qos,
+                raw=True,  # what is too much is not even decoded
                 # Each default event adds to every wait: together a sixth of the nodes' CPU.
                 event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
             )
