@@ -13,6 +13,7 @@ from processes import command_path
 from soak.acts import (
     ENCODERS,
     HEALTHY,
+    POWER,
     SIMULATOR,
     STREAMS,
     SUITES,
@@ -28,7 +29,7 @@ from soak.acts import (
 from soak.crew import Crew
 from soak.judge import GOES, Delays, Item, memory_items, table
 from soak.relay_node import PLANT, Relay
-from tomr_fault_diag.classifier.states import FAULTLESS, UNKNOWN
+from tomr_fault_diag.classifier.states import FAULTLESS, POWER_SENSOR, UNKNOWN
 from tomr_power_model.errors import InputError
 from tomr_power_model.files import write_text
 from tomr_power_model.messages.plain import NANOSECONDS
@@ -173,7 +174,6 @@ class Soak:
         self._set_fault(before, 0.0)
         self._set_fault(condition, condition.severity)
         self._await_verdict(self._doing)
-        self._allowed = _true_words(condition)
 
     def _set_fault(self, condition: Condition, severity: float) -> None:
         if condition.fault:
@@ -201,6 +201,7 @@ class Soak:
         self._until(found, "a verdict")
         for seconds in taken.values():
             self._delays.add(what, seconds)
+        self._allowed = _true_words(self._condition)
         self._drive(_QUIET)
 
     def _interrupt(self, interruption: Interruption) -> None:
@@ -214,6 +215,8 @@ class Soak:
             relay.shift_ns += round(interruption.by * NANOSECONDS)
         elif isinstance(interruption, Pause):
             relay.silent = {*STREAMS[interruption.streams]}
+            # A sensor that is silent for seconds is called so, and rightly.
+            self._allowed |= {POWER_SENSOR[POWER.index(t)].name for t in relay.silent if t in POWER}
             self._drive(interruption.length)
             relay.silent = set()
         elif isinstance(interruption, Flood):
