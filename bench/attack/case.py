@@ -50,7 +50,7 @@ class Base:
         chosen, names = dice.choice(
             ((self.healthy, frozenset[str]()), (self.faulty, frozenset({FAULT})))
         )
-        seconds = dice.choice((3.0, 3.0, 6.0, 60.0))
+        seconds = dice.choices((3.0, 6.0, 60.0), (6, 2, 1))[0]  # most of them short: cheap
         first = chosen[0].stamp_ns + round(dice.uniform(0.0, 8.0) * 1e9 * (seconds < 60.0))
         last = first + round(seconds * 1e9)
         return tuple(raw for raw in chosen if first <= raw.stamp_ns <= last), names

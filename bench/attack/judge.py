@@ -1,6 +1,7 @@
 """Running a try in a process of its own, and what to say of how it ended."""
 
 import contextlib
+import gc
 import io
 import json
 import os
@@ -9,13 +10,15 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from attrs import frozen
+from tqdm import tqdm
 
+from attack import live
 from attack.case import Attack
 from tomr_fault_diag.classifier.states import FAULTLESS, UNKNOWN
 from tomr_power_model.errors import InputError
@@ -32,7 +35,21 @@ MODULES = {
     "tomr_gap": "tomr_reality_gap.cli",
     "tomr_simulate": "tomr_sim_bridge.cli.simulate",
     "tomr_import_robotino": "tomr_sim_bridge.cli.import_robotino",
+    "tomr_commission": "tomr_commission.cli",
+    "tomr_odometry": "tomr_odometry.cli",
+    "tomr_train": "tomr_training.train",
 }
+FURTHER: dict[str, Callable[[Sequence[str]], int]] = {
+    "parameters": live.set_parameters,
+    "live view": live.serve_clients,
+}  # no commands of their own
+_NODES = (
+    "tomr_sim_bridge.nodes.sim_bridge_node",
+    "tomr_power_model.nodes.power_model_node",
+    "tomr_fault_diag.nodes.diagnosis_node",
+    "tomr_fault_diag.nodes.power_residuals_node",
+    "tomr_fault_diag.nodes.fault_classifier_node",
+)
 _ANSWERS = (0, 1, 2, 3)  # 3: nothing could be decided
 _QUIET = ("note:", "warning:", "error:", "usage:", "interrupted")
 
@@ -43,6 +60,7 @@ class Outcome:
 
     code: int
     seconds: float
+    cpu: float  # s, of the command and of making its input
     memory: int  # kB
     problem: str
     line: str  # the last on stderr
@@ -50,15 +68,27 @@ class Outcome:
 
 def load_tools(recording: Path) -> None:
     """Import what all tries need and compile what they share, once: they are forked."""
-    for module in MODULES.values():
+    for module in (*MODULES.values(), *_NODES, "tomr_view.server", "rclpy"):
         import_module(module)
+    tqdm.monitor_interval = 0  # no thread that might hold a lock while this process forks
+    given = str(recording)
     with contextlib.redirect_stdout(io.StringIO()):
-        import_module(MODULES["tomr_diagnose"]).main([str(recording), "--json"])
+        import_module(MODULES["tomr_diagnose"]).main([given, "--json"])
+        import_module(MODULES["tomr_calibrate"]).main(
+            [given, "--robot", "reference", "--fit", "robot.mass"]
+        )
+        import_module(MODULES["tomr_gap"]).main(
+            ["check", "--robot", "reference", "--real", given, "--quiet"]
+        )
+    gc.collect()
+    gc.freeze()  # a collection in a child would copy all that it shares with this process
 
 
 def run(make: Callable[[], Attack], folder: Path) -> tuple[Attack | None, Outcome]:
     """Make a try and run it, in a child each."""
+    making = time.process_time()
     given = make()
+    making = time.process_time() - making
     begun = time.monotonic()
     child = os.fork()
     if child == 0:
@@ -72,7 +102,9 @@ def run(make: Callable[[], Attack], folder: Path) -> tuple[Attack | None, Outcom
     problem = "hang" if hung else problem_of(given, code, errors, output)
     if not problem and memory > MOST_MEMORY:
         problem = "memory"
-    return given, Outcome(code, seconds, memory, problem, errors.strip().rpartition("\n")[2][:300])
+    last = errors.strip().rpartition("\n")[2][:300]
+    cpu = making + usage.ru_utime + usage.ru_stime
+    return given, Outcome(code, seconds, cpu, memory, problem, last)
 
 
 def _wait(child: int, given: Attack, begun: float) -> tuple[int, Any, bool]:
@@ -107,7 +139,8 @@ def _be_the_command(given: Attack, folder: Path) -> None:
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (given.largest_file, given.largest_file))
         sys.argv = [given.tool, *given.arguments]
-        code = int(import_module(MODULES[given.tool]).main(list(given.arguments)))
+        main = FURTHER.get(given.tool) or import_module(MODULES[given.tool]).main
+        code = int(main(list(given.arguments)))
         sys.stdout.flush()
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else _MADE
