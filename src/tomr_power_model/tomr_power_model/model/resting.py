@@ -17,9 +17,9 @@ until the wheel turns as expected.
 """
 
 from collections.abc import Sequence
+from typing import Protocol
 
 from tomr_power_model.dynamics import layout as at
-from tomr_power_model.model.commanded import CommandPath
 from tomr_power_model.robot import Controller
 
 _UNKNOWN = float("nan")
@@ -29,6 +29,23 @@ STANDS = 0.05  # rad/s
 SLOW = 0.5  # rad/s
 FOLLOWS = 0.5  # share of the difference in a tick
 PUSHED = 0.25  # most that a push leaves, as a share of the supply's voltage
+
+
+class SimulatedDrivers(Protocol):
+    """What simulates the drivers; `CommandPath` does."""
+
+    @property
+    def state(self) -> object | None:
+        """None before the first command."""
+        ...
+
+    def wheel(self, field: int, /) -> list[float]:
+        """A field of the wheels' state, see `layout`."""
+        ...
+
+    def add_to_sum(self, wheel: int, angle: float) -> None:
+        """Add to what a wheel's driver has summed up of its errors [rad]."""
+        ...
 
 
 class RestingDrivers:
@@ -50,7 +67,7 @@ class RestingDrivers:
         self._strange = [False] * self._wheels  # differences that no push makes
 
     def voltages(
-        self, path: CommandPath, angle: Sequence[float], speed: Sequence[float], share: float
+        self, path: SimulatedDrivers, angle: Sequence[float], speed: Sequence[float], share: float
     ) -> list[float]:
         """Voltage that each driver holds at some time of a tick [V], NaN before the first command.
 
@@ -75,7 +92,7 @@ class RestingDrivers:
         ]
 
     def _differences(
-        self, path: CommandPath, angle: Sequence[float], speed: Sequence[float]
+        self, path: SimulatedDrivers, angle: Sequence[float], speed: Sequence[float]
     ) -> list[float]:
         """What each driver's sum is over the simulation's [rad], NaN where not known."""
         turned, simulated = path.wheel(at.TURNED), path.wheel(at.SPEED)

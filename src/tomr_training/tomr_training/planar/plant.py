@@ -19,7 +19,6 @@ from tomr_training.labels import GroundTruth
 from tomr_training.planar.faults import CHANGES, number
 from tomr_training.planar.schedule import (
     TICK,
-    commanded,
     counted_shares,
     disturbed,
     end_of,
@@ -89,12 +88,6 @@ def run_plant(chosen: Drive) -> Motion:
         if fault.fault_id == "load_towed":
             inputs[:, at.PUSH : at.PUSH + 2] += _towed(chosen, fault)
     return _run(_on_its_floor(chosen), inputs, chosen.plant, chosen, _changes(chosen))
-
-
-def run_believed(chosen: Drive) -> Motion:
-    """Drive the robot as it is described, with the commands and nothing else."""
-    robot = chosen.believed
-    return _run(vehicle_of(robot), commanded(chosen, robot), robot, chosen)
 
 
 def _changes(chosen: Drive) -> list[tuple[int, Array]]:
