@@ -37,7 +37,7 @@ MANIFESTS := $(wildcard $(addprefix src/*/,package.xml setup.py setup.cfg resour
 LINKED := $(sort $(MANIFESTS) $(wildcard src/*/launch/*.launch.py \
     $(addprefix src/*/tomr_*/,robots/*.yaml missions/*.yaml weights/*)))
 
-.PHONY: help setup demo test attack audit lint format bench docs figures train bags clean FORCE
+.PHONY: help setup demo test attack soak audit lint format bench docs figures train bags clean FORCE
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -60,6 +60,9 @@ test: lint ## run every check and test
 
 attack: setup ## feed all commands with 20,000 hostile inputs (hours; resumed where it was)
 	$(BIN)/python bench/attack.py --tries 20000 --out attack $(ARGS)
+
+soak: setup ## drive for an hour with faults, gaps, floods and killed nodes
+	$(BIN)/python bench/soak.py --out soak $(ARGS)
 
 audit: setup ## look for known vulnerabilities in the installed packages (needs the Internet)
 	@[ -x .venv/audit/bin/pip-audit ] || { $(BIN)/python -m venv .venv/audit && \

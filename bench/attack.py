@@ -17,19 +17,22 @@ import json
 import os
 import random
 import shutil
+import subprocess
 import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy is loaded
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "OFF"  # nodes of tries are alone
 sys.path.insert(0, str(ROOT / "test"))  # mcap_records
 
-from attack import recordings, texts  # noqa: E402 the package beside this file
+from attack import live, recordings, stores, texts  # noqa: E402 the package beside this file
 from attack.case import GENERATORS, HEALTHY, Base, read_base  # noqa: E402
 from attack.judge import load_tools, run  # noqa: E402
 
@@ -37,7 +40,7 @@ from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK, run_main  # noqa: E402
 from tomr_power_model.errors import InputError, one_line  # noqa: E402
 from tomr_power_model.files import make_folder  # noqa: E402
 
-KINDS = (recordings, texts)  # they register their attacks
+KINDS = (live, recordings, stores, texts)  # they register their attacks
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -55,6 +58,16 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+@cache
+def _tree() -> str:
+    """The commit that is attacked."""
+    command = ("git", "-C", str(ROOT), "describe", "--always", "--dirty", "--exclude=*")
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):  # an unpacked archive
+        return "unknown"
+
+
 def _once(number: int, seed: int, only: str, base: Base, folder: Path) -> dict[str, Any]:
     dice = random.Random(f"{seed}:{number}:{only}")
     kind = dice.choice([name for name in sorted(GENERATORS) if only in name])
@@ -62,11 +75,13 @@ def _once(number: int, seed: int, only: str, base: Base, folder: Path) -> dict[s
     return {
         "number": number,
         "seed": seed,
+        "tree": _tree(),
         "kind": kind,
         "tool": given.tool if given else "",
         "what": one_line(given.what) if given else "",
         "code": outcome.code,
         "seconds": round(outcome.seconds, 2),
+        "cpu": round(outcome.cpu, 3),
         "memory": outcome.memory,
         "problem": outcome.problem,
         "line": one_line(outcome.line),
@@ -75,8 +90,9 @@ def _once(number: int, seed: int, only: str, base: Base, folder: Path) -> dict[s
 
 def _table(rows: Sequence[dict[str, Any]]) -> str:
     lines = [
-        "| attack | tries | answered | refused | ended | problems | longest, s | most, MB |",
-        "|---|---|---|---|---|---|---|---|",
+        "| attack | tries | answered | refused | ended | problems | CPU of one, s | longest, s "
+        "| most, MB |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     kinds = [*sorted({row["kind"] for row in rows}), ""]
     for kind in kinds:
@@ -87,6 +103,7 @@ def _table(rows: Sequence[dict[str, Any]]) -> str:
             f"| {sum(row['code'] in (2, 3) for row in mine)} "
             f"| {sum(row['code'] not in (0, 1, 2, 3) for row in mine)} "
             f"| {', '.join(f'{count} {name}' for name, count in problems.most_common()) or '-'} "
+            f"| {sum(row['cpu'] for row in mine) / len(mine):.2f} "
             f"| {max(row['seconds'] for row in mine):.0f} "
             f"| {max(row['memory'] for row in mine) // 1000} |"
         )

@@ -176,12 +176,16 @@ def both(*changes: Change) -> Change:
 
 @frozen
 class Case:
-    """A disturbance of a drive, when what it takes away is back [s], and the seed of its chance."""
+    """A disturbance of a drive, when what it takes away is back [s], and the seed of its chance.
+
+    `dead`: the wheel (0..2) whose power sensor it kills, which may be said.
+    """
 
     kind: str
     change: Change
     back: float = 0.0
     seed: int = 0
+    dead: int | None = None
 
 
 def gaps(places: Sequence[float]) -> Iterator[Case]:
@@ -208,11 +212,11 @@ def cases(placements: int) -> Iterator[Case]:
         yield Case("2 % lost, 5 ms, 1 s without power", worn, seed=seed)
     for at in places[::3]:
         for wheel in range(3):
-            yield Case("power frozen", power(wheel, at, frozen_sensor))
-            yield Case("power reads zero", power(wheel, at, dead))
+            yield Case("power frozen", power(wheel, at, frozen_sensor), dead=wheel)
+            yield Case("power reads zero", power(wheel, at, dead), dead=wheel)
             yield Case("one sample of 1e30 V", power(wheel, at, absurd, 0.015))
-            yield Case("1e30 V for good", power(wheel, at, absurd))
-            yield Case("unplugged", unplugged(wheel, at))
+            yield Case("1e30 V for good", power(wheel, at, absurd), dead=wheel)
+            yield Case("unplugged", unplugged(wheel, at), dead=wheel)
 
 
 def unplugged(wheel: int, at: float) -> Change:
@@ -233,9 +237,10 @@ def states(items: Drive) -> list[Diagnosis]:
     ]
 
 
-def accused(found: Sequence[Diagnosis]) -> list[str]:
-    """Faults in the order in which they were named, those of power sensors aside."""
-    names = [d.state.name for d in found if d.changed and d.state not in POWER_SENSOR]
+def accused(found: Sequence[Diagnosis], dead: int | None = None) -> list[str]:
+    """Faults in the order in which they were named, but for that of a wheel's dead power sensor."""
+    true = None if dead is None else POWER_SENSOR[dead]
+    names = [d.state.name for d in found if d.changed and d.state != true]
     return [name for name in names if name not in FAULTLESS]
 
 
@@ -244,7 +249,7 @@ def healthy(case: Case, mission: str, seed: int) -> tuple[str, list[str], float]
     found = states(case.change(recorded(mission, seed), np.random.default_rng(case.seed)))
     periodic = [d for d in found if not d.changed]
     decided = [d for d in periodic if d.state.name == "normal" or d.state.name not in FAULTLESS]
-    return case.kind, accused(found), len(decided) / max(len(periodic), 1)
+    return case.kind, accused(found, case.dead), len(decided) / max(len(periodic), 1)
 
 
 def faulty(case: Case, mission: str, seed: int) -> tuple[str, list[str], float]:

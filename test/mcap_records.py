@@ -3,6 +3,7 @@
 import io
 import struct
 from collections.abc import Iterable
+from functools import cache
 
 from lz4.frame import LZ4FrameCompressor  # type: ignore[import-untyped]
 
@@ -70,6 +71,7 @@ def indexed(head: bytes, chunks: Iterable[tuple[bytes, int, int, int]], compress
     return body + index + record(0x02, struct.pack("<QQI", start, 0, 0)) + MAGIC
 
 
+@cache  # the attacks ask for the same few again and again
 def zeros(compression: str, size: int) -> bytes:
     """Zeros packed into a few kilobytes."""
     block = bytes(MEGA)

@@ -1,10 +1,21 @@
 """A small campaign of hostile input: see bench/attack.py."""
 
+# ruff: noqa: E402 (bench/ is no package)
+
+import json
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
+sys.path.append(str(ROOT / "bench"))
+
+from attack.case import Attack
+from attack.judge import problem_of
+
+STATES = ("power sensor fault 1", "dragging wheel 2", "external load", "slip")
 
 
 def test_hostile_input_is_answered_as_promised(tmp_path: Path) -> None:
@@ -19,3 +30,13 @@ def test_hostile_input_is_answered_as_promised(tmp_path: Path) -> None:
     )
     assert run.returncode == 0, run.stdout + run.stderr
     assert "| all |" in run.stdout
+
+
+@pytest.mark.parametrize("state", [*STATES, "does not follow its commands"])
+def test_every_accusation_that_is_not_true_is_a_false_word(state: str) -> None:
+    def judged(*names: str) -> str:
+        given = Attack("tomr_diagnose", ("bag", "--json"), "", frozenset(names))
+        return problem_of(given, 1, "", json.dumps({"ticks": 9, "shares": {state: 0.1}}))
+
+    assert judged() == judged("another") == f"false word: {state}"
+    assert judged(state) == ""

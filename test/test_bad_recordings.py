@@ -2,7 +2,9 @@
 
 import json
 import shutil
+import sqlite3
 from collections.abc import Callable, Iterable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +93,21 @@ def _unclosed_sqlite(drive: list[Raw], folder: Path) -> Path:
     return left
 
 
+def _sqlite_with(statement: str) -> Callable[[list[Raw], Path], Path]:
+    """A recording in whose tables something was changed: sqlite3 takes any value anywhere."""
+
+    def make(drive: list[Raw], folder: Path) -> Path:
+        with RecordingWriter(folder / "tables", "sqlite3") as writer:
+            for m in drive[:600]:
+                writer.write_raw(m.topic, m.type_name, m.data, m.stamp_ns)
+        with closing(sqlite3.connect(folder / "tables" / "tables.db3")) as store:
+            store.execute(statement)
+            store.commit()
+        return folder / "tables"
+
+    return make
+
+
 def _cut_to(share: float) -> Callable[[list[Raw], Path], Path]:
     def make(_: list[Raw], folder: Path) -> Path:
         whole = (BAGS / "square" / "square.mcap").read_bytes()
@@ -121,6 +138,14 @@ BAD: dict[str, tuple[Callable[[list[Raw], Path], Path], list[str]]] = {
     "cut early": (_cut_to(0.01), ["cut.mcap", "cut off", "another copy"]),
     "no messages": (_of(lambda _: []), ["no messages", "record again"]),
     "sqlite never closed": (_unclosed_sqlite, ["killed", "never closed", "to mcap"]),
+    "sqlite stamp that is a text": (
+        _sqlite_with("UPDATE messages SET timestamp = 'x' WHERE id % 50 = 0"),
+        ["tables", "damaged", "record it again"],
+    ),
+    "sqlite message that is a text": (
+        _sqlite_with("UPDATE messages SET data = 'x' WHERE id % 50 < 9"),
+        ["tables", "damaged", "record it again"],
+    ),
     "no joint_states": (_of(_without("/joint_states")), ["no joint_states", "holds /battery"]),
     "no power": (_of(_without(*POWER)), ["none of battery_state, wheel_1/power", "robot.yaml"]),
     "power elsewhere": (

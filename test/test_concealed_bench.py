@@ -35,6 +35,7 @@ from concealed.score import (
     totals,
 )
 from concealed.sensing import Measured, SensorSet, clock_of, noise_of
+from concealed.unnamed import KINDS, figures, met
 
 from tomr_power_model.cli import run_main
 from tomr_power_model.effects import EFFECTS
@@ -506,3 +507,45 @@ def test_bad_input_gets_one_line(
     error = capsys.readouterr().err
     assert words in error
     assert error.count("\n") == 1
+
+
+def unnamed(
+    nature: str, learnt: Mapping[str, Any] | None, after: float = 0.2, **truths: Any
+) -> Any:
+    """How a case at wheel 1 is met; its error could fall from 0.5 to 0.1."""
+    case = truth({"effect": "unknown", "where": [W1], "parameters": {}, "nature": nature, **truths})
+    findings = [
+        {"effect": "unknown", "where": [W1], "holdout": {"nrmse_after": after}, "learnt": learnt}
+    ]
+    report = report_of({"verdict": "mismatch", "findings": findings if learnt is not None else []})
+    return met(case, case.effects[0], report)
+
+
+def test_every_effect_without_a_name_has_its_kind() -> None:
+    assert set(OUTSIDE) <= set(KINDS)
+
+
+def test_the_unnamed_are_scored_by_variable_place_law_and_prediction() -> None:
+    laws = [{"law": "step"}, {"law": "power law"}]
+    right = {"family": "torque.speed", "repeatable": True, "laws": laws}
+    cubic = unnamed("x.cubic", right)
+    assert (cubic.recognised, cubic.placed, cubic.law, cubic.repeats) == (True, True, True, None)
+    assert cubic.share == pytest.approx(0.75)
+    elsewhere = unnamed("x.cubic", right, where=[W2])
+    otherwise = unnamed("x.cubic", {**right, "family": "torque.time", "laws": laws[:1]}, after=0.6)
+    assert (elsewhere.placed, otherwise.placed, otherwise.law) == (False, False, False)
+    assert otherwise.share == pytest.approx(-0.25)
+    event = {"family": "torque.time", "repeatable": False, "laws": []}
+    comes, stays = (
+        unnamed("x.intermittent", {**event, "repeatable": one}) for one in (False, True)
+    )
+    assert (comes.repeats, stays.repeats, comes.share, comes.law) == (True, False, None, None)
+    missed = unnamed("x.tether", None)
+    assert (missed.recognised, missed.told, missed.share) == (False, "match", 0.0)
+    assert figures([cubic, otherwise, comes, stays, missed]) == {
+        "recognised": (4, 5),
+        "variable and place right": (3, 5),
+        "share of the possible improvement, median": 0.0,
+        "not repeatable, said so": (1, 2),
+        "a right law among those told": (1, 3),
+    }

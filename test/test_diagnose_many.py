@@ -42,6 +42,19 @@ def test_episodes_do_not_overlap_and_tell_since_when(capsys: pytest.CaptureFixtu
     assert (starts[0] - starts[1]) % period == period // 2  # the grid is shifted by half of it
 
 
+def test_a_name_with_line_breaks_stays_in_its_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    named = tmp_path / "a\nb \x1b[31m"
+    named.mkdir()
+    (named / "bag").symlink_to(HEALTHY)
+    assert main([str(named / "bag"), str(named / "absent")]) == 2
+    printed = capsys.readouterr()
+    assert "\x1b" not in printed.out + printed.err
+    assert len(printed.err.splitlines()) == 1
+    assert "a b" in printed.out.splitlines()[0]
+
+
 def test_a_folder_is_all_its_recordings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "bad").mkdir()
     (tmp_path / "bad" / "bad.mcap").write_bytes(b"no recording")

@@ -13,7 +13,7 @@ from rclpy.node import Node
 from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.offline import estimates
 from tomr_odometry.settings import OdometrySettings
-from tomr_odometry.topics import OUTPUTS, estimate_messages
+from tomr_odometry.topics import estimate_messages, outputs
 from tomr_power_model.messages.bag import jazzy_typestore, to_bag
 from tomr_power_model.nodes.stage_node import STAGE_QOS, message_class
 from tomr_power_model.recordings import open_recording
@@ -25,16 +25,18 @@ ROBOT = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")
 PATIENCE = 5.0  # s
 RATE = 2.0  # times real time
 
+GIVEN = {"patience": PATIENCE, "publish_floor": True}
+SETTINGS = OdometrySettings.given(GIVEN, "test")
+
 Key = tuple[str, int]
 
 
 def _offline() -> dict[Key, bytes]:
     robot, store = shipped_robot("reference"), jazzy_typestore()
-    settings = OdometrySettings.given({"patience": PATIENCE}, "test")
-    core, found = SlipOdometry(robot, settings), {}
+    core, found = SlipOdometry(robot, SETTINGS), {}
     with open_recording(BAG) as recording:
         for item in estimates(recording, robot, core, Complaints()):
-            for one in estimate_messages(robot, item, settings):
+            for one in estimate_messages(robot, item, SETTINGS):
                 name = one.message.type_name
                 data = bytes(store.serialize_cdr(to_bag(one.message), name))
                 found[one.topic, one.stamp_ns] = data
@@ -51,7 +53,7 @@ def test_node_and_offline_tool_publish_the_same(
     node, executor = Node("listener"), SingleThreadedExecutor()
     executor.add_node(node)
     try:
-        for topic, name in OUTPUTS.items():
+        for topic, name in outputs(SETTINGS).items():
 
             def keep(data: bytes, topic: str = topic, name: str = name) -> None:
                 message = store.deserialize_cdr(data, name)
@@ -61,11 +63,11 @@ def test_node_and_offline_tool_publish_the_same(
 
             node.create_subscription(message_class(name), topic, keep, STAGE_QOS, raw=True)
         parameters = ["--ros-args", "--params-file", str(ROBOT), "-p", f"patience:={PATIENCE}"]
-        spawn(["slip_odometry", *parameters])
+        spawn(["slip_odometry", *parameters, "-p", "publish_floor:=true"])
 
         def connected() -> bool:
             executor.spin_once(0.01)
-            return all(node.count_publishers(topic) == 1 for topic in OUTPUTS)
+            return all(node.count_publishers(topic) == 1 for topic in outputs(SETTINGS))
 
         wait_until(connected, "the node")
         replay = spawn(["bag_replay", "--ros-args", "-p", f"bag:={BAG}", "-p", f"rate:={RATE}"])

@@ -11,6 +11,7 @@ from tomr_power_model.recordings import open_recording
 ROOT = Path(__file__).resolve().parents[2]
 HEALTHY, FAULTY = ROOT / "bags" / "square", ROOT / "bags" / "circle_encoder_lost"
 FAULT = "motor system fault 3"  # in the faulty one
+POWER = {f"/wheel_{number}/power": f"power sensor fault {number}" for number in (1, 2, 3)}
 
 
 @frozen
@@ -49,7 +50,7 @@ class Base:
         chosen, names = dice.choice(
             ((self.healthy, frozenset[str]()), (self.faulty, frozenset({FAULT})))
         )
-        seconds = dice.choice((3.0, 3.0, 6.0, 60.0))
+        seconds = dice.choices((3.0, 6.0, 60.0), (6, 2, 1))[0]  # most of them short: cheap
         first = chosen[0].stamp_ns + round(dice.uniform(0.0, 8.0) * 1e9 * (seconds < 60.0))
         last = first + round(seconds * 1e9)
         return tuple(raw for raw in chosen if first <= raw.stamp_ns <= last), names

@@ -1,6 +1,7 @@
 """Running a try in a process of its own, and what to say of how it ended."""
 
 import contextlib
+import gc
 import io
 import json
 import os
@@ -9,14 +10,17 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from attrs import frozen
+from tqdm import tqdm
 
+from attack import live
 from attack.case import Attack
+from tomr_fault_diag.classifier.states import FAULTLESS, UNKNOWN
 from tomr_power_model.errors import InputError
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import load_robot
@@ -31,7 +35,21 @@ MODULES = {
     "tomr_gap": "tomr_reality_gap.cli",
     "tomr_simulate": "tomr_sim_bridge.cli.simulate",
     "tomr_import_robotino": "tomr_sim_bridge.cli.import_robotino",
+    "tomr_commission": "tomr_commission.cli",
+    "tomr_odometry": "tomr_odometry.cli",
+    "tomr_train": "tomr_training.train",
 }
+FURTHER: dict[str, Callable[[Sequence[str]], int]] = {
+    "parameters": live.set_parameters,
+    "live view": live.serve_clients,
+}  # no commands of their own
+_NODES = (
+    "tomr_sim_bridge.nodes.sim_bridge_node",
+    "tomr_power_model.nodes.power_model_node",
+    "tomr_fault_diag.nodes.diagnosis_node",
+    "tomr_fault_diag.nodes.power_residuals_node",
+    "tomr_fault_diag.nodes.fault_classifier_node",
+)
 _ANSWERS = (0, 1, 2, 3)  # 3: nothing could be decided
 _QUIET = ("note:", "warning:", "error:", "usage:", "interrupted")
 
@@ -42,6 +60,7 @@ class Outcome:
 
     code: int
     seconds: float
+    cpu: float  # s, of the command and of making its input
     memory: int  # kB
     problem: str
     line: str  # the last on stderr
@@ -49,15 +68,27 @@ class Outcome:
 
 def load_tools(recording: Path) -> None:
     """Import what all tries need and compile what they share, once: they are forked."""
-    for module in MODULES.values():
+    for module in (*MODULES.values(), *_NODES, "tomr_view.server", "rclpy"):
         import_module(module)
+    tqdm.monitor_interval = 0  # no thread that might hold a lock while this process forks
+    given = str(recording)
     with contextlib.redirect_stdout(io.StringIO()):
-        import_module(MODULES["tomr_diagnose"]).main([str(recording), "--json"])
+        import_module(MODULES["tomr_diagnose"]).main([given, "--json"])
+        import_module(MODULES["tomr_calibrate"]).main(
+            [given, "--robot", "reference", "--fit", "robot.mass"]
+        )
+        import_module(MODULES["tomr_gap"]).main(
+            ["check", "--robot", "reference", "--real", given, "--quiet"]
+        )
+    gc.collect()
+    gc.freeze()  # a collection in a child would copy all that it shares with this process
 
 
 def run(make: Callable[[], Attack], folder: Path) -> tuple[Attack | None, Outcome]:
     """Make a try and run it, in a child each."""
+    making = time.process_time()
     given = make()
+    making = time.process_time() - making
     begun = time.monotonic()
     child = os.fork()
     if child == 0:
@@ -68,10 +99,12 @@ def run(make: Callable[[], Attack], folder: Path) -> tuple[Attack | None, Outcom
     errors = (folder / "stderr").read_text("utf-8", "replace")
     output = (folder / "stdout").read_text("utf-8", "replace")
     memory = int(usage.ru_maxrss)
-    problem = "hang" if hung else _problem(given, code, errors, output)
+    problem = "hang" if hung else problem_of(given, code, errors, output)
     if not problem and memory > MOST_MEMORY:
         problem = "memory"
-    return given, Outcome(code, seconds, memory, problem, errors.strip().rpartition("\n")[2][:300])
+    last = errors.strip().rpartition("\n")[2][:300]
+    cpu = making + usage.ru_utime + usage.ru_stime
+    return given, Outcome(code, seconds, cpu, memory, problem, last)
 
 
 def _wait(child: int, given: Attack, begun: float) -> tuple[int, Any, bool]:
@@ -106,7 +139,8 @@ def _be_the_command(given: Attack, folder: Path) -> None:
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (given.largest_file, given.largest_file))
         sys.argv = [given.tool, *given.arguments]
-        code = int(import_module(MODULES[given.tool]).main(list(given.arguments)))
+        main = FURTHER.get(given.tool) or import_module(MODULES[given.tool]).main
+        code = int(main(list(given.arguments)))
         sys.stdout.flush()
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else _MADE
@@ -118,7 +152,8 @@ def _be_the_command(given: Attack, folder: Path) -> None:
         os._exit(code & 0xFF)
 
 
-def _problem(given: Attack, code: int, errors: str, output: str) -> str:
+def problem_of(given: Attack, code: int, errors: str, output: str) -> str:
+    """What is wrong with how a try ended, empty if nothing."""
     # A full disk takes what is said as well.
     if "Traceback" in errors or code in (70, _MADE):
         return "traceback"
@@ -179,8 +214,5 @@ def _false_word(given: Attack, code: int, output: str) -> str:
         return "silence"
     if given.names is None or code == 0:
         return ""
-    # "power sensor fault" says that its data are no good, and so they are.
-    said = {name for name in found["shares"] if not name.startswith("power sensor")}
-    named = {name for name in said if "fault" in name or "slip" in name}
-    wrong = named - given.names
+    wrong = found["shares"].keys() - FAULTLESS - {UNKNOWN.name} - given.names
     return f"false word: {', '.join(sorted(wrong))}" if wrong else ""

@@ -3,6 +3,7 @@
 import math
 import random
 import shutil
+import struct
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -10,11 +11,12 @@ from typing import Any
 import numpy as np
 from attrs import evolve
 
-from attack.case import HEALTHY, Attack, Base, Raw, attack, reading
+from attack.case import POWER, Attack, Base, Raw, attack, reading
 from tomr_power_model.messages.bag import jazzy_typestore
-from tomr_power_model.recordings import RecordingWriter, open_recording
+from tomr_power_model.recordings import RecordingWriter
 
 Raws = Iterable[Raw]
+_STAMP = struct.Struct("<4xiI")  # after what tells the encoding
 SECOND = 1_000_000_000
 EXTREMES = (math.nan, math.inf, -math.inf, 1e308, -1e308, 1e30, -1e30, 1e6, 0.0, 5e-324)
 _SENSORS = ("/joint_states", "/wheel_1/power", "/wheel_2/power", "/wheel_3/power")
@@ -40,15 +42,11 @@ def changed(raw: Raw, change: Callable[[Any], None]) -> Raw:
 
 
 def restamped(raw: Raw, stamp_ns: int) -> Raw:
-    """A message with another stamp in its header, if it has one."""
-
-    def change(message: Any) -> None:
-        if hasattr(message, "header"):
-            stamp = message.header.stamp
-            stamp.sec, stamp.nanosec = divmod(max(-(2**31) * SECOND, stamp_ns), SECOND)
-            stamp.sec = min(stamp.sec, 2**31 - 1)
-
-    return changed(raw, change)
+    """A message with another stamp in its header, with which each of the base begins."""
+    seconds, rest = divmod(max(-(2**31) * SECOND, stamp_ns), SECOND)
+    data = bytearray(raw.data)
+    _STAMP.pack_into(data, 0, min(seconds, 2**31 - 1), rest)
+    return evolve(raw, data=bytes(data))
 
 
 @attack("bytes of a file")
@@ -210,7 +208,19 @@ def odd_stamps(dice: random.Random, folder: Path, base: Base) -> Attack:
 
     bag = write(folder / "bag", [made(raw) for raw in raws])
     tool, arguments = reading(dice, bag)
-    return Attack(tool, arguments, f"{kind} by {by / SECOND:g} s on {len(chosen)} topics", names)
+    where = next(iter(chosen)) if len(chosen) == 1 else "all topics"
+    what = f"{kind} by {by / SECOND:g} s on {where}{', received so' * also_received}"
+    known = _known_of_stamps(kind, chosen, names) if also_received else names
+    return Attack(tool, arguments, what, known)
+
+
+def _known_of_stamps(kind: str, chosen: set[str], names: frozenset[str]) -> frozenset[str] | None:
+    """Faults that may be named where messages are received as they are stamped."""
+    if kind in ("reverse", "shuffle"):
+        return None  # a well-formed recording of another motion
+    if kind == "jump" and len(chosen) == 1:  # nothing comes of that topic while the others go on
+        return names | {POWER[topic] for topic in chosen if topic in POWER}
+    return names
 
 
 @attack("gaps and losses")
@@ -237,6 +247,8 @@ def missing(dice: random.Random, folder: Path, base: Base) -> Attack:
     bag = write(folder / "bag", [raw for raw in raws if not lost(raw)])
     tool, arguments = reading(dice, bag)
     what = f"{kind} of {length / SECOND:g} s, {share:.0%} on {len(chosen)} topics"
+    if kind in ("late", "all"):
+        names |= {POWER[topic] for topic in chosen if topic in POWER}
     return Attack(tool, arguments, what, names)
 
 
@@ -272,9 +284,8 @@ def folders(dice: random.Random, folder: Path, base: Base) -> Attack:
 
 @attack("a recorder that is killed")
 def unclosed(dice: random.Random, folder: Path, base: Base) -> Attack:
-    with open_recording(HEALTHY):
-        pass
-    data = (HEALTHY / "square.mcap").read_bytes()
+    raws = base.healthy if dice.random() < 0.1 else base.healthy[: dice.choice((1200, 2400))]
+    data = (write(folder / "bag", raws) / "bag.mcap").read_bytes()
     path = folder / "cut.mcap"
     path.write_bytes(data[: dice.randrange(len(data))])
     tool, arguments = reading(dice, path)

@@ -237,7 +237,22 @@ _WORDS = {
     ),
     "tomr_simulate": ("--out", "--robot", "--seed", "--storage", "--picture", "--list", "--quiet"),
     "tomr_import_robotino": ("--out", "--surface", "--storage"),
+    "tomr_commission": (
+        *("plan", "--robot", "--out", "--false-alarms-per-hour", "--tolerance", "--skip"),
+        *("--quiet", "--speed", "--help"),
+    ),
+    "tomr_odometry": (
+        *("--robot", "--out", "--reference", "--namespace", "--set", "--parameters", "--json"),
+        *("learn", "--quiet", "--help"),
+    ),
+    "tomr_train": (
+        *("--out", "--classifier", "--bands", "--drives", "--validation", "--first-seed"),
+        *("--epochs", "--help"),
+    ),
 }
+
+
+_READING = ("tomr_calibrate", "tomr_commission", "tomr_odometry")
 
 
 @attack("command line")
@@ -254,6 +269,10 @@ def command_lines(dice: random.Random, folder: Path, base: Base) -> Attack:
         arguments.append(dice.choice(("check", "explain")))
     for _ in range(dice.randrange(7)):
         arguments.append(dice.choice((*_WORDS[tool], *values)))
+    if tool in _READING and dice.random() < 0.5:  # get beyond the parser
+        arguments[:0] = [str(bag), "--robot", "reference", "--out", str(folder / "made")]
+    if tool == "tomr_train":  # it would take minutes
+        arguments += ["--drives", dice.choice(("0", "-1", "1e308", "nan"))]
     return Attack(tool, tuple(arguments), " ".join(arguments)[:60])
 
 

@@ -35,6 +35,7 @@ class Finding:
     rivals: frozenset[str]
     values: Mapping[str, Value]
     nrmse_after: float | None
+    learnt: Mapping[str, Any] | None = None  # of an effect without a name
 
     @property
     def confident(self) -> bool:
@@ -94,6 +95,7 @@ def _finding(item: Mapping[str, Any]) -> Finding:
         ),
         values=_values(item.get("parameters") or {}),
         nrmse_after=None if after is None else float(after),
+        learnt=item.get("learnt"),
     )
 
 
@@ -118,6 +120,7 @@ class TrueEffect:
     values: Mapping[str, float]
     size: str  # of its recipe, or empty
     snr: float | None  # per power sample
+    nature: str = ""  # of one without a name
 
 
 @frozen
@@ -159,6 +162,7 @@ def truth_of(document: Mapping[str, Any]) -> Truth:
             values={key: float(value["value"]) for key, value in item["parameters"].items()},
             size=str(item.get("size", "")),
             snr=per_sample.get(item.get("id")),
+            nature=str(item.get("nature", "")),
         )
         for item in document["effects"]
     )

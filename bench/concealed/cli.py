@@ -14,6 +14,7 @@ from concealed.claims import read_truths
 from concealed.make import chosen, make_all
 from concealed.run import read_times, run_all, tool
 from concealed.score import by_group, confusion, score_all, sightings, totals
+from concealed.unnamed import figures, met_all
 from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK
 from tomr_power_model.errors import InputError
 
@@ -98,6 +99,9 @@ def _score(options: argparse.Namespace) -> int:
     tables.print_sightings(console, limits)
     tables.print_confusion(console, counts)
     tables.print_totals(console, found)
+    unnamed = met_all(truths, options.reports)
+    if unnamed:
+        tables.print_unnamed(console, unnamed, figures(unnamed))
     if options.png is not None:
         tables.draw_confusion(counts, options.png)
     if options.json is not None:

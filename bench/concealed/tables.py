@@ -11,6 +11,7 @@ from rich.table import Table
 from concealed.catalogue import SIZES
 from concealed.likeness import family
 from concealed.score import NOTHING, NULL, Hit, Outcome, Sighting
+from concealed.unnamed import Met
 
 _GROUP_COLUMNS = (
     "cases",
@@ -157,6 +158,22 @@ def print_totals(console: Console, found: Mapping[str, Any]) -> None:
     for name, value in found.items():
         table.add_row(name.replace("_", " "), _any(value))
     console.print(table)
+
+
+def print_unnamed(console: Console, found: Sequence[Met], figures: Mapping[str, Any]) -> None:
+    """What has no name: one line per case, and the figures of all."""
+    table = Table(title="Without a name", box=None)
+    for heading in ("id", "case", "told as", "placed", "share", "comes and goes", "law"):
+        table.add_column(heading, no_wrap=True)
+    for item in found:
+        marks = [
+            "-" if said is None else "yes" if said else "no" for said in (item.repeats, item.law)
+        ]
+        share, placed = _number(item.share, 2), "yes" if item.placed else "no"
+        table.add_row(item.truth.identity, item.truth.name, item.told, placed, share, *marks)
+    console.print(table)
+    for name, value in figures.items():
+        console.print(f"{name}: {'-' if value is None else _any(value)}")
 
 
 def _any(value: Any) -> str:

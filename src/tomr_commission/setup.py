@@ -21,5 +21,5 @@ setup(
     install_requires=["setuptools"],
     extras_require={"test": ["pytest"]},
     zip_safe=False,
-    entry_points={"console_scripts": [f"tomr_commission = {NAME}.cli:main"]},
+    entry_points={"console_scripts": [f"tomr_commission = {NAME}.entry:tomr_commission"]},
 )

@@ -26,8 +26,8 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            f"slip_odometry = {NAME}.nodes.slip_odometry_node:main",
-            f"tomr_odometry = {NAME}.cli:main",
+            f"slip_odometry = {NAME}.entry:slip_odometry",
+            f"tomr_odometry = {NAME}.entry:tomr_odometry",
         ],
     },
 )

@@ -1,7 +1,11 @@
 """The level that gives a rate of false alarms."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
+from scipy.signal import lfilter
+from scipy.stats import norm
 
 from tomr_commission.alarm import Tail, alarm_level, block_peaks
 from tomr_commission.evidence import MOST_CAUTION, SURE
@@ -22,6 +26,39 @@ def test_exponential_peaks_give_the_level_that_their_law_has() -> None:
     assert level.low < level.expected <= 0.0101
     assert level.high > 0.01
     assert level.is_enough
+
+
+def kept_share(rates: Sequence[float], wanted: float) -> float:
+    return float(np.mean(np.array(rates) <= wanted))
+
+
+def test_rate_is_kept_as_often_as_the_confidence_says() -> None:
+    """Independent peaks of a known law, time and again: the true rate at each level."""
+    wanted, per_hour, scale = 0.05, 30.0, 3.0
+    rates = []
+    for seed in range(100):
+        tail = Tail.of("shoves", exponential(scale, 390, seed), per_hour, CHOICE)
+        level = alarm_level([tail], wanted, 11.0, CHOICE).needed + SURE
+        rates.append(per_hour * np.exp(-level / scale))
+    assert kept_share(rates, wanted) == pytest.approx(CHOICE.confidence, abs=0.12)
+    assert np.median(rates) > 0.3 * wanted  # nor is it more careful than it has to be
+
+
+def test_rate_is_kept_where_evidence_comes_in_clusters() -> None:
+    """Each tick exponential, and like those of the second before: peaks of 10 s count once."""
+    wanted, tick, hours = 2.0, 0.05, 100.0
+    random = np.random.default_rng(5)
+    stays = np.exp(-tick / 1.0)
+    noise = np.sqrt(1.0 - stays**2) * random.normal(size=int(hours * 3600.0 / tick))
+    evidence = -2.0 * norm.logsf(lfilter([1.0], [1.0, -stays], noise))
+    peaks = evidence.reshape(-1, round(CHOICE.block / tick)).max(axis=1)
+    rates = []
+    for part in np.split(peaks, 100)[:50]:  # an hour each
+        tail = Tail.of("driving", part, 3600.0 / CHOICE.block, CHOICE)
+        level = alarm_level([tail], wanted, 11.0, CHOICE).needed + SURE
+        rates.append(float((peaks > level).sum()) / hours)
+    assert 0.7 <= kept_share(rates, wanted) < 1.0
+    assert np.median(rates) > 0.3 * wanted
 
 
 def test_rarer_alarms_ask_for_more_caution() -> None:
@@ -54,4 +91,6 @@ def test_peaks_at_the_cap_are_longer_than_is_known() -> None:
 
 
 def test_block_peaks() -> None:
-    assert block_peaks(np.array([1.0, 3.0, 2.0, 0.0, 5.0]), 2) == [3.0, 2.0, 5.0]
+    """Two ticks to a second, and half a minute that was left out."""
+    seconds = np.array([0.0, 0.5, 1.0, 1.5, 32.0])
+    assert block_peaks(np.array([1.0, 3.0, 2.0, 0.0, 5.0]), seconds, 1.0) == [3.0, 2.0, 5.0]

@@ -14,8 +14,9 @@ from tomr_commission.cli import main
 from tomr_commission.commission import _observe
 from tomr_commission.rehearsal import Shoved
 from tomr_commission.trials import Trial
-from tomr_fault_diag.classifier.commissioned import commissioned_words
+from tomr_fault_diag.classifier.commissioned import commissioned_words, stamp_of
 from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.cli.diagnose import main as diagnose
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import load_robot, read_node_sections, shipped_robot
@@ -99,7 +100,7 @@ def test_written_description_is_loaded_everywhere(done: Path) -> None:
     assert settings.residuals.bands.power == pytest.approx(bands["power"])
     assert settings.classifier.caution == report(done)["alarm"]["caution"]
     # A no-go is no commissioning.
-    assert commissioned_words(settings.classifier) == "no: run tomr_commission"
+    assert commissioned_words(settings.classifier, load_robot(written)) == "no: run tomr_commission"
     assert settings.classifier.hardware_id == ClassifierSettings().hardware_id
 
 
@@ -109,6 +110,55 @@ def test_values_changed_afterwards_are_refused(done: Path, tmp_path: Path) -> No
     written.write_text(text.replace("mass: 15.0", "mass: 16.0"))
     with pytest.raises(InputError, match=r"commissioned on .*run tomr_commission again"):
         load_robot(written)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("mass: 15.0", "mass: 16.0"),
+        ("wheel_1_joint, wheel_2_joint", "wheel_2_joint, wheel_1_joint"),
+        ("robot_radius: 0.2", "robot_radius: 0.25"),
+    ],
+)
+def test_file_of_another_robot_is_refused_by_all(
+    done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str
+) -> None:
+    text = (done / "commissioned.yaml").read_text()
+    assert old in text
+    written = tmp_path / "another.yaml"
+    written.write_text(text.replace(old, new))
+    bag, robot = str(BAGS / "square"), str(written)
+    for command in (diagnose, lambda given: main([*given, "--out", str(tmp_path / "out")])):
+        assert command([bag, "--robot", robot]) == 2
+        error = capsys.readouterr().err
+        assert "not those that were commissioned on" in error
+        assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("part", "said"),
+    [
+        (None, ""),
+        (1, "commissioned: no: with another classifier on 2026-03-01"),
+        (2, "commissioned: no: another robot, or this one before"),
+        (3, "commissioned: no: with version x of the suite, this is"),
+    ],
+)
+def test_file_of_another_time_is_told_in_a_line(
+    done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], part: int | None, said: str
+) -> None:
+    robot = load_robot(done / "commissioned.yaml")
+    stamp = stamp_of("2026-03-01", ClassifierSettings(), robot).split(" ")
+    if part is not None:
+        stamp[part] = "x"
+    document = yaml.safe_load((done / "commissioned.yaml").read_text())
+    document["fault_classifier"]["ros__parameters"]["commissioned"] = " ".join(stamp)
+    written = tmp_path / "then.yaml"
+    written.write_text(yaml.safe_dump(document))
+    assert diagnose([str(BAGS / "square"), "--robot", str(written)]) == 0
+    told = [line for line in capsys.readouterr().err.splitlines() if "commissioned" in line]
+    assert len(told) == (part is not None)
+    assert all(said in line for line in told)
 
 
 def test_commissioned_file_is_commissioned_again_from_its_description(

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from attrs import evolve
 
 from tomr_commission.rehearsal import Rehearsal, Usage, observed_of, rehearse, shoved_drive
 from tomr_commission.simulated import KINDS, cases, simulated_fault
@@ -62,3 +63,10 @@ def test_fault_comes_on_under_way_and_stays() -> None:
     assert fault.end is None
     assert fault.settings["severity"] == 0.4
     assert drive.length > 8.0
+
+
+def test_rehearsal_sees_no_more_than_the_robot_tells() -> None:
+    deaf = Rehearsal(shoves=3, force=(3.0, 3.0), silent=tuple(range(10)))
+    args = (BandSettings(power=0.1, relative=0.01, speed=0.01), ClassifierSettings(), USAGE)
+    assert max(rehearse("reference", *args, deaf).peaks) == 0.0
+    assert max(rehearse("reference", *args, evolve(deaf, silent=())).peaks) > 0.0

@@ -85,6 +85,19 @@ def test_encoder_that_counts_backwards(ideal: Drive) -> None:
 
 
 @pytest.mark.parametrize(
+    ("axes", "said"),
+    [
+        ((1.0, -1.0, 1.0), "linear.y of the commands has the wrong sign"),
+        ((1.0, 1.0, -1.0), "angular.z of the commands has the wrong sign"),
+        ((-1.0, -1.0, -1.0), "all wheels turn against their sense"),
+    ],
+)
+def test_wrong_signs(ideal: Drive, axes: tuple[float, float, float], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        check_wheels([evolve(ideal, command=ideal.command * axes)], ROBOT, "robot.yaml")
+
+
+@pytest.mark.parametrize(
     ("key", "value", "said"),
     [
         ("robot.wheel_radius", 0.1, "write robot.wheel_radius: 0.05"),

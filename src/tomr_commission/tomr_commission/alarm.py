@@ -143,6 +143,7 @@ def alarm_level(
     return AlarmLevel(caution, wanted, needed, expected, float(low), float(high), tuple(tails))
 
 
-def block_peaks(evidence: Array, block: int) -> list[float]:
-    """The highest evidence of each block of so many ticks."""
-    return [float(evidence[at : at + block].max()) for at in range(0, len(evidence), block)]
+def block_peaks(evidence: Array, seconds: Array, block: float) -> list[float]:
+    """The highest evidence of each block of so many seconds, blocks without a tick left out."""
+    number = np.floor(seconds / block)
+    return [float(evidence[number == one].max()) for one in np.unique(number)]

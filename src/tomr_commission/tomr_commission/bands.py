@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from attrs import asdict, evolve, frozen
+from attrs import asdict, frozen
 from numpy.typing import NDArray
 
 from tomr_commission.observed import Observed, band_of
 from tomr_commission.request import BandChoice
-from tomr_fault_diag.residuals.calibrated import fit_bands
+from tomr_fault_diag.residuals.calibrated import fit_bands, widened
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL
 from tomr_fault_diag.residuals.settings import BandSettings
 
@@ -24,7 +24,6 @@ KINDS: Mapping[str, Sequence[int]] = {
     "motor power, encoder path": list(ENCODERS),
     "wheel speed": list(SPEEDS),
 }
-_MARGINED = ("relative", "power", "current", "transient", "total_relative")
 
 
 def bands_of(drives: Sequence[Observed], choice: BandChoice) -> BandSettings:
@@ -39,13 +38,8 @@ def bands_of(drives: Sequence[Observed], choice: BandChoice) -> BandSettings:
         str(drives[0].units[MOTORS.start]),
         choice.within,
     )
-    values = asdict(fitted)
-    for name in values:
-        if name in _MARGINED:
-            values[name] *= choice.margin
-        elif name.startswith("speed"):
-            values[name] *= choice.speed_factor * choice.margin
-    return evolve(fitted, **{name: float(f"{value:.4g}") for name, value in values.items()})
+    wide = widened(fitted, choice.margin, choice.speed_factor)
+    return BandSettings(**{name: float(f"{value:.4g}") for name, value in asdict(wide).items()})
 
 
 def regimes(drive: Observed) -> Mapping[str, Mask]:

@@ -126,10 +126,10 @@ def _plan(arguments: Sequence[str]) -> int:
     if not 0.05 <= options.speed <= 5.0:
         raise InputError(f"--speed {options.speed:g}: give 0.05 to 5 m/s")
     from tomr_commission.plan import INSTRUCTIONS, mission_text
-    from tomr_commission.store import write_atomically
+    from tomr_power_model.files.write import write_text
     from tomr_power_model.robot import load_robot
 
-    write_atomically(options.out, mission_text(load_robot(options.robot), options.speed))
+    write_text(options.out, mission_text(load_robot(options.robot), options.speed))
     print(f"written: {options.out}")
     print(INSTRUCTIONS.format(out=options.out, robot=options.robot))
     return EXIT_OK

@@ -17,17 +17,16 @@ from tomr_commission.commissioned import (
     Record,
     base_sections,
     commissioned_text,
-    suite_version,
 )
 from tomr_commission.evidence import decisions, evidence_in
 from tomr_commission.explained import EXPLAINED, FOLDER, Split, explain_drives
-from tomr_commission.injected import try_injected
+from tomr_commission.injected import kinds_for, try_injected
 from tomr_commission.observed import Observed, frames_of, observe, tells_currents
 from tomr_commission.parallel import on_all_cores
 from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse
 from tomr_commission.request import CommissionRequest
 from tomr_commission.simulated import try_simulated
-from tomr_commission.store import Store, digest, fingerprint, write_atomically
+from tomr_commission.store import Store, digest, fingerprint
 from tomr_commission.suspects import check_values, check_wheels
 from tomr_commission.trials import Floor, Trial, floors_of
 from tomr_commission.verdict import Outcome, Reason, reasons
@@ -39,13 +38,22 @@ from tomr_power_model.drive.cut import names_of
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
-from tomr_power_model.robot import load_robot, read_description, read_node_sections
+from tomr_power_model.files.write import make_folder, write_together
+from tomr_power_model.robot import (
+    load_robot,
+    read_description,
+    read_node_sections,
+    suite_version,
+)
+from tomr_reality_gap.report.write import write_report
 
 Progress = Callable[[str, float], None]
 
 STEPS = "steps"
-_BLOCK_TICKS = 200
-_CURRENTS = "neither shoves nor faults were simulated: the robot tells currents, not powers"
+_CURRENTS = (
+    "neither shoves nor faults were simulated: the robot tells currents, not powers; so the alarm "
+    "level is the shipped one at least, and how many false alarms shoves raise is not known"
+)
 _HOPELESS = 1.5  # times the caution that may be needed: more shoves will not bring it down
 
 
@@ -94,13 +102,14 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     described = work.description(explained)
     drives = work.observed(described)
     fitted, held = work.divided(drives)
-    classifier, plan = work.classifier(described), Rehearsal()
+    silent = set.intersection(*(set(drive.silent) for drive in fitted))
+    classifier, plan = work.classifier(described), Rehearsal(silent=tuple(sorted(silent)))
     tuned = work.tuned(described, fitted, classifier, plan)
     bands, level = tuned.bands, tuned.level
     chosen = evolve(classifier, caution=level.caution)
     progress("validating", 0.85)
     said = [decisions(frames_of(drive, bands), chosen) for drive in (*fitted, held)]
-    trials = try_injected(held, bands, chosen)
+    trials = try_injected(held, bands, chosen, kinds_for(held))
     notes = [note for drive in work.drives for note in drive.notes]
     if tells_currents(held):
         notes.append(_CURRENTS)
@@ -176,9 +185,9 @@ class _Work:
 
         key = digest([self.key, repr(request.tolerance)])
         found = self.store.values("explained", key, make)
-        (request.out / FOLDER / EXPLAINED).unlink(missing_ok=True)  # of an earlier run
-        for name, text in found["files"].items():
-            write_atomically(request.out / FOLDER / name, text)
+        folder = request.out / FOLDER
+        make_folder(folder)
+        write_report(folder, found["files"])
         return found
 
     def description(self, explained: Any) -> Path | None:
@@ -242,7 +251,7 @@ class _Work:
         while True:
             self.progress("simulating healthy hours", share)
             bands = bands_of(fitted, choice)
-            evidence = _real_peaks(fitted, bands, settings)
+            evidence = _real_peaks(fitted, bands, settings, self.request.alarm.block)
             wider = choice.wider * choice.margin
             # A few shoves tell where many are not worth while.
             for asked, most in (
@@ -304,7 +313,7 @@ class _Work:
     def _parts(self, source: str, settings: ClassifierSettings) -> tuple[object, ...]:
         """What everything simulated hangs on, weights of the classifier included."""
         described = sorted(read_description(source).items())
-        return self.key, described, settings, stamp_of("", settings)
+        return self.key, described, settings, stamp_of("", settings, load_robot(source))
 
 
 def _observe(job: tuple[Path, str, str]) -> Observed:
@@ -322,11 +331,12 @@ class _Real:
 
 
 def _real_peaks(
-    fitted: Sequence[Observed], bands: BandSettings, settings: ClassifierSettings
+    fitted: Sequence[Observed], bands: BandSettings, settings: ClassifierSettings, block: float
 ) -> _Real:
     peaks: list[float] = []
     for drive in fitted:
-        peaks += block_peaks(evidence_in(frames_of(drive, bands), settings), _BLOCK_TICKS)
+        evidence = evidence_in(frames_of(drive, bands), settings)
+        peaks += block_peaks(evidence, drive.seconds, block)
     return _Real(tuple(peaks), sum(drive.hours for drive in fitted))
 
 
@@ -337,7 +347,9 @@ def _level(request: CommissionRequest, real: _Real, shoved: Shoved, plan: Rehear
         Tail.of("simulated shoves", shoved.peaks, plan.shoves_per_hour, request.alarm),
     )
     shipped = ClassifierSettings().caution
-    return alarm_level(tails, request.false_alarms_per_hour, shipped, request.alarm)
+    # Some minutes of driving alone are no reason to be less careful.
+    alarm = request.alarm if shoved.peaks else evolve(request.alarm, below_shipped=0.0)
+    return alarm_level(tails, request.false_alarms_per_hour, shipped, alarm)
 
 
 def _text(
@@ -356,7 +368,9 @@ def _text(
         level=outcome.level,
         floors={floor.kind: floor.words for floor in floors},
         verdict="no-go" if against else "go",
-        stamp="" if against else stamp_of(date, work.classifier(described)),
+        stamp=""
+        if against
+        else stamp_of(date, work.classifier(described), load_robot(work.source(described))),
     )
     sections = base_sections(request.robot, described)
     return commissioned_text(sections, outcome.bands, record, Path(request.robot).name)
@@ -365,8 +379,6 @@ def _text(
 def write_results(found: Commissioned, texts: dict[str, str]) -> list[Path]:
     """Write commissioned.yaml and the reports; returns what was written."""
     folder = found.request.out
-    written = []
-    for name, text in {FILE: found.text, **texts}.items():
-        write_atomically(folder / name, text)
-        written.append(folder / name)
-    return written
+    written = {folder / name: text for name, text in {FILE: found.text, **texts}.items()}
+    write_together(written)
+    return list(written)

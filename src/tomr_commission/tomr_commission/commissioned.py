@@ -1,7 +1,6 @@
 """commissioned.yaml: the explained description, bands, alarm level, and the record of all that."""
 
 from collections.abc import Mapping, Sequence
-from importlib.metadata import version
 from pathlib import Path
 
 from attrs import asdict, frozen
@@ -9,7 +8,14 @@ from attrs import asdict, frozen
 from tomr_commission.alarm import AlarmLevel
 from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.calibration.fitted import sections_text
-from tomr_power_model.robot import COMMISSIONING, digest_of, read_description, read_sections
+from tomr_power_model.robot import (
+    COMMISSIONING,
+    digest_of,
+    read_description,
+    read_sections,
+    robot_from_parameters,
+    suite_version,
+)
 from tomr_power_model.robot.commissioned import DATE, DIGEST
 from tomr_power_model.robot.files import EVERY_NODE
 
@@ -29,11 +35,6 @@ class Record:
     floors: Mapping[str, str]  # smallest size found, by fault
     verdict: str
     stamp: str  # for the status of the classifier; empty: it is not commissioned
-
-
-def suite_version() -> str:
-    """Version of the suite that commissions."""
-    return version("tomr_power_model")
 
 
 def base_sections(robot: str, explained: Path | None) -> dict[str, dict[str, object]]:
@@ -62,7 +63,7 @@ def commissioned_text(
     merged[COMMISSIONING] = {
         DATE: record.date,
         "version": suite_version(),
-        DIGEST: digest_of(merged[EVERY_NODE]),
+        DIGEST: digest_of(robot_from_parameters(merged[EVERY_NODE], source)),
         "robot": source,
         "verdict": record.verdict,
         "drives": list(record.drives),

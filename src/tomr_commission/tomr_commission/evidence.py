@@ -2,9 +2,7 @@
 
 The evidence is the log odds of the likeliest fault against normal without the prior: how many
 decades of `caution` a tick would have overcome. It is read off the classifier in use, run with the
-most caution there is, so that it follows whatever the classifier becomes. It counts only where a
-classifier with hardly any caution would name a fault: whatever else that asks for besides is then
-given, too.
+most caution there is, so that it follows whatever the classifier becomes.
 """
 
 from collections.abc import Iterable
@@ -13,11 +11,12 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from tomr_fault_diag.classifier.judges import Judge, Opinion, make_judge
+from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
-from tomr_fault_diag.classifier.states import FAULTLESS, NAMED
+from tomr_fault_diag.classifier.states import FAULTLESS
+from tomr_fault_diag.classifier.window_network import WindowNetwork
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_power_model.model.ticks import NANOSECONDS
 
@@ -25,34 +24,25 @@ Array = NDArray[np.float64]
 
 MOST_CAUTION = next(spec.maximum for spec in CLASSIFIER_PARAMETERS if spec.name == "caution")
 SURE = 2.0  # decades beyond the caution at which a fault is named: odds of a hundred to one
-_LEAST = 1e-300
-_HARDLY_ANY = 2.0  # decades of caution
 
 
-class _Witness:
-    """Two judges, of most and of hardly any caution, that see the same; remembers what they say."""
+class _Witness(WindowJudge):
+    """A judge of most caution that remembers its evidence of the newest tick it was shown."""
 
     def __init__(self, settings: ClassifierSettings) -> None:
-        self.settings = settings
-        self._judges: tuple[Judge, ...] = tuple(
-            make_judge(evolve(settings, caution=caution)) for caution in (MOST_CAUTION, _HARDLY_ANY)
+        super().__init__(
+            WindowNetwork.load(settings.weights), evolve(settings, caution=MOST_CAUTION)
         )
-        self.decades = 0.0
+        self.newest = 0.0
 
     def clear(self) -> None:
-        for judge in self._judges:
-            judge.clear()
-        self.decades = 0.0
-
-    def interrupt(self) -> None:
-        for judge in self._judges:
-            judge.interrupt()
+        super().clear()
+        self.newest = 0.0
 
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
-        careful, hasty = (judge.judge(frame, elapsed_ns, unseen) for judge in self._judges)
-        named = hasty.sure and hasty.leading.name not in FAULTLESS
-        self.decades = _decades(careful.probabilities) if named else 0.0
-        return careful
+        opinion = super().judge(frame, elapsed_ns, unseen)
+        self.newest = self.evidence()
+        return opinion
 
 
 def evidence_in(frames: Iterable[ResidualFrame], settings: ClassifierSettings) -> Array:
@@ -61,15 +51,10 @@ def evidence_in(frames: Iterable[ResidualFrame], settings: ClassifierSettings) -
     classifier = FaultClassifier(witness)
     found = []
     for frame in frames:
+        witness.newest = 0.0
         classifier.classify(frame)
-        found.append(witness.decades)
-    return np.maximum(found, 0.0)
-
-
-def _decades(shares: Array) -> float:
-    well = np.array([state.name in FAULTLESS for state in NAMED[: len(shares)]])
-    odds = max(float(shares[~well].max()), _LEAST) / max(float(shares[well].sum()), _LEAST)
-    return float(np.log10(odds)) + MOST_CAUTION
+        found.append(witness.newest)
+    return np.array(found)
 
 
 @frozen

@@ -12,7 +12,7 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_commission.evidence import decisions
-from tomr_commission.observed import Observed, frames_of
+from tomr_commission.observed import Observed, frames_of, tells_currents
 from tomr_commission.trials import Trial, first_alarm, smallest_found
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, TOTAL
@@ -59,6 +59,23 @@ KINDS: tuple[InjectedKind, ...] = (
 )
 
 
+_AMPERES = (2.0, 1.0, 0.5, 0.3, 0.2, 0.1, 0.05)
+
+
+def kinds_for(drive: Observed) -> tuple[InjectedKind, ...]:
+    """What can honestly be put into a drive: nothing into motors without sensors of their own."""
+    if set(MOTORS) <= set(drive.silent):
+        return ()
+    if not tells_currents(drive):
+        return KINDS
+    # What a motor draws more of the whole robot's watts is not known in amperes.
+    return tuple(
+        evolve(kind, sizes=_AMPERES, unit="A") if kind.unit == "W" else kind
+        for kind in KINDS
+        if not kind.in_total or TOTAL in drive.silent
+    )
+
+
 def injected(drive: Observed, kind: InjectedKind, size: float, wheel: int) -> Observed:
     """A drive in which a fault begins after some healthy seconds."""
     residual = drive.residual.copy()
@@ -80,7 +97,7 @@ def try_injected(
     drive: Observed,
     bands: BandSettings,
     settings: ClassifierSettings,
-    kinds: Sequence[InjectedKind] = KINDS,
+    kinds: Sequence[InjectedKind],
 ) -> list[Trial]:
     """Each kind at each wheel, down to the smallest size that is found."""
     shown = drive.part(slice(0, _SHOWN), drive.name)

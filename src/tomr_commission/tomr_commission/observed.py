@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_fault_diag.diagnosis.offline import diagnose
@@ -18,6 +18,7 @@ from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import (
     ENCODERS,
     MOTORS,
+    NOT_MEASURED,
     RESIDUALS,
     SPEEDS,
     TOTAL,
@@ -86,6 +87,18 @@ class Observed:
     def seconds(self) -> Array:
         """Of each tick since the first, (n,)."""
         return np.asarray((self.stamp_ns - self.stamp_ns[0]) / NANOSECONDS)
+
+    @property
+    def silent(self) -> tuple[int, ...]:
+        """Residuals that are never known: what the robot does not tell."""
+        return tuple(np.flatnonzero(~np.isfinite(self.residual).any(axis=0)).tolist())
+
+    def silenced(self, channels: Sequence[int]) -> "Observed":
+        """The drive of a robot that does not tell some residuals."""
+        residual, missing = self.residual.copy(), self.missing.astype("<U32")
+        residual[:, list(channels)] = np.nan
+        missing[:, list(channels)] = NOT_MEASURED
+        return evolve(self, residual=residual, missing=missing)
 
     def without(self, spans: Sequence[tuple[float, float]]) -> "Observed":
         """The drive without some intervals [s]."""

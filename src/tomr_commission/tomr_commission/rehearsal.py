@@ -68,6 +68,7 @@ class Rehearsal:
     payload: float = 0.05  # of its mass, at most
     friction: tuple[float, float] = (0.6, 1.0)  # traction of the floor
     shoves_per_hour: float = 30.0  # that a robot meets, for the rate of alarms
+    silent: tuple[int, ...] = ()  # residuals that the robot does not tell
 
 
 @frozen
@@ -100,7 +101,7 @@ def _one(
     """Peaks of a drive's shoves, its highest evidence elsewhere, and its ticks."""
     described, bands, settings, usage, plan, seed = job
     drive = shoved_drive(robot_of(described), usage, plan, seed)
-    seen = observed_of(drive)
+    seen = observed_of(drive).silenced(plan.silent)
     evidence = evidence_in(frames_of(seen, bands), settings)
     own = np.zeros(len(evidence), dtype=bool)
     peaks = []

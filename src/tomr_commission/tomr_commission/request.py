@@ -5,7 +5,7 @@ from pathlib import Path
 
 from attrs import field, frozen
 
-from tomr_fault_diag.residuals.calibrated import WITHIN
+from tomr_fault_diag.residuals.calibrated import MARGIN, SPEED_FACTOR, WITHIN
 
 DEFAULT_RATE = 0.05  # false alarms per hour: one in 20 h
 DEFAULT_TOLERANCE = 0.05
@@ -16,8 +16,8 @@ class BandChoice:
     """How wide bands are made."""
 
     within: float = WITHIN  # share of the healthy residuals of the fitting drives inside
-    margin: float = 1.5  # on top, for what other days and floors bring
-    speed_factor: float = 2.0  # margin of speeds over that: drivers' loops are not known as well
+    margin: float = MARGIN
+    speed_factor: float = SPEED_FACTOR
     wider: float = 1.7  # times as wide, again and again, while alarms by shoves are too many
     widest: float = 8.0  # margin
     most_caution: float = 25.0  # decades that may be needed before bands are made wider

@@ -2,8 +2,8 @@
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Iterable
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from attrs import fields, frozen
 
 from tomr_commission.observed import Observed
 from tomr_power_model.errors import InputError
+from tomr_power_model.files.write import make_folder, write_bytes, write_text
 
 _FORMAT = 1  # of the kept files: a change makes all of them anew
 
@@ -39,18 +40,6 @@ def fingerprint(bag: Path) -> str:
     return made.hexdigest()[:16]
 
 
-def write_atomically(path: Path, text: str | bytes) -> None:
-    """Write a file whole or not at all. Raises InputError where that cannot be."""
-    data = text.encode() if isinstance(text, str) else text
-    partial = path.with_name(f".{path.name}.partial")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_bytes(data)
-        os.replace(partial, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}): give another") from None
-
-
 @frozen
 class Store:
     """A folder of results, each with the digest of what it was made of."""
@@ -67,7 +56,8 @@ class Store:
         except (OSError, ValueError, KeyError, TypeError):
             pass  # absent, of another format or cut off: make it
         value = make()
-        write_atomically(path, json.dumps({"key": key, "value": value}, indent=1))
+        make_folder(self.folder)
+        write_text(path, json.dumps({"key": key, "value": value}, indent=1))
         return json.loads(json.dumps(value))
 
     def observed(self, name: str, key: str) -> Observed | None:
@@ -83,12 +73,11 @@ class Store:
 
     def keep(self, name: str, key: str, drive: Observed) -> None:
         """Keep a drive."""
-        path = self._drive(name)
-        partial = path.with_name(f".{path.name}.partial.npz")
-        path.parent.mkdir(parents=True, exist_ok=True)
         values = {item.name: getattr(drive, item.name) for item in fields(Observed)}
-        np.savez_compressed(partial, key=key, **values)
-        os.replace(partial, path)
+        data = BytesIO()
+        np.savez_compressed(data, key=key, **values)
+        make_folder(self.folder)
+        write_bytes(self._drive(name), data.getvalue())
 
     def _drive(self, name: str) -> Path:
         return self.folder / f"{name}.npz"

@@ -1,5 +1,6 @@
 """The time line of a drive: power, residuals, what was true and what was named, as PNG."""
 
+from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from tomr_demo.score import Stretch
 from tomr_demo.series import Drive, Power
 from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STATES
-from tomr_power_model.errors import InputError
+from tomr_power_model.files.write import write_bytes
 from tomr_power_model.messages.plain import NANOSECONDS
 
 DPI = 130
@@ -79,12 +80,9 @@ def save_figure(drive: Drive, path: Path) -> None:
     for axis in (*powers, residuals):
         _mark_stretches(axis, drive, tinted=axis is not residuals)
     residuals.set_xlabel("time since the start of the drive [s]", fontsize=9, color=_INK)
-    try:
-        figure.savefig(path)
-    except OSError as error:
-        raise InputError(
-            f"{path}: the figure cannot be written ({error.strerror}): choose another folder"
-        ) from None
+    drawn = BytesIO()
+    figure.savefig(drawn, format="png")
+    write_bytes(path, drawn.getvalue())
 
 
 def _blocks(drive: Drive) -> tuple[list[_Block], list[_Block]]:

@@ -28,6 +28,7 @@ from tomr_demo.topics import PROCESSES, all_topics
 from tomr_demo.view import Scene, act_table, make_console, view_on
 from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK, run_main
 from tomr_power_model.errors import InputError
+from tomr_power_model.files.write import write_text
 from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import load_robot
 from tomr_view.cli import LOOPBACK, PORT
@@ -169,7 +170,7 @@ def write_robot(path: Path) -> None:
     text = files("tomr_power_model").joinpath("robots", "reference.yaml").read_text()
     document = yaml.safe_load(text)
     document["/**"]["ros__parameters"]["controller"]["delay"] = COMMAND_DELAY
-    path.write_text(yaml.safe_dump(document, sort_keys=False))
+    write_text(path, yaml.safe_dump(document, sort_keys=False))
 
 
 def start_nodes(children: Children, robot: Path, weights: Path | None = None) -> None:

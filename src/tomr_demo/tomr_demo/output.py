@@ -6,6 +6,7 @@ from pathlib import Path
 
 from tomr_demo.score import Scoreboard
 from tomr_power_model.errors import InputError
+from tomr_power_model.files.write import write_text
 from tomr_power_model.messages.plain import NANOSECONDS
 
 _MARK = "Left behind by tomr_demo, whose next run replaces it."
@@ -36,7 +37,7 @@ def make_output(wanted: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         for name in (RECORDING, FIGURE, RESULT, ROBOT, LOGS, README):
             _remove(folder / name)
-        (folder / README).write_text(_README)
+        write_text(folder / README, _README)
         (folder / LOGS).mkdir()
     except OSError as error:
         raise InputError(
@@ -88,4 +89,4 @@ def write_result(path: Path, board: Scoreboard) -> None:
         for stretch in board.stretches
     ]
     document = {"passed": board.passed, "stretches": stretches}
-    path.write_text(json.dumps(document, indent=2) + "\n")
+    write_text(path, json.dumps(document, indent=2) + "\n")

@@ -21,7 +21,7 @@ from tomr_fault_diag.residuals.settings import ResidualSettings
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.plain import Level
 from tomr_power_model.model.settings import ModelSettings
-from tomr_power_model.robot import shipped_robot
+from tomr_power_model.robot import shipped_robot, suite_version
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
@@ -164,15 +164,25 @@ def test_a_robot_that_has_not_been_told_anything_waits() -> None:
 def test_the_message_says_when_the_robot_was_commissioned() -> None:
     robot, found = shipped_robot("reference"), _run((HEALTHY, 40))[-1]
     plain = ClassifierSettings()
-    with_these = evolve(plain, commissioned=stamp_of("2026-03-01", plain))
+    with_these = evolve(plain, commissioned=stamp_of("2026-03-01", plain, robot))
     with_others = evolve(with_these, classifier="wang2024")
-    for settings, said in (
-        (plain, "no: run tomr_commission"),
-        (with_these, "2026-03-01"),
-        (with_others, "no: with another classifier on 2026-03-01, run tomr_commission again"),
+    renamed = evolve(robot, wheel_names=("a_joint", "b_joint", "c_joint"))
+    wider = evolve(robot, robot_radius=0.3)
+    older = evolve(with_these, commissioned=with_these.commissioned.rpartition(" ")[0] + " 0.0.1")
+    another = "another robot, or this one before its description was changed,"
+    for settings, described, said in (
+        (plain, robot, "no: run tomr_commission"),
+        (with_these, robot, "2026-03-01"),
+        (with_others, robot, "no: with another classifier on 2026-03-01"),
+        (with_these, renamed, f"no: {another} on 2026-03-01"),
+        (with_these, wider, f"no: {another} on 2026-03-01"),
+        (older, robot, f"no: with version 0.0.1 of the suite, this is {suite_version()}, on 2026"),
     ):
-        status = diagnosis_message(robot, found, "", commissioned_words(settings)).statuses[0]
-        assert dict(status.values)["commissioned"] == said
+        words = commissioned_words(settings, described)
+        assert words.startswith(said)
+        assert words.endswith(", run tomr_commission again") == (", " in words)
+        status = diagnosis_message(robot, found, "", words).statuses[0]
+        assert dict(status.values)["commissioned"] == words
 
 
 def test_a_clock_that_goes_back_starts_afresh() -> None:

@@ -179,6 +179,44 @@ def test_stamps_that_go_back_leave_a_gap() -> None:
     assert not any(frame.residuals[MOTORS[1]].stale for frame in late.values())
 
 
+@pytest.mark.parametrize("stamp", [lambda at: BASE + (at - 700) * MS, lambda at: 0])
+def test_a_sensor_with_bad_stamps_does_not_fall_silent(stamp: Callable[[int], int]) -> None:
+    def stamped(at: int, message: Any) -> Any:
+        if at > 1000:
+            message.header = bag_header(stamp(at))
+        return message
+
+    frames = _disturbed("wheel_2/power", stamped, 450)
+    said = {at: frame.residuals[MOTORS[1]].missing for at, frame in frames.items()}
+    assert {said[t] for t in range(50, 1050, 50)} == {""}
+    assert {said[t] for t in range(1550, 4400, 50)} == {
+        "a gap in wheel_2/power: its stamps do not fit"
+    }
+
+
+def test_a_sensor_not_heard_since_the_stamps_leapt_is_not_silent_either() -> None:
+    def hour(at: int, message: Any) -> Any | None:
+        return message if at < 1000 else None
+
+    stage = ResidualStage(_robot())
+    takers = {item.topic: item.take for item in residual_inputs(_robot(), stage)}
+    said: dict[int, str] = {}
+    for step in range(300):
+        at = step * 10
+        stamp = BASE + at * MS + (3_600_000 * MS if at >= 1000 else 0)
+        if step % 5 == 0:
+            stage.prediction(_prediction(stamp))
+        for name, make in ALL.items():
+            message = hour(at, make(stamp)) if name == "wheel_2/power" else make(stamp)
+            if message is not None:
+                takers[name](message, stamp)
+        for frame in stage.due():
+            said[at] = frame.residuals[MOTORS[1]].missing
+    assert {text for at, text in said.items() if at > 1200} == {
+        "a gap in wheel_2/power: its stamps do not fit"
+    }
+
+
 def test_what_no_supply_can_deliver_is_no_sample() -> None:
     def absurd(at: int, message: Any) -> Any:
         if at == 600:

@@ -1,15 +1,21 @@
 """The fit finds the creep that made a drive."""
 
 import math
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from tomr_odometry.learn.drives import Leg
+from tomr_odometry.learn.drives import Leg, leg_of, read_legs
 from tomr_odometry.learn.fit import Batch, fit_creep
+from tomr_odometry.reference import Path2D, reference_of
 from tomr_odometry.start import body_of
+from tomr_power_model.messages.bag import bag_header, bag_message
+from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import shipped_robot
 
+BAG = Path(__file__).parents[3] / "bags" / "square"
 BODY = body_of(shipped_robot("robotino_v2"))[0]
 
 
@@ -43,3 +49,74 @@ def test_several_floors_share_one_coefficient_and_say_how_far_they_are_apart() -
     assert 0.5 < found.coefficient[0] < 0.9
     assert found.coefficient[0] == found.coefficient[2]
     assert 0.1 < found.uncertainty < 0.3
+
+
+def _straight(lag: float = 0.0, jump: float = 0.0, turned: float = 0.0) -> Leg | None:
+    """4 s of which 3 s are driven at 0.5 m/s, heading 0.4 rad, seen by a reference."""
+    seconds = np.arange(0.0, 4.0, 0.01)
+    stamps = (1e9 * seconds).astype(np.int64)
+    way = 0.5 * np.clip(seconds - lag - 0.5, 0.0, 3.0)
+    pose = np.stack([way * math.cos(0.4), way * math.sin(0.4), np.full(400, 0.4 + turned)], axis=1)
+    pose[200:, 0] += jump
+    rims = 0.5 * np.clip(seconds - 0.5, 0.0, 3.0)[:, None] * (BODY.rows @ (1.0, 0.0, 0.0))
+    return leg_of(stamps, rims, np.zeros((400, 3)), Path2D(stamps, pose), -turned)
+
+
+def test_a_leg_is_what_the_reference_moved_in_the_frame_of_its_start() -> None:
+    for turned in (0.0, 0.2):
+        leg = _straight(turned=turned)
+        assert leg is not None
+        assert leg.moved == pytest.approx((1.5, 0.0, 0.0), abs=1e-6)
+        assert leg.way == pytest.approx(1.5, abs=0.02)
+        assert Batch([leg], BODY).errors(np.zeros(3), 0.0) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_reference_that_lags_costs_nothing_from_rest_to_rest() -> None:
+    late = _straight(lag=0.2)
+    assert late is not None
+    assert late.moved == pytest.approx((1.5, 0.0, 0.0), abs=0.01)
+
+
+def test_a_leg_whose_reference_jumps_is_left_out() -> None:
+    assert _straight(jump=0.6) is None
+    assert _straight(jump=0.1) is not None
+
+
+def test_legs_of_a_recording_end_where_it_did() -> None:
+    (leg,) = read_legs(BAG, shipped_robot("reference"), "ground_truth/odom")
+    with open_recording(BAG) as recording:
+        true = reference_of(recording, "ground_truth/odom")
+    assert leg.moved == pytest.approx(true.pose[-1] - true.pose[0], abs=0.01)
+    assert np.abs(leg.used).max() > 0.02
+    assert leg.way == pytest.approx(4.8, abs=0.1)
+
+
+def test_a_reference_from_tf_is_that_of_the_named_frame(tmp_path: Path) -> None:
+    def transform(frame: str, stamp: int, x: float, yaw: float) -> Any:
+        turn = bag_message(
+            "geometry_msgs/msg/Quaternion", z=math.sin(0.5 * yaw), w=math.cos(0.5 * yaw)
+        )
+        moved = bag_message(
+            "geometry_msgs/msg/Transform",
+            translation=bag_message("geometry_msgs/msg/Vector3", x=x),
+            rotation=turn,
+        )
+        return bag_message(
+            "geometry_msgs/msg/TransformStamped",
+            header=bag_header(stamp),
+            child_frame_id=frame,
+            transform=moved,
+        )
+
+    with RecordingWriter(tmp_path / "bag") as writer:
+        for k in range(20):
+            stamp = 1_000_000_000 + k * 10_000_000
+            both = [
+                transform("base_link", stamp, 0.1 * k, 0.4 * k),
+                transform("camera", stamp, 5.0, 0.0),
+            ]
+            message = bag_message("tf2_msgs/msg/TFMessage", transforms=both)
+            writer.write("/tf", "tf2_msgs/msg/TFMessage", message, stamp)
+    with open_recording(tmp_path / "bag") as recording:
+        path = reference_of(recording, "tf:base_link")
+    assert path.pose[-1] == pytest.approx((1.9, 0.0, 7.6))  # the heading goes on beyond a turn

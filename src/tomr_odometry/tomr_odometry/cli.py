@@ -8,7 +8,8 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from tomr_odometry.estimator import Estimate, SlipOdometry
+from tomr_odometry.estimate import Estimate
+from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.offline import estimates
 from tomr_odometry.picture import draw
 from tomr_odometry.reference import Path2D, reference_of, wheel_path
@@ -17,9 +18,11 @@ from tomr_odometry.summary import lines, summary
 from tomr_odometry.topics import estimate_messages
 from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import make_folder, write_together
 from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.recordings import Recording, RecordingWriter, open_recording
 from tomr_power_model.robot import Robot, load_robot, read_node_sections, shipped_robots
+from tomr_power_model.robot.parameters import parse_assignments
 from tomr_power_model.topics.inputs import Complaints
 
 NODE = "slip_odometry"
@@ -68,34 +71,12 @@ class _ListParameters(argparse.Action):
         parser.exit()
 
 
-def _assigned(texts: Sequence[str]) -> dict[str, object]:
-    found: dict[str, object] = {}
-    for text in texts:
-        name, equals, value = text.partition("=")
-        if not equals:
-            raise InputError(f"--set {text}: write NAME=VALUE")
-        try:
-            found[name] = json.loads(value)
-        except ValueError:
-            found[name] = value
-    return found
-
-
 def _play(
-    recording: Recording, robot: Robot, settings: OdometrySettings, options: argparse.Namespace
+    recording: Recording, core: SlipOdometry, robot: Robot, options: argparse.Namespace
 ) -> list[Estimate]:
-    core, complaints, kept = SlipOdometry(robot, settings), Complaints(), []
+    complaints = Complaints()
     items = estimates(recording, robot, core, complaints, options.namespace)
-    with RecordingWriter(options.out / "bag") as writer:
-        for item in tqdm(items, unit=" estimates", disable=None, delay=1.0):
-            kept.append(item)
-            for message in estimate_messages(robot, item, settings):
-                writer.write(
-                    message.topic,
-                    message.message.type_name,
-                    to_bag(message.message),
-                    message.stamp_ns,
-                )
+    kept = list(tqdm(items, unit=" estimates", disable=None, delay=1.0))
     for (topic, problem), count in complaints.counts.items():
         print(f"note: {topic}: {problem} ({count} messages)", file=sys.stderr)
     if not kept:
@@ -105,11 +86,25 @@ def _play(
     return kept
 
 
+def _write_bag(
+    folder: Path, robot: Robot, settings: OdometrySettings, kept: Sequence[Estimate]
+) -> None:
+    with RecordingWriter(folder) as writer:
+        for item in kept:
+            for message in estimate_messages(robot, item, settings):
+                writer.write(
+                    message.topic,
+                    message.message.type_name,
+                    to_bag(message.message),
+                    message.stamp_ns,
+                )
+
+
 def _odometry(arguments: Sequence[str] | None) -> int:
     options = _parser().parse_args(arguments)
     given = read_node_sections(options.robot, [NODE])
     settings = OdometrySettings.given(
-        {**given, **_assigned(options.set)}, f"--set or {options.robot}"
+        {**given, **parse_assignments(options.set)}, f"--set or {options.robot}"
     )
     robot = load_robot(options.robot)
     if options.out.exists():
@@ -121,11 +116,17 @@ def _odometry(arguments: Sequence[str] | None) -> int:
         if options.reference is not None:
             reference = reference_of(recording, options.reference, options.namespace)
         wheels = wheel_path(recording, robot, options.namespace)
-        kept = _play(recording, robot, settings, options)
+        core = SlipOdometry(robot, settings)
+        kept = _play(recording, core, robot, options)
     found = summary(robot, kept, wheels, reference)
-    (options.out / "odometry.json").write_text(json.dumps(found, indent=2) + "\n")
-    draw(options.out / "odometry.png", robot, kept, wheels, reference)
-    print(json.dumps(found, indent=2) if options.json else "\n".join(lines(found)))
+    text = json.dumps(found, indent=2, allow_nan=False)
+    picture = draw(robot, kept, wheels, reference, core.floor.grid())
+    make_folder(options.out)
+    write_together(
+        {options.out / "odometry.json": f"{text}\n", options.out / "odometry.png": picture}
+    )
+    _write_bag(options.out / "bag", robot, settings, kept)
+    print(text if options.json else "\n".join(lines(found)))
     return EXIT_OK
 
 

@@ -6,12 +6,14 @@ from collections.abc import Iterator
 from heapq import merge
 
 import numpy as np
-from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_odometry.kernel import AX, CREEP, DRAG, FRICTION, GYRO, SLOPE, VX, WZ, YAW, step
+from tomr_odometry.estimate import SLIDES, Estimate
+from tomr_odometry.grip import Available, Floor
+from tomr_odometry.kernel import AX, CREEP, DRAG, FRICTION, GYRO, RIM, SLOPE, VX, WZ, YAW, step
+from tomr_odometry.rims import Rims
 from tomr_odometry.settings import OdometrySettings
-from tomr_odometry.start import body_of, start
+from tomr_odometry.start import body_of, is_incredible, start, start_again
 from tomr_odometry.traction import Traction, Tractions
 from tomr_power_model.drive.sources import PowerReading
 from tomr_power_model.model.encoders import RecentStamps
@@ -21,57 +23,27 @@ from tomr_power_model.robot import GRAVITY, WHEELS, Robot
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
-_WINDOW_NS = to_ns(0.05)  # over which a rim's speed is taken
 _LEAST_STEP_NS = to_ns(0.004)  # between encoder samples that are used
+_SILENT_NS = to_ns(0.1)  # of the encoders, from which the IMU alone goes on
+_UNKNOWN_WAY = 1e4  # m^2
 _FRESH_NS = to_ns(0.25)  # how long a sensor may be silent
-_FROZEN_NS = to_ns(1.0)  # how long encoders that should count may not, and be waited for
-_FROZEN_COUNTS = 4.0  # that they should have counted
 _NO_IMU = np.full(6, np.nan)
 _NO_FORCES = np.zeros((0, 4))
 _TURNING = 0.02  # m/s: below it there is no slip ratio
 _CREEPING = 0.05  # m/s, the same of creep: a ratio to a wheel that hardly turns says nothing
-_SLIDES = 0.5  # probability from which a wheel is said to slide
-_SLOW = 0.02  # m/s: sliding slower than that is none
+_SLIDES_ON = 2.0  # s, for which a slide may go on unseen
+_GRID_NS = to_ns(1.0)  # of data, between two maps of the floor
 _TRACTION_TIME = 0.3  # s, over which traction is averaged where creep depends on it
 _GRAVITY_TIME = 0.5  # s, over which a new gravity would be taken for granted
 _AHEAD = 0.25  # s, for which the motion of the last encoder sample is taken to go on
+_REST = 0.3  # s of standstill, in which an IMU tells its biases
 _LOST_SPEED = 1.0  # m/s, by which a robot without encoders may be off
-_SLOW_ENCODERS = 0.02  # s between samples, from which they are looked at for uneven timing
-_UNEVEN_SHARE = 0.05  # of a new sample in the mean
+_LOST_MOST = 10.0  # s, after which it may be off no further
+_DOUBTED = 5.0  # s, over which a velocity that turns out wrong is taken to have been so at most
 _LIFTED = 1.5  # m/s^2 off the usual weight
 _LIFTED_TILT = 0.6  # rad/s of rolling or pitching
 _CARRIED_NS = to_ns(0.7)  # how long after such a moment the robot may still be carried
 _CARRIED_SPEED = 0.6  # m/s/sqrt(Hz)
-
-
-@frozen
-class Estimate:
-    """What is known at a tick."""
-
-    stamp_ns: int
-    pose: Array  # x, y [m], yaw [rad], in the odometry frame
-    pose_covariance: Array  # (3, 3)
-    twist: Array  # in base_link [m/s, m/s, rad/s]
-    twist_covariance: Array
-    slip: Array  # ratio of each wheel, signed
-    sliding: Array  # m/s, rim less ground
-    probability: Array  # that each wheel slides
-    traction: Array  # N, NaN where not known
-    available: Array  # N that a wheel was seen to transmit where it slid last, NaN before
-    is_slipping: bool
-    is_carried: bool
-    missing: tuple[str, ...]  # sensors that are silent
-    sensors: tuple[tuple[str, str], ...]
-    assumed: tuple[str, ...]
-    learnt: tuple[tuple[str, float], ...]
-
-    @property
-    def words(self) -> str:
-        """What it comes to, in words."""
-        if self.is_carried:
-            return "carried or lifted: the pose is not known"
-        said = "slipping" if self.is_slipping else "gripping"
-        return f"{said}; without {', '.join(self.missing)}" if self.missing else said
 
 
 class SlipOdometry:
@@ -83,12 +55,14 @@ class SlipOdometry:
         self._clock = TickClock(given.ticks)
         self._tractions = Tractions(robot)
         self._body, self._radius = body_of(robot)
-        # Without an IMU wheels may slide unseen: the covariance has to allow for it.
-        self._unaided = given.noise._replace(
-            way=given.noise.unaided_way, turn=given.noise.unaided_turn, slip_rate=0.0
-        )
+        # Without an IMU wheels may slide unseen: the covariance has to allow for it. With one whose
+        # biases no standstill has told yet, what slides from the start may look like a bias.
+        noise = given.noise
+        self._unsure = noise._replace(way=noise.unaided_way, turn=noise.unaided_turn)
+        self._unaided = self._unsure._replace(slip_rate=0.0)
         # Magnitudes of currents are good for creep, but no evidence of what the body does.
         self._are_evidence = robot.measurement.signed
+        self.floor = Floor(robot)
         self._clear()
 
     def _clear(self) -> None:
@@ -96,23 +70,33 @@ class SlipOdometry:
         self._queues: dict[str, deque[tuple[int, str, tuple[float, ...]]]] = {}
         self._time = 0  # of the filter's state [ns]
         self._mode = np.zeros(4)
+        self._trusted = 0.0  # s, since the state was doubted last
+        self._has_stood = False  # long enough for the IMU to tell its biases
         self._x, self._P = start(self._robot, self.settings.noise, self.settings.creep)
-        self._last: deque[tuple[int, Array]] = deque()
-        self._first: Array | None = None
+        self._rims = Rims(self._radius)
         self._stamps = RecentStamps()
-        self._quantum = 2e-2  # rad, smallest step of the encoders seen
-        self._forces = np.full(WHEELS, np.nan)
+        self._forces, self._force_std = np.full((2, WHEELS), np.nan)
         self._used = np.zeros(WHEELS)
         self._travel = np.zeros(2)
-        self._moved = np.zeros(WHEELS)
-        self._uneven = 0.0
-        self._available = np.full(WHEELS, np.nan)
+        self._available = Available()
         self._inertial: list[tuple[float, ...]] = []
         self._tractive: list[Traction] = []
         self._heard: dict[str, int] = {}
         self._is_aided = False
         self._weight = math.nan
+        self._felt = 0  # stamp of the last weight
         self._carried_until = 0
+
+    def _start_afresh(self, stamp_ns: int) -> None:
+        """After a leap of the stamps: where the robot was, and how far it may have come since.
+
+        The frame goes on as before: a pose that leaps with the clock is wrong wherever it leaps to.
+        """
+        leap = min(1e-9 * abs(stamp_ns - self._time), _LOST_MOST) if self._time else 0.0
+        pose, spread = self._x[:3].copy(), self._P[:3, :3] + (_LOST_SPEED * leap) ** 2 * np.eye(3)
+        self._clear()
+        self._x[:3] += pose
+        self._P[:3, :3] += spread
 
     def command(self, stamp_ns: int, twist: Triple) -> Arrival:
         """Take a commanded twist [m/s, m/s, rad/s]."""
@@ -136,7 +120,7 @@ class SlipOdometry:
     ) -> Arrival:
         arrival = self._clock.arrive(stream, stamp_ns, periodic)
         if arrival is Arrival.RESTARTED:
-            self._clear()
+            self._start_afresh(stamp_ns)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
             self._queues.setdefault(stream, deque()).append((stamp_ns, stream, values))
         return arrival
@@ -164,11 +148,14 @@ class SlipOdometry:
         if stream == "command":
             self._tractions.command(stamp, (values[0], values[1], values[2]))
         elif stream == "encoders":
-            self._rims(stamp, np.array(values))
+            self._count(stamp, np.array(values))
         elif stream == "imu":
             if self.settings.use_imu and self._time:
                 self._inertial.append(values)
                 self._feel(stamp, values)
+                if self._is_aided and stamp - self._time > _SILENT_NS:
+                    unknown = np.full(WHEELS, _UNKNOWN_WAY)
+                    self._step(stamp, np.stack([self._x[RIM : RIM + WHEELS], unknown]))
         elif self.settings.use_power and self._time and int(stream[-1]) < WHEELS:
             found = self._tractions.power(stamp, int(stream[-1]), values[0])
             if found is not None:
@@ -177,95 +164,76 @@ class SlipOdometry:
     def _feel(self, stamp: int, values: tuple[float, ...]) -> None:
         """Notice a robot that is lifted: its weight changes, or it rolls and pitches."""
         weight, tilting = values[5], math.hypot(values[0], values[1])
-        if not math.isfinite(weight):
-            return
         before = self._weight if math.isfinite(self._weight) else weight
-        is_lifted = abs(weight - before) > _LIFTED or tilting > _LIFTED_TILT
-        if abs(before) > 0.5 * GRAVITY and is_lifted:
+        is_heavy = abs(before) > 0.5 * GRAVITY and abs(weight - before) > _LIFTED
+        if is_heavy or tilting > _LIFTED_TILT:
             self._carried_until = stamp + _CARRIED_NS
-        share = 0.01 / _GRAVITY_TIME
-        self._weight = before + share * (weight - before)
+        if math.isfinite(weight):
+            share = min(1e-9 * (stamp - self._felt) / _GRAVITY_TIME, 1.0)
+            self._weight = before + share * (weight - before)
+            self._felt = stamp
 
     def _is_fresh(self, stream: str, now: int) -> bool:
         return now - self._heard.get(stream, -_FRESH_NS) < _FRESH_NS
 
-    def _rims(self, stamp: int, angle: Array) -> None:
+    def _count(self, stamp: int, angle: Array) -> None:
         """Take an encoder sample: the filter goes on to it."""
         if not np.isfinite(angle).all():
             return
-        self._stamps.add(stamp, (angle[0], angle[1], angle[2]))
+        counted = (angle[0], angle[1], angle[2])
+        self._stamps.add(stamp, counted)
         (time,) = self._stamps.times([stamp])
-        if self._first is None:
-            self._first, self._time = angle, time
-        elif time - self._time < _LEAST_STEP_NS or self._is_frozen(time, angle):
-            return
-        else:
-            self._go_on(time, angle)
-        self._last.append((time, angle))
-        self._tractions.encoders(time, (angle[0], angle[1], angle[2]))
-        while len(self._last) > 2 and self._last[1][0] <= time - _WINDOW_NS:
-            self._last.popleft()
+        if self._time:
+            is_aided = self.settings.use_imu and self._is_fresh("imu", stamp)
+            if self._is_aided and not is_aided and self._mode[3] > SLIDES:
+                self._lose_sight()
+            self._is_aided = is_aided
+            # With an IMU the filter weighs itself whether encoders that repeat are frozen.
+            is_frozen = not self._is_aided and self._rims.is_frozen(time, angle)
+            if time - self._time < _LEAST_STEP_NS or is_frozen:
+                return
+        noise = self.settings.noise
+        ways = self._rims.take(time, angle, noise.jitter)
+        ways[1] += noise.rim**2
+        self._tractions.encoders(time, counted)
+        if self._time:
+            self._has_stood |= self._is_aided and self._rims.rest > _REST
+            self._step(time, ways)
+        self._time = time
 
-    def _is_frozen(self, time: int, angle: Array) -> bool:
-        """Whether encoders repeat themselves although the wheels should have turned on.
+    def _lose_sight(self) -> None:
+        """The IMU dies while wheels slide: for how long they go on nothing tells."""
+        sliding = self._rims.speed - self._body.rows @ self._x[VX : WZ + 1]
+        lost = (float(np.abs(sliding).max()) * _SLIDES_ON) ** 2
+        for place in (0, 1):
+            self._P[place, place] += lost
 
-        Counts repeat where a robot has come to rest as well. With an IMU the filter weighs that
-        itself; without one wheels that have been braking are taken to brake on.
-        """
-        if self._is_aided or time - self._time > _FROZEN_NS:
-            return False
-        if not np.array_equal(angle, self._last[-1][1]):
-            return False
-        (first, old), (last, new) = self._last[0], self._last[-1]
-        stamp, middle = self._last[len(self._last) // 2]
-        earlier = np.abs(middle - old).max() / max(stamp - first, 1)
-        later = np.abs(new - middle).max() / max(last - stamp, 1)
-        braking = max(float(earlier - later), 0.0) / max(0.5 * (last - first), 1.0)
-        turned = float(later) * (time - self._time)
-        if braking > 0.0:
-            turned = min(turned, 0.5 * float(later) ** 2 / braking)
-        return turned > _FROZEN_COUNTS * self._quantum
-
-    def _go_on(self, time: int, angle: Array) -> None:
-        """A step of the filter to an encoder sample."""
-        noise, dt = self.settings.noise, 1e-9 * (time - self._time)
-        assert self._first is not None
-        moved = np.abs(angle - self._last[-1][1])
-        if (moved > 1e-7).any():
-            self._quantum = min(self._quantum, float(moved[moved > 1e-7].min()))
-        way = (angle - self._first) * self._radius
-        speed = (angle - self._last[-1][1]) * self._radius / dt
-        variance = (self._quantum * self._radius) ** 2 / 12.0
-        variance = variance + (noise.jitter * speed) ** 2 + noise.rim**2
-        if dt > _SLOW_ENCODERS:
-            variance = variance + self._unevenness(speed * dt)
-        inertial = np.mean(self._inertial, axis=0) if self._inertial else _NO_IMU
+    def _step(self, time: int, ways: Array) -> None:
+        """Go on to a time, with the ways of the rims there."""
+        dt = 1e-9 * (time - self._time)
         forces = self._evidence(dt)
+        inertial = np.mean(self._inertial, axis=0) if self._inertial else _NO_IMU
         self._inertial, self._tractive = [], []
-        self._advance(time, dt, np.stack([way, variance]), inertial, forces)
+        self._advance(time, dt, ways, inertial, forces)
         self._time = time
         if time < self._carried_until:
             lost = _CARRIED_SPEED**2 * dt
             for place in (0, 1, 2, VX, VX + 1, WZ):
                 self._P[place, place] += lost
-        sliding = self._mode[:3] > _SLIDES
-        self._available = np.where(sliding, np.abs(self._forces), self._available)
-
-    def _unevenness(self, moved: Array) -> float:
-        """Variance of ways sampled unevenly in time, by their second differences [m^2]."""
-        second = float(np.mean((moved - self._moved) ** 2)) / 6.0
-        self._moved = moved
-        self._uneven += _UNEVEN_SHARE * (second - self._uneven)
-        return self._uneven
+        sliding = self._mode[:3] > SLIDES
+        self._available.take(self._forces, self._force_std, sliding, dt)
+        self.floor.take(self._x[:3], sliding, self._forces / self._body.load)
 
     def _evidence(self, dt: float) -> Array:
         """Forces for the filter, if they are evidence; keeps what creep and messages need."""
         noise, keep = self.settings.noise, math.exp(-dt / _TRACTION_TIME)
         for found in self._tractive:
-            self._forces[found.wheel] = found.force
+            self._forces[found.wheel], self._force_std[found.wheel] = found.force, found.std
+        for wheel in range(WHEELS):
+            if not self._is_fresh(f"power {wheel}", self._heard["encoders"]):
+                self._forces[wheel] = self._force_std[wheel] = math.nan
         known = np.nan_to_num(self._forces) / self._body.load
         self._used = known + keep * (self._used - known)
-        self._is_aided = self.settings.use_imu and self._is_fresh("imu", self._heard["encoders"])
         if not self._tractive or not self._are_evidence or not self._is_aided:
             return _NO_FORCES
         rows = [(f.wheel, f.force, noise.force**2 + f.std**2, f.speed) for f in self._tractive]
@@ -273,7 +241,8 @@ class SlipOdometry:
 
     def _advance(self, time: int, dt: float, rims: Array, inertial: Array, forces: Array) -> None:
         used = self.settings.creep.shape(self._used)
-        noise = self.settings.noise if self._is_aided else self._unaided
+        noise = self.settings.noise if self._has_stood else self._unsure
+        noise = noise if self._is_aided else self._unaided
         keep = math.exp(-dt / _TRACTION_TIME)
         self._travel = self._x[VX : VX + 2] + keep * (self._travel - self._x[VX : VX + 2])
         used = used * math.hypot(*self._travel)
@@ -281,6 +250,15 @@ class SlipOdometry:
             self._x, self._P, self._body, noise, self._mode, used, dt,
             rims, inertial, forces,
         )  # fmt: skip
+        self._trusted += dt
+        if self._is_aided and is_incredible(self._x, noise):
+            # The wheels slid while they were taken for gripping.
+            since = min(self._trusted, _DOUBTED)
+            self._x, self._P = start_again(
+                self._robot, noise, self.settings.creep, (self._x, self._P), since
+            )
+            self._mode[:] = 1.0
+            self._trusted = 0.0
 
     def _estimate(self, tick: int) -> Estimate:
         x, P, body = self._x, self._P, self._body
@@ -292,35 +270,46 @@ class SlipOdometry:
         c, s = math.cos(yaw), math.sin(yaw)
         pose = x[:3].copy()
         pose += (c * moved[0] - s * moved[1], s * moved[0] + c * moved[1], moved[2])
-        lost = (_LOST_SPEED * (ahead - dt)) ** 2  # encoders are silent: anything may happen
+        silent = 1e-9 * (tick - self._rims.time) - _AHEAD
+        lost = (_LOST_SPEED * max(silent, 0.0)) ** 2  # encoders are silent: anything may happen
         ground = body.rows @ twist
-        (first, old), (last, new) = self._last[0], self._last[-1]
-        rim = (new - old) / max(1e-9 * (last - first), 1e-3) * self._radius
+        rim = self._rims.speed
         creeps = x[CREEP] * self.settings.creep.shape(self._used) * math.hypot(*self._travel)
-        is_sliding = self._mode[:3] > _SLIDES
+        is_sliding = self._mode[:3] > SLIDES
         sliding = np.where(is_sliding, rim - ground, creeps)
         larger = np.maximum(np.abs(rim), np.abs(rim - sliding))
         least = np.where(is_sliding, _TURNING, _CREEPING)
         slip = np.where(larger > least, sliding / np.maximum(larger, least), 0.0)
         missing, sensors = self._sensors(tick)
+        is_due = self.settings.publish_floor and tick % _GRID_NS < self.settings.ticks.period
         return Estimate(
             stamp_ns=tick,
             pose=pose,
             pose_covariance=P[:3, :3] + lost * np.eye(3),
             twist=twist,
-            twist_covariance=P[VX : WZ + 1, VX : WZ + 1] + lost * np.eye(3),
+            twist_covariance=P[VX : WZ + 1, VX : WZ + 1] + lost * np.eye(3) + self._unseen(),
             slip=np.clip(slip, -1.0, 1.0),
             sliding=sliding,
+            creeping=creeps,
             probability=self._mode[:3].copy(),
             traction=self._forces.copy(),
-            available=self._available.copy(),
-            is_slipping=bool(np.any(is_sliding & (np.abs(sliding) > _SLOW))),
+            traction_std=self._force_std.copy(),
+            available=self._available.interval,
+            floor=self.floor.grid() if is_due else None,
             is_carried=tick < self._carried_until,
             missing=missing,
             sensors=sensors,
             assumed=self._assumed(missing),
             learnt=self._learnt(),
         )
+
+    def _unseen(self) -> Array:
+        """Variance of a velocity that nothing but the wheels tells."""
+        if self._is_aided and self._has_stood:
+            return np.zeros((3, 3))
+        noise, travel = self._unsure, math.hypot(*self._travel)
+        # What makes the pose spread as it does where slides last so long.
+        return np.diag(np.square((noise.way, noise.way, noise.turn)) * travel**2 / _SLIDES_ON)
 
     def _sensors(self, tick: int) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:
         """Sensors that are silent, and what is used of each."""

@@ -50,7 +50,7 @@ class Noise(NamedTuple):
     grip_rate: float = 3.0  # 1/s, at which they find it again
     way: float = 0.005  # m/s/sqrt(Hz) per m/s of travel, of the pose
     turn: float = 0.005  # rad/s/sqrt(Hz) per m/s, of the heading
-    unaided_way: float = 0.5  # the same without an IMU
+    unaided_way: float = 1.0  # the same without an IMU
     unaided_turn: float = 0.3
     slid: float = 0.1  # m/s/sqrt(Hz), of the pose while a wheel slides
     slid_yaw: float = 0.04  # rad/s/sqrt(Hz)

@@ -1,14 +1,16 @@
 """A picture of a drive: its path by wheels, as estimated and true; slip over time."""
 
 from collections.abc import Sequence
-from pathlib import Path
+from io import BytesIO
 
 import numpy as np
+from matplotlib.axes import Axes
 
-from tomr_odometry.estimator import Estimate
+from tomr_odometry.estimate import Estimate
+from tomr_odometry.grip import SIDE, UNKNOWN, Grid
 from tomr_odometry.reference import Path2D
 from tomr_odometry.summary import estimated_path
-from tomr_power_model.canvas import AFTER, BEFORE, MEASURED, sheet
+from tomr_power_model.canvas import AFTER, BEFORE, MEASURED, PLACE, sheet
 from tomr_power_model.robot import Robot
 
 _WHEELS = ("#1d4ed8", "#c2410c", "#15803d")
@@ -17,9 +19,13 @@ _WITHIN_95 = 5.991
 
 
 def draw(
-    file: Path, robot: Robot, items: Sequence[Estimate], wheels: Path2D, reference: Path2D | None
-) -> None:
-    """Write the picture as PNG."""
+    robot: Robot,
+    items: Sequence[Estimate],
+    wheels: Path2D,
+    reference: Path2D | None,
+    floor: Grid | None,
+) -> bytes:
+    """The picture as PNG."""
     ours = estimated_path(items)
     with sheet(2, 1, 4.2, heights=(2.0, 1.0)) as (page, (plane, over_time)):
         start = ours.pose[0]
@@ -35,6 +41,8 @@ def draw(
             values, axes = np.linalg.eigh(item.pose_covariance[:2, :2])
             ring = axes @ (np.sqrt(np.maximum(values, 0.0))[:, None] * circle)
             plane.plot(item.pose[0] + ring[0], item.pose[1] + ring[1], color=AFTER, lw=0.4)
+        if floor is not None:
+            _draw_floor(plane, floor)
         plane.set_aspect("equal", adjustable="datalim")
         plane.set_xlabel("x [m]")
         plane.set_ylabel("y [m]")
@@ -43,7 +51,23 @@ def draw(
         slip = np.array([item.slip for item in items])
         for name, column, color in zip(robot.wheel_names, slip.T, _WHEELS, strict=True):
             over_time.plot(seconds, column, color=color, lw=0.8, label=name)
+        lost = [item.is_slipping for item in items]
+        over_time.fill_between(
+            seconds, -1.0, 1.0, where=lost, color=PLACE, alpha=0.6, lw=0.0, label="loss of traction"
+        )
         over_time.set_xlabel("time [s]")
         over_time.set_ylabel("slip ratio")
         over_time.legend(fontsize=7)
-        page.savefig(file)
+        buffer = BytesIO()
+        page.savefig(buffer, format="png")
+        return buffer.getvalue()
+
+
+def _draw_floor(plane: Axes, floor: Grid) -> None:
+    """Cells that were driven over: the darker, the less traction there was."""
+    (x, y), (height, width) = floor.corner, floor.cells.shape
+    cells = np.ma.masked_equal(floor.cells.astype(float), UNKNOWN)
+    edges = (x, x + SIDE * width, y, y + SIDE * height)
+    plane.imshow(
+        cells, cmap="Oranges", vmin=0.0, vmax=100.0, alpha=0.5, origin="lower", extent=edges
+    )

@@ -24,6 +24,7 @@ PARAMETERS: tuple[ParameterSpec, ...] = (
     _S("odom_frame", "frame of the pose", "str", "odom"),
     _S("base_frame", "frame of the robot", "str", "base_link"),
     _S("publish_tf", "odom_frame to base_frame on /tf as well", "bool", False),
+    _S("publish_floor", "where wheels slid, on floor_traction, each second", "bool", False),
 )
 
 
@@ -43,6 +44,7 @@ class OdometrySettings:
     odom_frame: str = "odom"
     base_frame: str = "base_link"
     publish_tf: bool = False
+    publish_floor: bool = False
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:
@@ -55,6 +57,7 @@ class OdometrySettings:
             odom_frame=str(values["odom_frame"]),
             base_frame=str(values["base_frame"]),
             publish_tf=bool(values["publish_tf"]),
+            publish_floor=bool(values["publish_floor"]),
         )
 
     @classmethod

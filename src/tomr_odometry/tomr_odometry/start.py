@@ -12,6 +12,7 @@ from tomr_odometry.kernel import (
     DRAG,
     FRICTION,
     GYRO,
+    RIM,
     SIZE,
     SLOPE,
     VX,
@@ -19,11 +20,15 @@ from tomr_odometry.kernel import (
     Array,
     Body,
     Noise,
+    X,
+    Y,
 )
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.numbers import laid_out, wheel_records
 from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.robot import WHEELS, Robot
+
+_INCREDIBLE = 2.5  # standard deviations of a bias
 
 
 def body_of(robot: Robot) -> tuple[Body, Array]:
@@ -56,3 +61,26 @@ def start(robot: Robot, n: Noise, creep: Creep) -> tuple[Array, Array]:
     std[FRICTION : FRICTION + WHEELS] = n.friction
     std[DRAG], std[CREEP] = n.drag, creep.uncertainty or n.creep
     return x, np.diag(std**2)
+
+
+def is_incredible(x: Array, n: Noise) -> bool:
+    """Whether the biases are beyond what an IMU has: they stand for a motion that was none."""
+    off = np.abs(x[ACCELEROMETER : ACCELEROMETER + 2]) / n.accelerometer_bias
+    return max(float(off.max()), abs(float(x[GYRO])) / n.gyro_bias) > _INCREDIBLE
+
+
+def start_again(
+    robot: Robot, n: Noise, creep: Creep, state: tuple[Array, Array], since: float
+) -> tuple[Array, Array]:
+    """What is left where the wheels misled for some seconds, `since`; state and covariance.
+
+    The velocity may be wrong altogether, and with it the way of that time.
+    """
+    (was, doubt), (x, P) = state, start(robot, n, creep)
+    speed = float(np.hypot(was[VX], was[VX + 1])) + n.start_twist
+    x[:AX] = was[:AX]
+    x[RIM : RIM + WHEELS] = was[RIM : RIM + WHEELS]
+    P[:VX, :VX] = doubt[:VX, :VX]
+    for place, std in ((X, speed * since), (Y, speed * since), (VX, speed), (VX + 1, speed)):
+        P[place, place] += std**2
+    return x, P

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from tomr_odometry.estimator import Estimate
+from tomr_odometry.estimate import Estimate
 from tomr_odometry.reference import Path2D
+from tomr_power_model.errors import InputError
 from tomr_power_model.robot import Robot
 
 _TOGETHER = 0.5  # s: spells of slip that are nearer than this are one
@@ -25,11 +26,11 @@ def spells(items: Sequence[Estimate]) -> list[tuple[float, float]]:
 
 
 def _end_error(path: Path2D, reference: Path2D) -> float:
-    """Distance of the ends when the starts are laid on each other [m]."""
+    """Distance of the ends when the starts are laid on each other [m]. Raises InputError."""
     stamps = path.stamps[(path.stamps >= reference.stamps[0])]
     stamps = stamps[stamps <= reference.stamps[-1]]
     if len(stamps) < 2:
-        return float("nan")
+        raise InputError("the reference pose is of another time than the drive: no end in common")
     own, true = path.at(stamps[[0, -1]]), reference.at(stamps[[0, -1]])
     laid = Path2D(stamps[[0, -1]], true).laid_on(own[0], true[0]).pose
     return float(np.hypot(*(laid[1, :2] - own[1, :2])))
@@ -39,6 +40,21 @@ def estimated_path(items: Sequence[Estimate]) -> Path2D:
     """The estimated poses."""
     stamps = np.array([item.stamp_ns for item in items], dtype=np.int64)
     return Path2D(stamps, np.array([item.pose for item in items]))
+
+
+def _kinds(robot: Robot, items: Sequence[Estimate]) -> dict[str, dict[str, float]]:
+    """Of each wheel: the way that its contact slid by creep, and by loss of traction [m], and the
+    share of the time in which it lost traction."""
+    elapsed = 1e-9 * np.diff([item.stamp_ns for item in items], prepend=items[0].stamp_ns)
+    steps = np.clip(elapsed, 0.0, 1.0)[:, None]
+    creep = (np.abs([item.creeping for item in items]) * steps).sum(axis=0)
+    lost = (np.abs([item.losing for item in items]) * steps).sum(axis=0)
+    share = np.mean([item.loses_traction for item in items], axis=0)
+    rows = zip(robot.wheel_names, creep.tolist(), lost.tolist(), share.tolist(), strict=True)
+    return {
+        name: {"creep_m": one, "loss_of_traction_m": other, "loss_of_traction_share": part}
+        for name, one, other, part in rows
+    }
 
 
 def summary(
@@ -54,6 +70,7 @@ def summary(
         "assumed": list(last.assumed),
         "slipping_share": float(np.mean([item.is_slipping for item in items])),
         "slipping_s": spells(items),
+        "kinds_of_slip": _kinds(robot, items),
         "largest_slip": dict(zip(robot.wheel_names, slip.max(axis=0).tolist(), strict=True)),
         "end": dict(zip(("x", "y", "yaw"), last.pose.tolist(), strict=True)),
         "end_std": np.sqrt(np.diag(last.pose_covariance)).tolist(),
@@ -76,6 +93,11 @@ def lines(found: Mapping[str, Any]) -> Iterator[str]:
     yield f"slipping {100.0 * found['slipping_share']:.1f} % of the time"
     for start, end in found["slipping_s"]:
         yield f"{start:8.2f} s to {end:8.2f} s"
+    for name, kind in found["kinds_of_slip"].items():
+        yield (
+            f"{name}: slid {kind['creep_m']:.3f} m by creep, {kind['loss_of_traction_m']:.3f} m by "
+            f"loss of traction ({100.0 * kind['loss_of_traction_share']:.1f} % of the time)"
+        )
     end, std = found["end"], found["end_std"]
     x, y, yaw = found["wheels_end"]
     yield (

@@ -31,8 +31,9 @@ from tomr_power_model.messages.plain import Level, Status, battery_state
 from tomr_power_model.messages.readings import SupplyReading
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.ticks import Arrival
-from tomr_power_model.nodes.stage_node import _stamp_of_bytes, message_class, to_ros
+from tomr_power_model.nodes.stage_node import message_class, to_ros
 from tomr_power_model.robot import shipped_robot
+from tomr_power_model.topics.flow import Flow
 from tomr_power_model.topics.inputs import CLOSEST, Complaints, measured_inputs, model_inputs
 
 STAMP = 1_700_000_000_500_000_000
@@ -188,7 +189,7 @@ def test_a_flood_of_encoders_is_thinned(period_us: int, taken: int) -> None:
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 10**9)
         assert joints.take(message, stamp_ns) is None
         data = jazzy_typestore().serialize_cdr(message, "sensor_msgs/msg/JointState")
-        assert _stamp_of_bytes(bytes(data)) == stamp_ns
+        assert Flow(has_header=True).stamp_of(bytes(data)) == stamp_ns
         # Told by the stamp alone, before and after: the answer is the same.
         assert joints.is_too_close is not None
         assert joints.is_too_close(stamp_ns) == (stamp_ns not in stamps)

@@ -87,6 +87,15 @@ def test_faults_are_refused_with_wheel_interval_and_remedy(
     assert "\n" not in text
 
 
+def test_a_sign_is_judged_where_power_is_known(make_drive: MakeDrive) -> None:
+    drive = make_drive(ROBOT, 1)
+    unknown, reversed_ = drive.power.copy(), reverse(drive).power
+    unknown[::7, 1] = reversed_[::7, 2] = np.nan  # a current without a voltage
+    assert faults(evolve(drive, power=unknown)) == []
+    with pytest.raises(InputError, match="must be negative while power is drawn"):
+        refuse(faults(evolve(drive, power=reversed_)))
+
+
 def test_a_bag_of_another_robot_is_refused(make_drive: MakeDrive) -> None:
     turned = evolve(ROBOT, wheel_offset=ROBOT.wheel_offset + np.pi / 3)
     with pytest.raises(

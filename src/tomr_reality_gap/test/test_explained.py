@@ -19,6 +19,7 @@ from tomr_power_model.unmodelled import FAMILIES, LearntTerm
 from tomr_reality_gap.described import described, for_users
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
+from tomr_reality_gap.verdict import _term_notes
 from tomr_sim_bridge.plant.simulation import Simulation
 
 WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
@@ -69,6 +70,21 @@ def test_nodes_draw_what_was_learnt_if_another_drive_repeats_it(
     plain = predicted(explained(tmp_path, {}), twist, 2.0)
     learnt = explained(tmp_path, {}, unmodelled=_draws(2.0, is_repeatable))
     np.testing.assert_allclose(predicted(learnt, twist, 2.0) - plain, [0.0, more, 0.0], atol=1e-3)
+
+
+def test_a_curve_that_no_driver_holds_is_told_and_not_written(tmp_path: Path) -> None:
+    """A resistance that falls by 3 N m over 1 rad/s; the drivers hold 1.7 N m s/rad."""
+    knots, values = (np.array([0.0, 1.0, 2.0]),), np.array([[0.0, 3.0, 0.0]])
+    term = LearntTerm(FAMILIES["torque.speed"], (0,), knots, values)
+    effect = SimpleNamespace(term=term, is_repeatable=True, family=term.family)
+    assert explained(tmp_path, {}, unmodelled=effect).unmodelled == ()
+    (note,) = _term_notes(effect, load_robot("reference"))  # type: ignore[arg-type]
+    assert "is not in the explained description: its curve is as steep as 3 N m s/rad" in note
+    gentle = SimpleNamespace(
+        term=evolve(term, values=0.1 * values), is_repeatable=True, family=term.family
+    )
+    assert explained(tmp_path, {}, unmodelled=gentle).unmodelled
+    assert _term_notes(gentle, load_robot("reference")) == ()  # type: ignore[arg-type]
 
 
 def test_a_long_table_is_read_again_as_it_was_written(tmp_path: Path) -> None:

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from tomr_power_model.unmodelled import FAMILIES, LearntTerm
+from tomr_reality_gap.fit import laws
 from tomr_reality_gap.fit.laws import LAWS, Evidence, laws_of, words_of
 from tomr_reality_gap.fit.learnt import Table
 
@@ -43,6 +45,9 @@ def test_a_spring_is_told_with_its_anchor_and_reaches_beyond_the_table() -> None
     found, term = _laws(_table("force.place", line, line), _spring(x, y))["spring"]
     expected = {"stiffness": 4.0, "slack": 0.5, "x": 0.3, "y": -0.2}
     assert found == pytest.approx(expected, abs=0.02)
+    assert [(points[0], points[-1]) for points in term.knots] == [
+        (-3.0, pytest.approx(3.0, abs=0.2))
+    ] * 2
     far = np.array([2.5, 2.5])
     at = np.argmin([np.hypot(a - far[0], b - far[1]) for a in term.knots[0] for b in term.knots[1]])
     place = np.array([(a, b) for a in term.knots[0] for b in term.knots[1]])[at]
@@ -56,6 +61,8 @@ def test_a_spring_is_told_with_its_anchor_and_reaches_beyond_the_table() -> None
          {"size": 0.3, "decay": 0.9}),
         ("driver.speed", "step", lambda w: 2.0 * (w > 4.2), {"size": 2.0}),
         ("torque.speed", "power law", lambda w: 0.01 * w**3, {"size": 0.01, "exponent": 3.0}),
+        ("driver.current", "square beyond a threshold", lambda i: 0.5 * i**2 * (i > 4.2),
+         {"size": 0.5}),
         ("torque.angle", "periodic", lambda a: 0.2 * np.sin(3.0 * a + 1.0),
          {"size": 0.2, "order": 3.0, "phase": 1.0}),
     ],
@@ -70,6 +77,67 @@ def test_curves_are_told_as_the_laws_that_they_are(
     told, _ = found[law]
     for name, value in parameters.items():
         assert told[name] == pytest.approx(value, rel=0.03, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("family", "law", "parameters"),
+    [
+        ("force.velocity", "wind", {"coefficient": 5.0, "x": 0.5, "y": -0.3}),
+        ("force.place", "steady force", {"x": 2.0, "y": -1.0}),
+        ("torque.place", "patch", {"size": 0.3, "radius": 0.6, "x": -0.2, "y": 0.3}),
+    ],
+)
+def test_maps_are_told_as_the_laws_that_they_are(
+    family: str, law: str, parameters: dict[str, float]
+) -> None:
+    """Values worked out here, by the words that the law is told with."""
+    line = np.linspace(-1.0, 1.0, 9)
+    x, y = (grid.ravel() for grid in np.meshgrid(line, line, indexing="ij"))
+    p = parameters
+    if law == "wind":
+        past = np.stack([p["x"] - x, p["y"] - y])
+        values = p["coefficient"] * np.hypot(*past) * past
+    elif law == "steady force":
+        values = np.stack([np.full_like(x, p["x"]), np.full_like(x, p["y"])])
+    else:
+        beyond = np.hypot(p["x"] - x, p["y"] - y) / p["radius"] - 1.0
+        values = p["size"] / (1.0 + np.exp(4.0 * beyond))[None]  # with a soft edge
+    found = _laws(_table(family, line, line), values)
+    told, _ = found[law]
+    assert told == pytest.approx(parameters, abs=0.01)
+
+
+def test_every_law_belongs_to_families_that_are_known_and_is_told_with_all_its_parameters() -> None:
+    for law in LAWS:
+        assert set(law.families) <= set(FAMILIES)
+        assert {name for name in law.units if f"{{{name}}}" in law.words} == set(law.units)
+
+
+def test_the_law_that_fits_best_for_its_length_comes_first_and_three_are_listed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    knots = np.linspace(0.0, 8.0, 24)
+    listed = list(_laws(_table("torque.speed", knots), 0.01 * knots))
+    assert listed[0] == "power law"
+    monkeypatch.setattr(laws, "_AS_WELL", -np.inf)
+    assert len(_laws(_table("torque.speed", knots), 0.01 * knots)) == 3
+
+
+def test_intervals_are_as_wide_as_the_data_are_inexact() -> None:
+    """Four times the noise, correlation included; 2 % of a value is never known."""
+    knots = np.linspace(0.0, 8.0, 24)
+    table, values = _table("torque.speed", knots), 0.01 * knots[None] ** 2
+    term = LearntTerm(table.family, (), table.knots, values)
+    widths = []
+    for inflation in (1.0, 16.0):
+        evidence = evolve(_evidence(values, exact=100.0), inflation=inflation)
+        told = laws_of(table, term, evidence)[0].fitted.parameters["exponent"]
+        widths.append(told.high - told.low)
+    # Each value is known to 0.1: the exponent's standard deviation by its own derivative.
+    slopes = np.stack([knots**2, 0.01 * knots**2 * np.log(np.maximum(knots, 1e-9))], axis=1)
+    sigma = 0.1 * np.sqrt(np.linalg.inv(slopes.T @ slopes)[1, 1])
+    expected = [3.92 * np.hypot(part * sigma, 0.02 * 2.0) for part in (1.0, 4.0)]
+    assert widths == pytest.approx(expected, rel=0.02)
 
 
 def test_a_curve_that_is_no_law_stays_a_table() -> None:

@@ -10,11 +10,12 @@ from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.parameter import ParameterisedRobot, per_wheel
 from tomr_power_model.robot import read_description, shipped_robot
 from tomr_reality_gap.alignment.channels import Channel
+from tomr_reality_gap.alignment.motion import motion_in
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection
 from tomr_reality_gap.fit.jacobian import linearise
-from tomr_reality_gap.fit.learnt import motion_in, with_terms
+from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
 from tomr_reality_gap.fit.simulator_discrepancy import discrepancy_torques
@@ -23,7 +24,6 @@ from tomr_reality_gap.hypotheses.catalogue import nuisances
 from tomr_reality_gap.hypotheses.scales import scales_of
 from tomr_reality_gap.mismatch.locate import located
 from tomr_reality_gap.mismatch.orders import ripple_orders
-from tomr_reality_gap.mismatch.probes import motion_of
 
 from .test_alignment import _recorded as recorded_drive
 from .test_alignment import as_recorded, simulation  # noqa: F401 -- the fixture
@@ -96,7 +96,7 @@ def test_what_has_no_name_is_found_with_its_wheel_and_variable(
     assert effect.is_repeatable
     assert effect.is_large
     shape = shape_of(effect, robot)
-    assert abs(shape.at[np.argmax(np.abs(shape.value))]) == pytest.approx(4.0, abs=1.2)
+    assert abs(shape.at[np.argmax(np.abs(shape.value))]) == pytest.approx(4.0, abs=1.0)
     # A simulation of the user's that has the same is no other than reality in this.
     plain, resisting = simulation.predict([robot])[0], next(simulation.respond(robot, torque))
     for theirs, expected in ((resisting, True), (plain, False)):
@@ -153,7 +153,7 @@ def test_what_the_users_simulation_resists_more_is_taken_off(
         simulation,
         recorded=evolve(simulation.recorded, command=simulation.recorded.command[:, [1, 0, 2]]),
     )
-    torque = more.torque(motion_of(turned, robot, turned.run(robot)))
+    torque = more.torque(motion_in(turned, robot))
     wanted, ours = turned.predict([theirs, robot])
     corrected = evolve(turned, resisting=torque).predict([robot])[0]
     powers = np.concatenate(

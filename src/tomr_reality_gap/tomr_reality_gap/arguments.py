@@ -46,6 +46,12 @@ def add_inputs(parser: argparse.ArgumentParser) -> None:
         metavar="BAG=FROM:TO",
         help="leave out what was measured then [s]; repeatable",
     )
+    add(
+        "--effects",
+        type=Path,
+        metavar="DIR",
+        help="run the Python files there, effects of your own: trust them",
+    )
     add_tolerance(parser)
 
 
@@ -67,6 +73,10 @@ def add_quiet(parser: argparse.ArgumentParser) -> None:
 
 def inputs_of(options: argparse.Namespace) -> Request:
     """The inputs. Raises InputError for what cannot be meant."""
+    if options.effects is not None:
+        from tomr_power_model.effects.user import load_effects
+
+        load_effects(options.effects)
     tolerance, tolerances = tolerances_of(options.tolerance)
     seen: dict[Path, str] = {}
     given = [("--real", path) for path in options.real]

@@ -10,6 +10,7 @@ from tomr_power_model.errors import InputError
 from tomr_reality_gap.arguments import add_inputs, add_quiet, inputs_of
 from tomr_reality_gap.fleet.command import add_fleet
 from tomr_reality_gap.progress import Progress, progress_bar
+from tomr_reality_gap.promote.command import add_promote
 from tomr_reality_gap.request import Request
 
 if TYPE_CHECKING:  # --help does without what takes a second to import
@@ -23,6 +24,7 @@ _EPILOG = """\
 examples:
   tomr_gap explain --robot my_robot.yaml --real tour1 --holdout tour2 --out gap
   tomr_gap check --robot my_robot.yaml --real tour1
+  tomr_gap promote gap/robot_explained.yaml --law "power law" --out effects
   tomr_gap fleet recordings/ --out gaps
 
 `tomr_gap explain --help` and so on say more.
@@ -101,6 +103,7 @@ def _parser() -> argparse.ArgumentParser:
     add_inputs(check)
     add_quiet(check)
     check.set_defaults(run=_check)
+    add_promote(commands)
     add_fleet(commands)
     return parser
 

@@ -3,6 +3,7 @@
 from attrs import evolve
 
 from tomr_power_model.calibration.fitted import fitted_text
+from tomr_power_model.robot.description import why_not_held
 from tomr_power_model.unmodelled.described import parameters_of
 from tomr_reality_gap.analysis import AnalysisResult
 from tomr_reality_gap.fit.model import Model
@@ -24,9 +25,10 @@ def described(analysis: AnalysisResult, model: Model) -> str:
     values = dict(model.described.values)
     wheels = analysis.robot.wheel_names
     effect = analysis.unmodelled
-    if effect is not None and effect.is_repeatable:
+    robot = model.described.robot
+    if effect is not None and effect.is_repeatable and not why_not_held(robot, effect.term):
         name = f"term_{len(analysis.robot.unmodelled) + 1}"
-        values.update(parameters_of(name, effect.term, wheels))
+        values.update(parameters_of(name, effect.term, wheels, values))
     for key in [key for key in values if f".{wheels[0]}." in key]:
         keys = [key.replace(wheels[0], wheel) for wheel in wheels]
         numbers = {values.get(item) for item in keys}

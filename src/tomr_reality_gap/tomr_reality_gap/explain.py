@@ -28,13 +28,11 @@ from tomr_reality_gap.mismatch.orders import ripple_orders
 from tomr_reality_gap.prepared import Prepared, prepared
 from tomr_reality_gap.progress import Progress
 from tomr_reality_gap.request import Request
-from tomr_reality_gap.rules import is_doubted, is_unmodelled, unexplained
+from tomr_reality_gap.rules import is_doubted, is_unmodelled, leaves_much, unexplained
 from tomr_reality_gap.verdict import explanation_of
 
 Array = NDArray[np.float64]
 
-_MUCH = 0.3  # of the mismatch left by names: even a little of noise's size is looked into
-_LEAST = 0.05
 _LITTLE = 0.15  # of the noise: what is left of what is drawn is not looked into
 
 
@@ -159,9 +157,11 @@ def _unmodelled(dataset: Dataset, found: Selection, ready: Prepared) -> Unmodell
     robot = found.best.model.described.robot
     described, explained = dataset.predict([ready.base.robot, robot])
     share, size = unexplained(residuals_of(dataset, described, explained))
-    if size < (_LEAST if share > _MUCH and found.best.model.hypotheses else _LITTLE):
+    has_names = bool(found.best.model.hypotheses)
+    # Names that leave much may only stand in for what has none, however small it is.
+    if size < _LITTLE and not (has_names and leaves_much(share)):
         return None
-    gross = is_doubted(share, size, bool(found.best.model.hypotheses))
+    gross = is_doubted(share, size, has_names)
     rest = _remainder(dataset, found.best.model)
     effect = unmodelled_effect(rest, robot, ready.scales, is_sure=gross)
     cost = finding_cost(len(dataset.value))

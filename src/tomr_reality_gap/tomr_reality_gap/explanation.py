@@ -86,7 +86,7 @@ class Learnt:
 
     term: LearntTerm
     sigma: Array  # standard deviations of its values, like them
-    share: float  # of what the named findings leave that it predicts where it was not fitted
+    share: float  # of what named findings leave that it predicts where it was not fitted; or NaN
     is_repeatable: bool  # whether another drive would show it again
     laws: tuple[FittedLaw, ...] = ()  # simplest first
 

@@ -16,6 +16,7 @@ from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 from tomr_reality_gap.mismatch.locate import located
 from tomr_reality_gap.rules import (
     DOUBTED,
+    NAMELESS,
     confidence_of,
     energy_shares,
     estimate_of,
@@ -60,7 +61,7 @@ class Findings:
             parameters={},
             located=located(channels, effect.change, weight, share, variables=self.variables),
             rivals=(),
-            confidence=0.9,
+            confidence=NAMELESS,
             evidence=effect.evidence,
             shape=shape_of(effect, analysis.robot),
             learnt=Learnt(

@@ -21,11 +21,11 @@ from tomr_power_model.estimation.parameter import ParameterisedRobot, per_wheel
 from tomr_power_model.recordings import open_recording, resolve_topic
 from tomr_power_model.robot import Robot, read_description, robot_from_parameters
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS, channels_of
+from tomr_reality_gap.alignment.motion import motion_in
 from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
-from tomr_reality_gap.fit.learnt import motion_in, with_terms
+from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.simulator_discrepancy import DiscrepancyTorques, discrepancy_torques
 from tomr_reality_gap.hypotheses.scales import scales_of, traction_ratios_of
-from tomr_reality_gap.mismatch.probes import motion_of
 from tomr_reality_gap.request import Request
 
 Array = NDArray[np.float64]
@@ -133,8 +133,7 @@ def _with(
     """The recording, simulated with what the user's simulation resists beyond ours."""
     if discrepancy is None:
         return simulation
-    motion = motion_of(simulation, robot, simulation.run(robot))
-    return evolve(simulation, resisting=discrepancy.torque(motion))
+    return evolve(simulation, resisting=discrepancy.torque(motion_in(simulation, robot)))
 
 
 def _as_described(simulation: RecordingSimulation) -> RecordingSimulation:

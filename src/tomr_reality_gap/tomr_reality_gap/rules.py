@@ -20,6 +20,9 @@ _MUCH = 0.3  # of the mismatch left: what was named is not the whole story
 _GROSS = 10.0  # times the noise: no match, even if nothing is named; slow noise reaches 1
 _SURE = 0.97
 DOUBTED = 0.45  # confidence of a finding that leaves much at most
+# Fixed, and no posterior: the evidence leaves no doubt that something is there (e^-20 at least, as
+# odds are tempered), but how likely it is that no name fits it cannot be had from the names.
+NAMELESS = 0.9
 
 
 @frozen
@@ -73,9 +76,14 @@ def is_unmodelled(evidence: float, named: float, cost: float) -> bool:
     return evidence > max(_UNMODELLED_COST, cost, SIMULATOR.unmodelled * named)
 
 
+def leaves_much(share: float) -> bool:
+    """Whether what was named is not the whole story, from the share that is left."""
+    return share > _MUCH
+
+
 def is_doubted(share: float, size: float, has_findings: bool) -> bool:
     """Whether too much is left (see `unexplained`) for what was named, or for a match."""
-    return share > _MUCH and size > (1.0 if has_findings else _GROSS)
+    return leaves_much(share) and size > (1.0 if has_findings else _GROSS)
 
 
 def energy_shares(lost: Sequence[float], left: float) -> list[float]:

@@ -9,6 +9,8 @@ from tomr_power_model.effects import EFFECTS
 from tomr_power_model.estimation.linear_gaussian import Gram, solve
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.statistics import autocorrelation
+from tomr_power_model.robot import Robot
+from tomr_power_model.robot.description import why_not_held
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.analysis import AnalysisResult, detection_limits, residuals_of
 from tomr_reality_gap.described import described, for_users
@@ -58,14 +60,17 @@ def explanation_of(
         score=score_of([item for item in comparisons if item.held_out]),
         explained=described(analysis, for_users(analysis, model)) if findings else "",
         suggested=suggested(findings),
-        notes=(*notes, *_event_notes(effect)),
+        notes=(*notes, *_term_notes(effect, model.described.robot)),
     )
 
 
-def _event_notes(effect: Unmodelled | None) -> tuple[str, ...]:
-    """What no other drive repeats is told, and not predicted."""
-    if effect is None or effect.is_repeatable:
+def _term_notes(effect: Unmodelled | None, robot: Robot) -> tuple[str, ...]:
+    """What no other drive repeats is told, and not predicted; what no driver holds, not written."""
+    if effect is None:
         return ()
+    if effect.is_repeatable:
+        why = why_not_held(robot, effect.term)
+        return (f"{effect.family.words} is not in the explained description: {why}",) if why else ()
     return (
         f"{effect.family.words} comes and goes: other drives are predicted without it; its course "
         "is an estimate for this one",

@@ -238,3 +238,8 @@ def test_slow_and_fast_drivers_reach_the_same_speed(
     changes = {"controller.rate": rate, "controller.proportional": 0.6}
     run = drive(Simulation(make_robot(changes, ideal=True)), 5.0, (0.0, 0.3, 0.0), skip=4.0)
     assert run.joints().mean(axis=0) == pytest.approx([-6.0, 3.0, 3.0], abs=0.012)
+
+
+def test_what_mujoco_refuses_is_told_in_one_line(make_robot: MakeRobot) -> None:
+    with pytest.raises(InputError, match=r"cannot be simulated \(.*\): check its masses and radii"):
+        Simulation(make_robot({"robot.robot_radius": 0.001}))

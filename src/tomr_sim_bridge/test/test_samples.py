@@ -5,8 +5,9 @@ import math
 import pytest
 
 from tomr_power_model.messages.bag import jazzy_typestore, to_bag
+from tomr_power_model.messages.motion import transform_of
 from tomr_power_model.messages.types import TF
-from tomr_sim_bridge.plant.samples import odometry, transform_of
+from tomr_sim_bridge.plant.samples import odometry
 
 
 def test_odometry_and_its_transform_say_the_same() -> None:

@@ -13,11 +13,14 @@ _OUTPUTS = frozenset(
     {
         "clock",
         "diagnostics",
+        "floor_traction",
         "from_encoders",
+        "odom_slip",
         "parameter_events",
         "predicted",
         "residuals",
         "rosout",
+        "slip",
     }
 )
 
@@ -96,7 +99,7 @@ def select_topics(
     """Return type by full name of the topics to replay.
 
     With `topics` these and no others, found with or without a namespace; else every topic but the
-    outputs of the suite (predictions, residuals, diagnostics), /clock, ROS's own and, unless
+    outputs of the suite (predictions, residuals, diagnostics, slip), /clock, ROS's own and, unless
     included, ground_truth/*.
 
     Raises:

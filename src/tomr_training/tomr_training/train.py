@@ -5,6 +5,7 @@ import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from tomr_fault_diag.classifier.states import STATES
 from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
 from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.errors import InputError
+from tomr_power_model.files.write import make_folder, write_together
 
 if TYPE_CHECKING:  # it takes seconds to import: --help does without
     from tomr_training.planar.generate import LabelledTicks
@@ -56,7 +58,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--out", type=Path, required=True, help="weights to write (.npz)")
+    parser.add_argument("--out", type=Path, required=True, help="weights to write, .npz")
     parser.add_argument(
         "--classifier",
         choices=tuple(_KINDS),
@@ -80,6 +82,9 @@ def _train(arguments: Sequence[str] | None) -> int:
     options = _parser().parse_args(arguments)
     if options.drives < 1 or options.validation < 1:
         raise InputError("--drives and --validation: give at least 1")
+    if options.out.suffix != ".npz":
+        raise InputError(f"--out {options.out}: give a name that ends in .npz")
+    make_folder(options.out.parent)
     try:
         import torch
     except ModuleNotFoundError as error:
@@ -92,9 +97,9 @@ def _train(arguments: Sequence[str] | None) -> int:
     seeds = range(options.first_seed, between), range(between, between + options.validation)
     train, unseen = (generate(chosen) for chosen in seeds)
     trained = _KINDS[options.classifier](options, train, unseen)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
     arrays: dict[str, Any] = {name: a.astype(np.float32) for name, a in trained.arrays.items()}
-    np.savez(options.out, **arrays)
+    weights = BytesIO()
+    np.savez(weights, **arrays)
     confusion = trained.confusion
     text = {
         "classifier": options.classifier,
@@ -112,7 +117,7 @@ def _train(arguments: Sequence[str] | None) -> int:
         },
     }
     document = json.dumps(text, indent=2) + "\n"
-    options.out.with_suffix(".json").write_text(document, encoding="utf-8")
+    write_together({options.out: weights.getvalue(), options.out.with_suffix(".json"): document})
     _print(confusion)
     return EXIT_OK
 

@@ -35,6 +35,8 @@ def lines(found: Commissioned) -> list[str]:
 
 def headline(found: Commissioned) -> str:
     """The verdict in one sentence."""
+    if found.is_go and not found.shoved.peaks:
+        return "commissioned; nothing speaks against it, but how often shoves alarm is not known"
     if found.is_go:
         return (
             f"commissioned for {found.request.false_alarms_per_hour:g} false alarms per hour; "

@@ -59,7 +59,7 @@ _OTHER = 1e-6  # and that one fault becomes another
 _STRANGE = 1e-2  # of a fault of no known kind, over that of a known one
 _SLIPPERY = 1e5  # of slip, over that of other faults: it may be over soon
 _SLOW = 1e-4  # of what a description that is off looks like, all the time
-_LEAST = 1e-30
+_LEAST = 1e-60  # far below the rarest onset that `caution` allows, or that would count for more
 
 
 class Belief:
@@ -96,11 +96,13 @@ def of_states(likelihoods: Array) -> Array:
 
 def _transitions(onset: float) -> Array:
     """P(j -> k), (20, 20)."""
+    onset = min(onset, _PUSH)  # a fault, slip as well, is no likelier than a push
     moves = np.full((_STATES, _STATES), _OTHER)
+    moves[:, LOADED] *= onset / _PUSH  # as rare beside a push as it is without a fault
     moves[:, NORMAL] = _ENDING
     moves[SLIP, NORMAL] = _SLIP_ENDING
     moves[[NORMAL, EXTERNAL]] = onset
-    moves[[NORMAL, EXTERNAL], SLIP] *= _SLIPPERY
+    moves[[NORMAL, EXTERNAL], SLIP] = min(_SLIPPERY * onset, _PUSH)
     for kind in (DRAGS, WEAKS, METERS):
         moves[[NORMAL, EXTERNAL], kind] *= _SLOW
     moves[:, OTHER] *= _STRANGE

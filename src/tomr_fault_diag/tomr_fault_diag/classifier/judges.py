@@ -167,6 +167,11 @@ class WindowJudge:
         for idle in unseen.wheels:  # what an idle wheel hides it cannot refute either
             faults = [kind.start + idle for kind in _HIDDEN]
             likelihoods[faults] = np.maximum(likelihoods[faults], likelihoods[NORMAL])
+        for moved in unseen.moved:  # no fault turns a wheel that stands: somebody pushes
+            likelihoods[[kind.start + moved for kind in _HIDDEN]] = likelihoods[NORMAL]
+        if unseen.everything:  # a robot that stands says the same again and again
+            slight = likelihoods - likelihoods[NORMAL] < self.settings.striking
+            likelihoods[slight] = likelihoods[NORMAL]
         for kind in _CREEPING:
             over = likelihoods[kind] - likelihoods[NORMAL]
             plain = np.sign(over) * np.maximum(np.abs(over) - _SLIGHT, 0.0)
@@ -176,13 +181,33 @@ class WindowJudge:
         self._recent.append(_ratios(likelihoods))
         group = max(_GROUPS, key=lambda group: float(shares[group].sum()))
         best = self._kept(shares, group)
-        striking = any(window[best] > self.settings.striking for window in self._recent)
         state = STATE_OF[best]
         wheel = best - CONTROLS.start if state is STATES[CONTROL] else state.wheel
         if state in DRAGGING and _stands(self._window, best - DRAGS.start):
             state = STUCK[best - DRAGS.start]
-        sure = bool(shares[group].sum() > _SURE and striking)
+        sure = bool(shares[group].sum() > _SURE) and self._is_striking(best)
         return Opinion(named_of(shares), sure, wheel, state)
+
+    def evidence(self) -> float:
+        """Log odds of the likeliest fault against none, without the prior [decades].
+
+        0 where it would not be named with however little caution: no window is striking, or
+        another fault may be it. Exact where the caution in use is far beyond.
+        """
+        shares = self._belief.shares
+        faults = _GROUPS[1:]
+        sums = [float(shares[group].sum()) for group in faults]
+        most = max(sums)
+        group = faults[sums.index(most)]
+        striking = self._is_striking(group[int(np.argmax(shares[group]))])
+        if not striking or most < _SURE * sum(sums):
+            return 0.0
+        odds = most / float(shares[_GROUPS[0]].sum())
+        return max(self.settings.caution + math.log10(odds), 0.0)
+
+    def _is_striking(self, state: int) -> bool:
+        """Whether a window of the last half second spoke for a state by itself."""
+        return any(window[state] > self.settings.striking for window in self._recent)
 
     def _kept(self, shares: Array, group: list[int]) -> int:
         """The likeliest of a group; the one before stays while it is not unlikely."""

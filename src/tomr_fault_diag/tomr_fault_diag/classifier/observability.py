@@ -5,6 +5,7 @@ wheel slips only while it has to push. Told from what the command asks for and t
 """
 
 from collections import deque
+from collections.abc import Iterable
 
 from attrs import frozen
 
@@ -24,6 +25,7 @@ class Unseen:
 
     wheels: tuple[int, ...] = ()
     slip: bool = False
+    moved: tuple[int, ...] = ()  # wheels that turned lately though nothing asked them to
     blind: tuple[tuple[int, str], ...] = ()  # wheels without power of their own, and why
 
     @property
@@ -40,7 +42,8 @@ class Unseen:
         return (*motors, "slip") if self.slip else motors
 
 
-_Tick = tuple[int, tuple[float, ...], tuple[bool, ...]]  # stamp [ns], expected, turning
+# Stamp [ns], speeds expected [rad/s], which wheels are told to turn, which turn.
+_Tick = tuple[int, tuple[float, ...], tuple[bool, ...], tuple[bool, ...]]
 
 
 class MotionWatch:
@@ -59,24 +62,39 @@ class MotionWatch:
         """Take the newest tick; returns what the last ticks could not show."""
         speeds = [frame.residuals[index] for index in SPEEDS]
         expected = tuple([speed.modelled for speed in speeds])
-        now, turning = frame.stamp_ns, tuple([_turns(speed) for speed in speeds])
-        self._ticks.append((now, expected, turning))
+        now, told = frame.stamp_ns, tuple([_is_told_to_turn(speed) for speed in speeds])
+        self._ticks.append((now, expected, told, tuple([_turns(speed) for speed in speeds])))
         while self._ticks[0][0] <= now - _LATELY:
             self._ticks.popleft()
         if self._since is None:
             self._since = now
         if now - self._since < _LEAST:
             return Unseen()
-        _, every_expected, every_turning = zip(*self._ticks, strict=True)
-        turning = tuple([any(wheel) for wheel in zip(*every_turning, strict=True)])
+        _, every_expected, every_told, every_turning = zip(*self._ticks, strict=True)
+        told, turning = _ever(every_told), _ever(every_turning)
         steady = all(
             max(wheel) - min(wheel) < _SPEEDING for wheel in zip(*every_expected, strict=True)
         )
-        return Unseen(tuple([wheel for wheel, turns in enumerate(turning) if not turns]), steady)
+        idle = [wheel for wheel in range(_WHEELS) if not told[wheel]]
+        return Unseen(
+            wheels=tuple([wheel for wheel in idle if not turning[wheel]]),
+            slip=steady,
+            moved=tuple([wheel for wheel in idle if turning[wheel]]),
+        )
+
+
+def _ever(ticks: Iterable[Iterable[bool]]) -> tuple[bool, ...]:
+    """Of each wheel, whether something held in any tick."""
+    return tuple([any(wheel) for wheel in zip(*ticks, strict=True)])
+
+
+def _is_told_to_turn(speed: Residual) -> bool:
+    """One of which it is not known may be."""
+    return not abs(speed.modelled) < _TURNING
 
 
 def _turns(speed: Residual) -> bool:
-    """Whether a wheel is told to turn, or turns; one that is not known may."""
+    """One that is not known may."""
     expected = speed.modelled
     measured = expected + (-speed.residual if expected < 0.0 else speed.residual)
-    return not (abs(expected) < _TURNING and abs(measured) < _TURNING)
+    return not abs(measured) < _TURNING

@@ -37,7 +37,7 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
     ),
     _S(
         "commissioned",
-        "when tomr_commission set bands and caution, and with which weights",
+        "when tomr_commission set bands and caution, and what with",
         "str",
         "",
     ),

@@ -160,8 +160,9 @@ class FaultClassifier:
         if leading in _WELL and misfit.unexplained:
             leading = UNKNOWN
         candidate = STATES[NORMAL] if leading in _WELL else leading
-        if candidate != self._candidate:
-            self._candidate, self._candidate_since, self._sure_since = candidate, stamp, None
+        if not _is_one_fault(candidate, self._candidate):
+            self._candidate_since, self._sure_since = stamp, None
+        self._candidate = candidate
         held = self._is_held(opinion.sure, stamp)
         is_blind = opinion.wheel in [wheel for wheel, _ in self._unseen.blind]
         if leading is UNKNOWN and misfit.unexplained:
@@ -214,6 +215,11 @@ class FaultClassifier:
         self._wheel = wheel
         if state != self._state:
             self._state, self._since = state, since
+
+
+def _is_one_fault(state: State, other: State) -> bool:
+    """Whether two states are the same, or tell what ails one and the same motor."""
+    return state == other or (state.paper is not None and state.paper == other.paper)
 
 
 def _is_waiting(frame: ResidualFrame) -> bool:

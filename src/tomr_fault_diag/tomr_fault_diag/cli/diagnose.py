@@ -26,7 +26,6 @@ from tomr_fault_diag.diagnosis.replayed import (
 from tomr_fault_diag.diagnosis.settings import (
     STAGE_NODES,
     DiagnosisSettings,
-    parse_assignments,
 )
 from tomr_fault_diag.diagnosis.words import (
     as_json,
@@ -39,10 +38,11 @@ from tomr_fault_diag.diagnosis.words import (
     verdict,
 )
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_MISMATCH, EXIT_OK, run_main
-from tomr_power_model.errors import InputError
+from tomr_power_model.errors import InputError, one_line
 from tomr_power_model.files import make_folder
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.robot import load_robot, read_node_sections, shipped_robots
+from tomr_power_model.robot.parameters import parse_assignments
 
 EXIT_UNDECIDED = 3
 _MOST_PHASES = 50
@@ -181,12 +181,17 @@ def _exit_code(done: Sequence[Replayed], failed: Sequence[Failed]) -> int:
     return EXIT_UNDECIDED if any(item.undecided for item in done) else EXIT_OK
 
 
+def _tell(line: str) -> None:
+    """On stderr, in one line whatever the names in it hold."""
+    print(one_line(line), file=sys.stderr)
+
+
 def _scores(done: Sequence[Replayed]) -> dict[str, Any]:
     from tomr_fault_diag.diagnosis.score import Scores  # scipy takes its time to load
 
     for item in done:
         if not item.seen:
-            print(f"note: {item.task.bag}: nothing is said of it: not scored", file=sys.stderr)
+            _tell(f"note: {item.task.bag}: nothing is said of it: not scored")
     seen = tuple(one for item in done for one in item.seen)
     if not seen:
         raise InputError("--labels: nothing is said of any of the recordings: check their names")
@@ -195,7 +200,7 @@ def _scores(done: Sequence[Replayed]) -> dict[str, Any]:
 
 def _print_one(item: Replayed) -> None:
     if item.undecided:
-        print(f"{item.task.bag}: {verdict(item)}", file=sys.stderr)
+        _tell(f"{item.task.bag}: {verdict(item)}")
     for line in summary_lines(item.phases[0].summary, item.start_ns):
         print(line)
     if len(item.phases) > 1:
@@ -205,7 +210,7 @@ def _print_one(item: Replayed) -> None:
 def _print_notes(item: Replayed, is_alone: bool) -> None:
     place = "" if is_alone else f"{item.task.bag}: "
     for line in notes(item):
-        print(f"note: {place}{line}", file=sys.stderr)
+        _tell(f"note: {place}{line}")
 
 
 def _print_json(
@@ -238,7 +243,7 @@ def _diagnose(arguments: Sequence[str] | None) -> int:
     for item in [_replayed_alone(tasks[0])] if is_alone else _replayed(tasks, options.jobs):
         if isinstance(item, Failed):
             failed.append(item)
-            print(f"error: {item.reason}", file=sys.stderr)
+            _tell(f"error: {item.reason}")
         else:
             done.append(item)
     order = {task.bag: number for number, task in enumerate(tasks)}

@@ -5,8 +5,9 @@ from typing import Any
 
 from tomr_fault_diag.diagnosis.pipeline import Pipeline, Step
 from tomr_power_model.errors import InputError
-from tomr_power_model.recordings import Recording, resolve_topic
+from tomr_power_model.recordings import Recording
 from tomr_power_model.topics.inputs import Input
+from tomr_power_model.topics.recorded import recorded_inputs
 
 Note = Callable[[str, Any, int], None]  # topic of the contract, message, receive stamp [ns]
 
@@ -19,26 +20,14 @@ def find_topics(
     Raises InputError if a topic has another type, or if so much is missing that nothing could
     be compared.
     """
-    found: dict[str, str] = {}
-    for item in inputs:
-        topic = resolve_topic(recording, item.topic, namespace)
-        if topic is None:
-            continue
-        types = (item.type_name, *item.other_types)
-        if recording.topics[topic] not in types:
-            raise InputError(
-                f"{recording.path}: {topic} is a {recording.topics[topic]}, needs {types[0]}: "
-                "remap it or set measurement.source in robot.yaml"
-            )
-        found[topic] = item.topic
-    held = ", ".join(recording.topics)
-    if "joint_states" not in found.values():
-        raise InputError(f"{recording.path}: no joint_states; the recording holds {held}")
+    found = {
+        topic: item.topic for topic, item in recorded_inputs(recording, inputs, namespace).items()
+    }
     power = {item.topic for item in inputs} - {"joint_states", "cmd_vel", "imu/data"}
     if power and not power & set(found.values()):
         raise InputError(
             f"{recording.path}: none of {', '.join(sorted(power))}: are the wheels named "
-            f"otherwise in robot.yaml? The recording holds {held}"
+            f"otherwise in robot.yaml? The recording holds {', '.join(recording.topics)}"
         )
     return found
 

@@ -64,7 +64,7 @@ class Pipeline:
         self._predictor = PowerPredictor(robot, settings.model, is_compiled=compiled)
         self._residuals = ResidualStage(robot, settings.residuals)
         self._classifier = FaultClassifier(make_judge(settings.classifier))
-        self._commissioned = commissioned_words(settings.classifier)
+        self._commissioned = commissioned_words(settings.classifier, robot)
         wheels = WheelFinder(robot.wheel_names)
         self.inputs: tuple[Input, ...] = (
             *model_inputs(robot, self._predictor, wheels),

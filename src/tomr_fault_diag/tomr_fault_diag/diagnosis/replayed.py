@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from attrs import evolve, field, frozen
 
+from tomr_fault_diag.classifier.commissioned import commissioned_words
 from tomr_fault_diag.classifier.messages import diagnosis_message, evidence_of
 from tomr_fault_diag.classifier.stage import Diagnosis
 from tomr_fault_diag.diagnosis.heard import Heard, Stream, why_undecided
@@ -128,7 +129,7 @@ def replay_one(task: Task, progress: Progress | None = None) -> Replayed:
     heard = Heard()
     with open_recording(task.bag) as recording:
         _run(recording, task, listeners, heard, progress)
-        notes = (recording.warning,) if recording.warning else ()
+        notes = tuple(filter(None, (recording.warning, _outdated(task, robot))))
         start_ns, end_ns = recording.start_ns, recording.end_ns
     first = listeners[0].pipeline
     phases = tuple(item.phase(share) for item, share in zip(listeners, shares, strict=True))
@@ -140,6 +141,13 @@ def replay_one(task: Task, progress: Progress | None = None) -> Replayed:
         stream.first = stream.last = None  # messages need not travel between processes
     found = Replayed(task, start_ns, end_ns, phases, heard.streams, notes, complaints, undecided)
     return _finished(found, robot, [listener.track() for listener in listeners])
+
+
+def _outdated(task: Task, robot: Robot) -> str:
+    """A line where bands and caution were set for something else; empty where not."""
+    settings = task.settings.classifier
+    said = commissioned_words(settings, robot)
+    return f"commissioned: {said}" if settings.commissioned and said.startswith("no") else ""
 
 
 def _finished(found: Replayed, robot: Robot, tracks: Sequence[Track]) -> Replayed:

@@ -1,6 +1,6 @@
 """All parameters of the diagnosis together, for tools that run the three stages in one."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Self
 
 from attrs import evolve, frozen
@@ -8,7 +8,6 @@ from attrs import evolve, frozen
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
 from tomr_fault_diag.residuals.settings import RESIDUAL_PARAMETERS, ResidualSettings
 from tomr_power_model.errors import InputError
-from tomr_power_model.files import load_yaml
 from tomr_power_model.model.settings import MODEL_PARAMETERS, ModelSettings
 from tomr_power_model.robot.description import closest
 from tomr_power_model.robot.parameters import ParameterSpec, check_all
@@ -78,14 +77,3 @@ class DiagnosisSettings:
             model=evolve(self.model, ticks=shifted),
             residuals=evolve(self.residuals, ticks=shifted),
         )
-
-
-def parse_assignments(assignments: Iterable[str]) -> dict[str, object]:
-    """`name=value` pairs from a command line, values read as YAML."""
-    values: dict[str, object] = {}
-    for assignment in assignments:
-        name, equals, text = assignment.partition("=")
-        if not equals:
-            raise InputError(f"--set {assignment}: write name=value, e.g. band.power=2.0")
-        values[name.strip()] = load_yaml(text, f"--set {assignment}")
-    return values

@@ -5,6 +5,7 @@ from typing import Any
 
 from tomr_fault_diag.diagnosis.replayed import Failed, Phase, Replayed
 from tomr_fault_diag.diagnosis.summary import Episode, Summary
+from tomr_power_model.errors import one_line
 from tomr_power_model.messages.plain import NANOSECONDS
 
 
@@ -49,7 +50,7 @@ def phases_line(replayed: Replayed) -> str:
 def bag_line(replayed: Replayed) -> str:
     """A recording among many."""
     length = seconds(replayed.end_ns, replayed.start_ns)
-    return f"{replayed.task.bag}  {length:.1f} s  {verdict(replayed)}"
+    return f"{one_line(replayed.task.bag)}  {length:.1f} s  {verdict(replayed)}"
 
 
 def verdict(replayed: Replayed) -> str:

@@ -39,7 +39,7 @@ class FaultClassifierNode(StageNode):
     def __init__(self) -> None:
         super().__init__("fault_classifier", CLASSIFIER_PARAMETERS)
         self.classifier = FaultClassifier(make_judge(ClassifierSettings.of(self.values)))
-        self._commissioned = commissioned_words(self.classifier.settings)
+        self._commissioned = commissioned_words(self.classifier.settings, self._robot)
         self.offer(TOPIC, DiagnosticMessage)
         self.listen([Input(RESIDUALS, DIAGNOSTICS, guarded(self._take))], self._advance, STAGE_QOS)
         self.on_change(self._retune)

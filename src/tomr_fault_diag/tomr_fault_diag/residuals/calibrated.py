@@ -19,6 +19,8 @@ from tomr_power_model.errors import InputError
 Array = NDArray[np.float64]
 
 WITHIN = 0.999  # of healthy residuals
+MARGIN = 1.5  # on top, for what other days and floors bring
+SPEED_FACTOR = 2.0  # margin of speeds over that: loops of real drivers are not known as well
 _LEAST = 2000  # residuals to fit to
 
 
@@ -71,14 +73,11 @@ def fit_bands(
     return found
 
 
-def widened(bands: BandSettings, margin: float = 1.5, speed_margin: float = 3.0) -> BandSettings:
-    """Bands with a margin for what other days and floors bring.
-
-    Args:
-        bands: as they were fitted.
-        margin: of powers and currents.
-        speed_margin: of wheel speeds: loops of real drivers are not known as well.
-    """
+def widened(
+    bands: BandSettings, margin: float = MARGIN, speed_factor: float = SPEED_FACTOR
+) -> BandSettings:
+    """Bands with a margin, that of wheel speeds so many times as large."""
+    speed = margin * speed_factor
     return evolve(
         bands,
         relative=margin * bands.relative,
@@ -86,9 +85,9 @@ def widened(bands: BandSettings, margin: float = 1.5, speed_margin: float = 3.0)
         current=margin * bands.current,
         transient=margin * bands.transient,
         total_relative=margin * bands.total_relative,
-        speed=speed_margin * bands.speed,
-        speed_relative=speed_margin * bands.speed_relative,
-        speed_transient=speed_margin * bands.speed_transient,
+        speed=speed * bands.speed,
+        speed_relative=speed * bands.speed_relative,
+        speed_transient=speed * bands.speed_transient,
     )
 
 

@@ -112,6 +112,7 @@ class ResidualStage:
         lately = max(_FEWEST, round(_TRANSIENT / ticks.period))
         self._recent: deque[_Modelled] = deque(maxlen=lately)
         self._scatter: deque[float] = deque(maxlen=_SCATTERS)
+        self._decided = 0  # newest tick
 
     def retune(self, bands: BandSettings) -> None:
         """Change the bands while running."""
@@ -131,7 +132,7 @@ class ResidualStage:
             if not self._encoders.add(EncoderSample(stamp_ns, position, velocity)):
                 self._encoders.continuity.refuse()
                 return "no wheel can turn so far so fast; the sample is ignored"
-        elif arrival is Arrival.REPEATED:
+        else:
             self._encoders.continuity.precedes(stamp_ns)
         return arrival
 
@@ -143,12 +144,15 @@ class ResidualStage:
             self._flows[supply].refuse()
             return problem
         arrival = self._arrive(self._supplies[supply], stamp)
+        if arrival is Arrival.TAKEN and stamp <= self._decided - self.settings.stale:
+            self._flows[supply].misplace()
+            return "the stamp is too old for any decision to come; the message is ignored"
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
             self._windows[supply].add(reading)
             self._flows[supply].take(stamp)
             if supply != TOTAL:
                 self._repeats[supply].take(stamp, (reading.voltage, reading.current, reading.power))
-        elif arrival is Arrival.REPEATED:
+        else:
             self._flows[supply].precedes(stamp)
         return arrival
 
@@ -166,6 +170,7 @@ class ResidualStage:
         """Residuals for the ticks that the stamps have reached, in order."""
         found = []
         for tick in self._clock.due():
+            self._decided = tick
             found.append(self._frame(tick))
             self._health.take(tick, self._inputs(tick, found[-1]), self.settings.hardware_id)
         return found
@@ -196,6 +201,7 @@ class ResidualStage:
                 flow.clear()
             for watch in self._repeats:
                 watch.clear()
+            self._decided = 0
             self._encoders.clear()
             self._predictions.clear()
             self._recent.clear()
@@ -227,6 +233,8 @@ class ResidualStage:
         if not self._has_motor_power:
             return Measured(NAN, "W", NOT_MEASURED)
         missing = f"no fresh {self._topics[wheel]}/power"
+        if self._flows[wheel].is_misplaced(tick):
+            missing = f"{GAP}{self._topics[wheel]}/power: its stamps do not fit"
         if measured.value == measured.value:
             missing = ""
             if self._flows[wheel].is_broken(tick):

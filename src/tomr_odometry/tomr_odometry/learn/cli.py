@@ -16,6 +16,7 @@ from tomr_odometry.learn.fit import Batch, fit_creep
 from tomr_odometry.start import body_of
 from tomr_power_model.cli import EXIT_OK
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import make_folder, write_together
 from tomr_power_model.robot import load_robot, read_node_sections, shipped_robots
 
 ROBOT_FILE, REPORT_FILE, NODE = "robot_learnt.yaml", "learnt.json", "slip_odometry"
@@ -133,10 +134,10 @@ def learn(arguments: Sequence[str] | None) -> int:
         floors[name] = legs
     creep = fit_creep(floors, body)
     found = _report(floors, creep, body)
-    options.out.mkdir(parents=True)
     text = learnt_text(options.robot, creep, [str(bag) for bag in options.bags])
-    (options.out / ROBOT_FILE).write_text(text)
-    (options.out / REPORT_FILE).write_text(json.dumps(found, indent=2) + "\n")
+    report = json.dumps(found, indent=2, allow_nan=False)
+    make_folder(options.out)
+    write_together({options.out / ROBOT_FILE: text, options.out / REPORT_FILE: f"{report}\n"})
     coefficients = ", ".join(f"{value:.3g}" for value in creep.coefficient)
     print(f"creep: {coefficients}; growth {creep.growth:.3g} +- {creep.uncertainty:.2g}")
     for name, item in found["floors"].items():

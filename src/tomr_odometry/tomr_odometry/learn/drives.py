@@ -6,7 +6,8 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_odometry.estimator import Estimate, SlipOdometry
+from tomr_odometry.estimate import Estimate
+from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.offline import estimates
 from tomr_odometry.reference import Path2D, reference_of
 from tomr_odometry.settings import OdometrySettings
@@ -68,14 +69,15 @@ def read_legs(path: Path, robot: Robot, topic: str, turned: float = 0.0) -> list
     for number in range(int(seconds[-1] // LEG_S) + 1):
         chosen = np.flatnonzero(inside & (seconds // LEG_S == number))
         if len(chosen) > 2:
-            leg = _leg(stamps[chosen], rims[chosen], used[chosen], reference, turned)
+            leg = leg_of(stamps[chosen], rims[chosen], used[chosen], reference, turned)
             legs += [leg] if leg is not None else []
     return legs
 
 
-def _leg(
+def leg_of(
     stamps: NDArray[np.int64], rims: Array, used: Array, reference: Path2D, turned: float
 ) -> Leg | None:
+    """One leg; None where the reference hardly moved, or was corrected on the way."""
     own = (reference.stamps >= stamps[0]) & (reference.stamps <= stamps[-1])
     path = reference.pose[own]
     if len(path) < 2 or np.hypot(*np.diff(path[:, :2], axis=0).T).max() > _JUMP:

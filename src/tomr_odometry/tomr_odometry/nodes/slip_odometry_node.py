@@ -2,7 +2,7 @@
 
 from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.settings import PARAMETERS, OdometrySettings
-from tomr_odometry.topics import OUTPUTS, TF, TF_TOPIC, estimate_messages, odometry_inputs
+from tomr_odometry.topics import estimate_messages, odometry_inputs, outputs
 from tomr_power_model.errors import InputError
 from tomr_power_model.nodes.command_line import node_arguments
 from tomr_power_model.nodes.stage_node import StageNode, run_node
@@ -18,8 +18,7 @@ class SlipOdometryNode(StageNode):
         super().__init__("slip_odometry", NODE_PARAMETERS)
         self._settings = OdometrySettings.of(self.values)
         self._core = SlipOdometry(self._robot, self._settings)
-        outputs = {**OUTPUTS, TF_TOPIC: TF} if self._settings.publish_tf else OUTPUTS
-        for topic, type_name in outputs.items():
+        for topic, type_name in outputs(self._settings).items():
             try:
                 self.offer_type(topic, type_name)
             except ImportError as error:

@@ -17,9 +17,8 @@ def test_an_effect_tells_all_of_itself(effect: type[Effect]) -> None:
     assert effect.label[0].isupper()
     assert effect.mission
     for name, parameter in effect.parameters.items():
-        for value in (parameter.start, parameter.default):
+        for value in (parameter.neutral, parameter.start, parameter.default):
             assert value is None or parameter.minimum <= value <= parameter.maximum, name
-        assert parameter.neutral <= parameter.maximum
         assert parameter.prior_std > 0.0
     if effect.prior is not None:
         assert all(size(SCALES) > 0.0 for size in effect.prior.sizes.values())

@@ -82,6 +82,44 @@ def test_a_tick_rests_on_what_came_up_to_it() -> None:
     assert late.gaps == 0
 
 
+def test_after_a_leap_of_the_stamps_comes_a_gap_and_not_at_the_start() -> None:
+    first, leapt = flow(1000), flow(1000)
+    leapt.clear()
+    assert leapt.is_misplaced(BASE + 5000 * MS)  # heard before the leap and not since
+    leapt.take(BASE + 5000 * MS)
+    assert not first.is_broken(BASE)
+    assert leapt.is_broken(BASE + 5040 * MS)
+    assert not leapt.is_broken(BASE + 5050 * MS)
+    assert not leapt.is_misplaced(BASE + 5050 * MS)
+    never = Continuity(POWER_TOLERANCE)
+    never.clear()
+    assert not never.is_misplaced(BASE)
+
+
+@pytest.mark.parametrize("stamp", [0, BASE + 980 * MS, BASE + 500 * MS])
+def test_a_sensor_whose_stamps_do_not_fit_is_not_silent_and_says_so(stamp: int) -> None:
+    """Messages without a stamp, with the last one's, and with an older one."""
+    stream = flow(1000)
+    stream.precedes(stamp)
+    stream.precedes(stamp)
+    assert not stream.is_misplaced(BASE + 1000 * MS)
+    stream.precedes(stamp)
+    assert said(InputState("x", stream), 1000) == (Level.WARN, "its stamps do not fit")
+    stream.take(BASE + 1020 * MS)
+    assert not stream.is_misplaced(BASE + 1020 * MS)
+
+
+def test_nothing_is_known_of_a_stream_most_of_which_cannot_be_placed() -> None:
+    ordered, mixed = flow(1000), flow(1000)
+    for t in range(1000, 2000, 20):
+        for stream, strays in ((ordered, 1), (mixed, 3)):
+            stream.take(BASE + t * MS)
+            for _ in range(strays):
+                stream.precedes(BASE + (t - 300) * MS)
+    assert not ordered.is_broken(BASE + 1980 * MS)
+    assert mixed.is_broken(BASE + 1980 * MS)
+
+
 def test_it_is_said_once_a_second_and_on_a_change() -> None:
     reporter, stream = InputReporter(), flow(1520)
     for t in range(50, 4000, 50):

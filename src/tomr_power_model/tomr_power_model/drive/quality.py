@@ -255,8 +255,9 @@ def _wrong_sign(item: Drive, robot: Robot) -> Iterator[Finding]:
     """Power that flows out of the motors while they drive."""
     for wheel, name in enumerate(robot.wheel_names):
         time, _, speed = _of_wheel(item, wheel)
-        power = item.power[np.isfinite(item.power[:, wheel]), wheel]
-        moving = np.abs(speed) > _MOVING
+        # A current may be read where no voltage is known: there is no power then.
+        power = item.power[np.isfinite(item.reading[:, wheel]), wheel]
+        moving = (np.abs(speed) > _MOVING) & np.isfinite(power)
         if np.count_nonzero(moving) > 20 and np.median(power[moving]) < 0.0:
             yield Finding(
                 item.name,

@@ -17,9 +17,11 @@ from tomr_power_model.effects.base import (
     Wheel,
     effect,
 )
+from tomr_power_model.effects.user import load_named_effects
 
 for _module in pkgutil.walk_packages(__path__, __name__ + "."):
     import_module(_module.name)
+load_named_effects()
 
 __all__ = [
     "EFFECTS",

@@ -18,7 +18,6 @@ class SimulatorDiscrepancy:
     log_evidence_per_sample: float = 0.003  # that a finding must bring
     named: float = 0.01  # of the log evidence of all findings: what one of them must bring
     unmodelled: float = 0.12  # the same, of an effect without a name
-    beside_unmodelled: float = 0.3  # of an unnamed effect's log evidence: a named one beside it
     temper: float = 3.0  # root of the odds: likelihoods are not exact either
 
 

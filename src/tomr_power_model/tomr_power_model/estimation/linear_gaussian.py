@@ -69,7 +69,7 @@ class Solution:
 
 def solve(gram: Gram, chosen: Sequence[int]) -> Solution:
     """Posterior of a subset of columns."""
-    rows = np.asarray(chosen)
+    rows = np.asarray(chosen, dtype=np.intp)
     factor = cho_factor(gram.matrix[np.ix_(rows, rows)] + np.eye(len(rows)), lower=True)
     mean = cho_solve(factor, gram.vector[rows])
     explained = float(gram.vector[rows] @ mean)

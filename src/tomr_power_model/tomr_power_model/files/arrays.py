@@ -12,7 +12,8 @@ from tomr_power_model.errors import InputError
 from tomr_power_model.files.text import require_regular
 from tomr_power_model.limits import limits, too_large
 
-# What zip, zlib and numpy raise for a damaged file.
+# What zip, zlib and numpy raise for a damaged file. Where a flipped bit asks for a compression that
+# zipfile does not have, that is NotImplementedError; for a password, RuntimeError.
 _DAMAGED = (
     OSError,
     ValueError,

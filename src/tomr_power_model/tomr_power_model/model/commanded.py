@@ -145,6 +145,12 @@ class CommandPath:
             return []
         return self._simulation.of_wheels(self.state, field)
 
+    def add_to_sum(self, wheel: int, angle: float) -> None:
+        """Add to what a wheel's driver has summed up of its errors [rad]."""
+        assert self.state is not None
+        place = at.STATE_HEADER + wheel * at.STATE_WHEEL + at.INTEGRAL
+        self.state[place] += angle
+
     def over(self, tick_ns: int, seen: Seen) -> Commanded | None:
         """Means over the window that ends at a tick, or None without a command.
 

@@ -37,7 +37,9 @@ POWER_TOLERANCE = Tolerance(to_ns(0.1), to_ns(0.35), to_ns(0.05))
 # What a robot did in a gap, its simulation does after it, and takes as long as that.
 COMMAND_TOLERANCE = Tolerance(to_ns(0.125), to_ns(0.5), to_ns(0.3), share=1.0)
 _LONGEST = to_ns(0.6)  # of a gap, as far as `share` goes
-_REFUSED = -1  # in place of how far a message went back
+# In place of how far a message went back.
+_REFUSED = -1
+_MISPLACED = -2
 
 
 class Continuity:
@@ -45,18 +47,21 @@ class Continuity:
 
     def __init__(self, tolerance: Tolerance) -> None:
         self._tolerance = tolerance
+        self._read, self._was_read = 0, False
         self.clear()
 
     def clear(self) -> None:
-        """Forget the stream."""
+        """Forget the stream where its stamps leap, but for having been heard."""
+        self._was_read = self._was_read or self._read > 0
         self._ahead: deque[tuple[int, int]] = deque()  # stamp, and how far a message went back
         self._read = 0  # newest stamp that came
         self._last = 0  # newest one up to the last tick
         self._intervals: deque[int] = deque(maxlen=_KEPT)
         self._counted: deque[int] = deque()
+        self._in_order: deque[bool] = deque(maxlen=_KEPT)
         self._count = 0
         self._tolerated = self._tolerance.longest
-        self._back, self._strays = 0, 0
+        self._back, self._strays, self._misplaced = 0, 0, 0
         self._excused = 0
         self.refused = 0  # messages up to the last tick
         self.refused_at = 0  # newest stamp before the last of them, 0: there was none
@@ -71,9 +76,15 @@ class Continuity:
         self._ahead.append((stamp_ns, 0))
 
     def precedes(self, stamp_ns: int) -> None:
-        """Take note of a message that repeats or precedes an earlier stamp, and is ignored."""
-        if self._read > stamp_ns:
+        """Take note of a message that is ignored: it repeats or precedes a stamp, or has none."""
+        if self._read > stamp_ns > 0:
             self._ahead.append((self._read, self._read - stamp_ns))
+        else:
+            self.misplace()
+
+    def misplace(self) -> None:
+        """Take note of a message whose stamp is none, repeated, or too old to be of use."""
+        self._ahead.append((self._read, _MISPLACED))
 
     def refuse(self) -> None:
         """Take note of a message that cannot be used."""
@@ -94,13 +105,22 @@ class Continuity:
         return self._last
 
     def is_broken(self, tick_ns: int) -> bool:
-        """Whether at a tick the stream pauses, or went on only just before."""
-        return self.is_silent(tick_ns) or tick_ns < self._until
+        """Whether at a tick the stream pauses, went on only just before, or is in no order."""
+        return self.is_silent(tick_ns) or tick_ns < self._until or self._is_disordered()
+
+    def _is_disordered(self) -> bool:
+        """Whether hardly any of the last messages could be placed: each may be sent twice."""
+        return 3 * sum(self._in_order) < len(self._in_order)
 
     def is_silent(self, tick_ns: int) -> bool:
         """Whether at a tick nothing has come for longer than usual."""
         last = self.last(tick_ns)
         return bool(last) and tick_ns - last > self._tolerated
+
+    def is_misplaced(self, tick_ns: int) -> bool:
+        """Whether nothing is known at a tick because of stamps: the sensor itself may be well."""
+        last = self.last(tick_ns)
+        return self._misplaced >= _STRAYS or (not last and self._was_read)
 
     def rate(self, tick_ns: int) -> float:
         """Samples per second of the last moments [Hz]."""
@@ -110,13 +130,12 @@ class Continuity:
 
     def _follow(self, stamp: int, back: int) -> None:
         if back:
-            self.refused, self.refused_at = self.refused + 1, stamp
-            self.refused_since += 1
-            if back > 0:
-                self._back, self._strays = max(self._back, back), self._strays + 1
+            self._ignore(stamp, back)
             return
         silence = stamp - self._last if self._last else 0
-        if self._strays >= _STRAYS:
+        if not self._last and self._was_read:
+            self._break_off(stamp, _LONGEST)  # the stamps leapt: who knows how long it was
+        elif self._strays >= _STRAYS:
             silence = max(silence, self._back)
             self._break_off(stamp, silence)
         elif silence > self._tolerated:
@@ -124,9 +143,10 @@ class Continuity:
                 self._break_off(stamp, silence)
         elif silence:
             self._intervals.append(silence)
-        self._back, self._strays, self._last = 0, 0, stamp
+        self._back, self._strays, self._misplaced, self._last = 0, 0, 0, stamp
         self.refused_since = 0
         self._count += 1
+        self._in_order.append(True)
         self._counted.append(stamp)
         while self._counted[0] <= stamp - _RATED:
             self._counted.popleft()
@@ -134,6 +154,17 @@ class Continuity:
             given = self._tolerance
             usual = round(_USUAL * median(self._intervals))
             self._tolerated = min(max(usual, given.shortest), given.longest)
+
+    def _ignore(self, stamp: int, back: int) -> None:
+        """Count a message that is none of the samples."""
+        if back != _REFUSED:
+            self._misplaced += 1
+            self._in_order.append(False)
+        if back != _MISPLACED:
+            self.refused, self.refused_at = self.refused + 1, stamp
+            self.refused_since += 1
+        if back > 0:
+            self._back, self._strays = max(self._back, back), self._strays + 1
 
     def _break_off(self, stamp: int, silence: int) -> None:
         given = self._tolerance

@@ -27,6 +27,8 @@ class InputState:
         """How it does at a tick."""
         flow, last = self.flow, self.flow.last(tick_ns)
         age = tick_ns - last
+        if flow.is_misplaced(tick_ns):
+            return Level.WARN, "its stamps do not fit"
         if flow.refused_since >= _MANY:
             return Level.WARN, "sends what cannot be used"
         if not last:
@@ -56,6 +58,23 @@ class InputState:
         return Status(f"inputs: {self.topic}", level, words, values, hardware_id)
 
 
+@frozen
+class TermsState:
+    """What is to be said of learnt terms: whether the motion is one that they were learnt in."""
+
+    outside: Sequence[str]  # families of those that are beyond their tables
+
+    def verdict(self, tick_ns: int) -> tuple[Level, str]:
+        """How they do at a tick."""
+        if not self.outside:
+            return Level.OK, "within their tables"
+        return Level.WARN, f"fading beyond the table of {', '.join(self.outside)}"
+
+    def status(self, tick_ns: int, hardware_id: str) -> Status:
+        """As a status, with a name that stays."""
+        return Status("inputs: learnt terms", *self.verdict(tick_ns), hardware_id=hardware_id)
+
+
 class InputReporter:
     """Says how inputs do: once in a while, and at once when one gets better or worse."""
 
@@ -65,7 +84,9 @@ class InputReporter:
         self._slot = 0
         self._reports: list[DiagnosticMessage] = []
 
-    def take(self, tick_ns: int, states: Sequence[InputState], hardware_id: str) -> None:
+    def take(
+        self, tick_ns: int, states: Sequence[InputState | TermsState], hardware_id: str
+    ) -> None:
         """Look at all inputs of a stage at a tick."""
         levels = [state.verdict(tick_ns)[0] for state in states]
         slot = tick_ns // self._period

@@ -25,7 +25,7 @@ from tomr_power_model.model.encoders import (
     Triple,
     WheelEstimate,
 )
-from tomr_power_model.model.input_health import InputReporter, InputState
+from tomr_power_model.model.input_health import InputReporter, InputState, TermsState
 from tomr_power_model.model.means import Means
 from tomr_power_model.model.monitors import Monitors
 from tomr_power_model.model.power_models import POWER_MODELS, MeasuredMotion, Windows
@@ -63,7 +63,7 @@ class PowerPredictor:
         self._clock = TickClock(given.ticks)
         timing = CommandTiming(given.ticks.period, given.command_timeout, given.stale)
         self._path = CommandPath(robot, timing, is_compiled=is_compiled)
-        self._resting = RestingDrivers(robot.controller, WHEELS)
+        self._resting = RestingDrivers(robot.controller, WHEELS, robot.supply.nominal_voltage)
         self._encoders = EncoderWindow(
             given.encoder_window, given.ticks.period, given.stale, fastest_wheel(robot)
         )
@@ -131,8 +131,12 @@ class PowerPredictor:
         found = []
         for tick in self._clock.due():
             found.append(self._predict(tick))
-            commands = InputState(COMMANDS, self._commands, is_optional=True)
-            self._health.take(tick, (commands,), self.settings.hardware_id)
+            states: list[InputState | TermsState] = [
+                InputState(COMMANDS, self._commands, is_optional=True)
+            ]
+            if self._robot.unmodelled:
+                states.append(TermsState(self._path.besides.outside))
+            self._health.take(tick, states, self.settings.hardware_id)
         return found
 
     def reports(self) -> list[DiagnosticMessage]:

@@ -7,6 +7,13 @@ law does, on the measured speeds:
 
 for simulation and driver are asked for the same, and both sum up. What a start in motion or
 saturation left different fades while the wheel turns: there motion and simulation tell the sum.
+
+What a push leaves in a driver's sum stays while friction holds the wheel, seconds long, and what
+is expected of the wheel then would be wrong. So while a wheel stands that in the simulation stands
+too, or turns slowly and no faster than it is asked to, the simulation's sum follows the driver's.
+Elsewhere it must not: what a faulty wheel does would be expected of it. No push makes a difference
+as large as an encoder that reads standstill: from such a one on the sums have nothing in common
+until the wheel turns as expected.
 """
 
 from collections.abc import Sequence
@@ -18,21 +25,29 @@ from tomr_power_model.robot import Controller
 _UNKNOWN = float("nan")
 MOVING = 1.0  # rad/s
 FADES = 0.01  # share of the difference in a tick in motion
+STANDS = 0.05  # rad/s
+SLOW = 0.5  # rad/s
+FOLLOWS = 0.5  # share of the difference in a tick
+PUSHED = 0.25  # most that a push leaves, as a share of the supply's voltage
 
 
 class RestingDrivers:
     """Sums of the drivers, one per wheel."""
 
-    def __init__(self, controller: Controller, wheels: int) -> None:
+    def __init__(self, controller: Controller, wheels: int, voltage: float) -> None:
+        """`voltage` of the supply [V]."""
         self._proportional = controller.proportional
         self._integral = controller.integral
         self._wheels = wheels
+        unlike = PUSHED * voltage
+        self._most = unlike / controller.integral if controller.integral else 0.0  # rad
         self.clear()
 
     def clear(self) -> None:
         """What the drivers' sums hold is not known until the next command."""
         self._offset = [_UNKNOWN] * self._wheels  # rad
         self._before = [_UNKNOWN] * self._wheels  # V, at the end of the last tick
+        self._strange = [False] * self._wheels  # differences that no push makes
 
     def voltages(
         self, path: CommandPath, angle: Sequence[float], speed: Sequence[float], share: float
@@ -49,19 +64,38 @@ class RestingDrivers:
             return [_UNKNOWN] * self._wheels
         found = []
         asked, sums = path.wheel(at.ASKED), path.wheel(at.INTEGRAL)
-        turned = path.wheel(at.TURNED)
+        for wheel, apart in enumerate(self._differences(path, angle, speed)):
+            error = asked[wheel] - speed[wheel]
+            known = apart if apart == apart else 0.0
+            found.append(self._proportional * error + self._integral * (sums[wheel] + known))
+        before, self._before = self._before, found
+        return [
+            first + share * (last - first) if first == first else last
+            for first, last in zip(before, found, strict=True)
+        ]
+
+    def _differences(
+        self, path: CommandPath, angle: Sequence[float], speed: Sequence[float]
+    ) -> list[float]:
+        """What each driver's sum is over the simulation's [rad], NaN where not known."""
+        turned, simulated = path.wheel(at.TURNED), path.wheel(at.SPEED)
+        asked = path.wheel(at.ASKED)
+        found = []
         for wheel in range(self._wheels):
             ahead = turned[wheel] - angle[wheel]
             if ahead == ahead and self._offset[wheel] != self._offset[wheel]:
                 self._offset[wheel] = -ahead
             if abs(speed[wheel]) > MOVING:
                 self._offset[wheel] -= FADES * (ahead + self._offset[wheel])
-            known = ahead + self._offset[wheel]
-            total = sums[wheel] + (known if known == known else 0.0)
-            error = asked[wheel] - speed[wheel]
-            found.append(self._proportional * error + self._integral * total)
-        before, self._before = self._before, found
-        return [
-            first + share * (last - first) if first == first else last
-            for first, last in zip(before, found, strict=True)
-        ]
+            apart = ahead + self._offset[wheel]
+            found.append(apart)
+            if abs(apart) > self._most:
+                self._strange[wheel] = True
+            elif abs(speed[wheel]) > MOVING:
+                self._strange[wheel] = False
+            is_slow = abs(simulated[wheel]) < min(SLOW, abs(asked[wheel]) + STANDS)
+            stands = is_slow and abs(speed[wheel]) < STANDS
+            if stands and apart == apart and not self._strange[wheel]:
+                path.add_to_sum(wheel, FOLLOWS * apart)
+                self._offset[wheel] -= FOLLOWS * apart
+        return found

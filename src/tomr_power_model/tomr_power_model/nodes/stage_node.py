@@ -7,7 +7,6 @@ from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from struct import Struct
 from typing import Any
 
 import rclpy
@@ -22,13 +21,14 @@ from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_OK
-from tomr_power_model.errors import InputError
+from tomr_power_model.errors import InputError, one_line
 from tomr_power_model.messages.outgoing import TYPES, DiagnosticMessage, Outgoing
-from tomr_power_model.messages.plain import NANOSECONDS, Plain, build
+from tomr_power_model.messages.plain import Plain, build
 from tomr_power_model.nodes.command_type import CommandType
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
 from tomr_power_model.robot import Robot
 from tomr_power_model.robot.parameters import NAMELESS, ParameterSpec, Value
+from tomr_power_model.topics.flow import Flow
 from tomr_power_model.topics.inputs import Complaints, Input
 
 # Sensors are best effort: a late sample is worth less than the next one. The depth bridges the
@@ -36,8 +36,6 @@ from tomr_power_model.topics.inputs import Complaints, Input
 SENSOR_QOS = QoSProfile(depth=500, reliability=ReliabilityPolicy.BEST_EFFORT)
 STAGE_QOS = QoSProfile(depth=500, reliability=ReliabilityPolicy.RELIABLE)
 
-_STAMP = Struct("<iI")
-_CDR_HEAD = 4  # bytes before the first field
 _SIGNAL_CHECK_S = 0.2  # the longest that a signal waits while no message comes
 
 
@@ -93,23 +91,27 @@ class StageNode(Node):
         clock = self.get_clock()
         self._note("listens to", item.topic, item.type_name)
 
-        def receive(message: Any) -> None:
-            problem = item.take(message, clock.now().nanoseconds)
-            if problem is not None:
-                self.complain(item.topic, problem)
-            advance()
-
-        def receive_bytes(data: bytes) -> None:
-            if item.is_too_close is None or not item.is_too_close(_stamp_of_bytes(data)):
-                receive(deserialize_message(data, message_class(item.type_name)))
-
         def subscribe(type_name: str) -> Any:
+            kind = message_class(type_name)
+            flow = Flow(has_header="header" in kind.get_fields_and_field_types())
+
+            def receive(data: bytes) -> None:
+                now = clock.now().nanoseconds
+                if item.is_too_close is not None and item.is_too_close(flow.stamp_of(data)):
+                    return
+                problem = flow.refuses(data, now)
+                if problem is None:
+                    problem = item.take(deserialize_message(data, kind), now)
+                if problem is not None:
+                    self.complain(item.topic, problem)
+                advance()
+
             return self.create_subscription(
-                message_class(type_name),
+                kind,
                 item.topic,
-                receive if item.is_too_close is None else receive_bytes,
+                receive,
                 qos,
-                raw=item.is_too_close is not None,
+                raw=True,  # what is too much is not even decoded
                 # Each default event adds to every wait: together a sixth of the nodes' CPU.
                 event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
             )
@@ -195,12 +197,6 @@ class StageNode(Node):
         return outlet is not None and outlet.get_subscription_count() > 0
 
 
-def _stamp_of_bytes(data: bytes) -> int:
-    """Stamp [ns] of a serialised message that begins with a header, 0 if it is big-endian."""
-    seconds, nanoseconds = _STAMP.unpack_from(data, _CDR_HEAD) if data[1] & 1 else (0, 0)
-    return int(seconds) * NANOSECONDS + int(nanoseconds)
-
-
 def _of_robot(message: DiagnosticMessage, namespace: str) -> DiagnosticMessage:
     """Robots share /diagnostics: there the names of statuses begin with their namespaces."""
     if not message.topic.startswith("/"):
@@ -255,12 +251,13 @@ def run_node(make: Callable[[], Node], arguments: list[str] | None = None) -> in
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         node = make()
     except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(one_line(f"error: {error}"), file=sys.stderr)
         rclpy.try_shutdown()
         return EXIT_BAD_INPUT
     except RCLError as error:
         # A parameter file that rcl cannot read; its text ends with where it was in C.
-        print(f"error: {str(error).partition(', at ')[0]}: mend the file", file=sys.stderr)
+        reason = str(error).partition(", at ")[0]
+        print(one_line(f"error: {reason}: mend the file"), file=sys.stderr)
         return EXIT_BAD_INPUT
     if isinstance(node, StageNode):
         node.introduce()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.interfaces.typing import Typesdict
 from rosbags.typesys import get_types_from_idl, get_types_from_msg
@@ -27,11 +29,12 @@ def check_definition(connection: Connection, place: str) -> None:
             f"{place}: {topic} is a {kind}, which is no standard message of ROS 2 Jazzy: leave "
             "the topic out, or record another"
         )
-    if connection.msgdef.format == MessageDefinitionFormat.NONE or not connection.msgdef.data:
+    form, text = connection.msgdef.format, connection.msgdef.data
+    if form == MessageDefinitionFormat.NONE or not text:
         return
     # As in Recording._read: only library code runs in the block, and its errors have no base.
     try:
-        own = _defined(connection)
+        own = _defined(kind, form, text)
     except Exception as error:
         raise InputError(
             f"{place}: the definition of {kind} ({topic}) cannot be read ({type(error).__name__}); "
@@ -45,12 +48,12 @@ def check_definition(connection: Connection, place: str) -> None:
             )
 
 
-def _defined(connection: Connection) -> Typesdict:
-    text = connection.msgdef.data
+@lru_cache(maxsize=64)  # recordings repeat the same few, and parsing one takes milliseconds
+def _defined(kind: str, form: MessageDefinitionFormat, text: str) -> Typesdict:
     if len(text) > limits().text_bytes:
         raise ValueError("too large")
-    if connection.msgdef.format == MessageDefinitionFormat.MSG:
-        return get_types_from_msg(text, connection.msgtype)
+    if form == MessageDefinitionFormat.MSG:
+        return get_types_from_msg(text, kind)
     if not text.startswith(_RULE + _HEAD):
         return get_types_from_idl(text)
     found: Typesdict = {}

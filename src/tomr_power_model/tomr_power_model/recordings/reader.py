@@ -61,6 +61,8 @@ class _Storage:
             if mine:
                 streams.append(reader.messages(mine, start=start_ns))
         for connection, stamp_ns, data in merge(*streams, key=itemgetter(1)):
+            if not isinstance(stamp_ns, int) or not isinstance(data, bytes | memoryview):
+                raise ValueError("no stamp or no bytes")  # sqlite3 keeps any type in any column
             yield connection, stamp_ns, self.unpack(data)
 
 

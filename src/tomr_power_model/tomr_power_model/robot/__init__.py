@@ -1,6 +1,6 @@
 """The robot's description: read from robot.yaml or from ROS parameters."""
 
-from tomr_power_model.robot.commissioned import COMMISSIONING, digest_of
+from tomr_power_model.robot.commissioned import COMMISSIONING, digest_of, suite_version
 from tomr_power_model.robot.description import (
     GRAVITY,
     WHEELS,
@@ -39,4 +39,5 @@ __all__ = [
     "robot_from_parameters",
     "shipped_robot",
     "shipped_robots",
+    "suite_version",
 ]

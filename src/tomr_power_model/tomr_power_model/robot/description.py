@@ -9,6 +9,7 @@ from attrs import frozen
 
 from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
+from tomr_power_model.robot.held import too_steep
 from tomr_power_model.robot.parameters import SHARED_PARAMETERS, ParameterSpec, Value, check_all
 from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
 from tomr_power_model.unmodelled import LearntTerm
@@ -143,7 +144,7 @@ def robot_from_parameters(values: Mapping[str, object], place: str) -> Robot:
     number = _Group(checked)
     physics = _physics(values, names, place)
     _check_payload(number("robot.mass"), physics, place)
-    return Robot(
+    robot = Robot(
         wheel_names=names,
         wheel_offset=number("robot.wheel_offset"),
         robot_radius=number("robot.robot_radius"),
@@ -167,6 +168,29 @@ def robot_from_parameters(values: Mapping[str, object], place: str) -> Robot:
         physics=MappingProxyType(physics),
         unmodelled=terms_of(values, names, place),
     )
+    _check_held(robot, place)
+    return robot
+
+
+def why_not_held(robot: Robot, term: LearntTerm) -> str:
+    """Why a learnt term would make a robot's loop unstable, in words; empty if it would not."""
+    return too_steep(
+        term,
+        constants=[motor.wheel_constant for motor in robot.motors],
+        resistances=[motor.resistance for motor in robot.motors],
+        proportional=robot.controller.proportional,
+        wheel_radius=robot.wheel_radius,
+    )
+
+
+def _check_held(robot: Robot, place: str) -> None:
+    for number, term in enumerate(robot.unmodelled, start=1):
+        why = why_not_held(robot, term)
+        if why:
+            raise InputError(
+                f"{place}: unmodelled: learnt term {number} ({term.family.family_id}): {why}: the "
+                "loop would not be stable: learn it anew with more drives, or remove it"
+            )
 
 
 def _check_payload(mass: float, physics: Mapping[str, PerWheel], place: str) -> None:

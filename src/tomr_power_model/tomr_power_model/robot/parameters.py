@@ -7,6 +7,7 @@ from typing import Literal
 from attrs import frozen
 
 from tomr_power_model.errors import InputError, one_line
+from tomr_power_model.files import load_yaml
 
 Value = float | int | bool | str | tuple[float, ...] | tuple[str, ...]
 Kind = Literal["float", "int", "bool", "str", "floats", "strs"]
@@ -155,3 +156,14 @@ def check_all(
         else:
             checked[spec.name] = spec.default
     return checked
+
+
+def parse_assignments(assignments: Iterable[str]) -> dict[str, object]:
+    """`name=value` pairs from a command line, values read as YAML."""
+    values: dict[str, object] = {}
+    for assignment in assignments:
+        name, equals, text = assignment.partition("=")
+        if not equals:
+            raise InputError(f"--set {assignment}: write name=value, as in {assignment}=2.0")
+        values[name.strip()] = load_yaml(text, f"--set {assignment}")
+    return values

@@ -1,6 +1,6 @@
 """What a family of unnamed terms is: what it acts on, and the variables that it depends on."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -21,6 +21,7 @@ class Axis:
     name: str
     unit: str
     knots: int  # along it
+    of: Callable[[Motion], Array]  # each period and place, (n, places): wheels, or one
     is_periodic: bool = False  # an angle
     spacing: float = 0.0  # between knots at most, in the unit; 0: as many as `knots` says
 
@@ -39,16 +40,27 @@ class Family:
     words: ClassVar[str]  # what it is, for a person
     is_strange: ClassVar[bool] = False  # whether no effect of the vocabulary depends on the like
     is_event: ClassVar[bool] = False  # whether it says when, not why: no other drive repeats it
+    holds: ClassVar[str] = ""  # the family whose terms are all among its own
 
-    @staticmethod
-    def coordinates(motion: Motion) -> Array:
-        """Of each period and place, (n, places, axes): wheels, or one."""
-        raise NotImplementedError
+    @classmethod
+    def coordinates(cls, motion: Motion) -> Array:
+        """Of each period and place, (n, places, axes)."""
+        return np.stack([axis.of(motion) for axis in cls.axes], axis=-1)
 
     @staticmethod
     def factor(motion: Motion) -> Array:
         """What the table's value is multiplied by, (n, places) or (1, 1)."""
         return np.ones((1, 1))
+
+
+class Resistance(Family):
+    """Torques against a wheel's motion, either way."""
+
+    acts = "torque"
+
+    @staticmethod
+    def factor(motion: Motion) -> Array:
+        return motion.sign
 
 
 class _Registry(Mapping[str, type[Family]]):

@@ -12,7 +12,10 @@ from tomr_power_model.unmodelled.term import LearntTerm
 Array = NDArray[np.float64]
 
 PREFIX = "unmodelled."
-_FIELDS = ("family", "wheels", "unit", "knots_1", "knots_2", "values")
+VERSION = 1  # of what the fields mean
+_FIELDS = ("version", "robot", "family", "wheels", "unit", "knots_1", "knots_2", "values")
+_OWNER = ("robot.mass", "robot.robot_radius", "robot.wheel_radius")
+_ALIKE = 0.1  # relative: a robot that was measured anew is the same
 _DIGITS = 6
 _UNEVEN = 1e-3  # of the spacing
 
@@ -31,7 +34,29 @@ def terms_of(
             if field not in _FIELDS or not name:
                 raise InputError(f"{place}: {key} is unknown: give {', '.join(_FIELDS)}")
             found.setdefault(name, {})[field] = value
+    for name, fields in found.items():
+        _check_owner(fields, _owner(values), f"{place}: {PREFIX}{name}")
     return tuple(_term(fields, names, f"{place}: {PREFIX}{name}") for name, fields in found.items())
+
+
+def _owner(values: Mapping[str, object]) -> list[float]:
+    """What tells one robot from another: mass, its radius and that of the wheels [kg, m, m]."""
+    return [float(values[key]) for key in _OWNER]  # type: ignore[arg-type]
+
+
+def _check_owner(fields: Mapping[str, object], owner: Sequence[float], place: str) -> None:
+    """Raise InputError for a table of another version, or of another robot."""
+    if fields.get("version") != VERSION:
+        raise InputError(
+            f"{place}.version = {fields.get('version')!r}: only {VERSION} is understood: "
+            "learn it anew with tomr_gap explain"
+        )
+    learnt_on = _numbers(fields, "robot", place)
+    if len(learnt_on) != len(owner) or not np.allclose(learnt_on, owner, rtol=_ALIKE, atol=0.0):
+        raise InputError(
+            f"{place}.robot = {learnt_on.tolist()} is not this one, {list(owner)} (mass, radius, "
+            "wheel radius): learn it anew with tomr_gap explain, or remove it"
+        )
 
 
 def _term(fields: Mapping[str, object], names: Sequence[str], place: str) -> LearntTerm:
@@ -84,13 +109,19 @@ def _knots(points: Array, place: str) -> Array:
     return points
 
 
-def parameters_of(name: str, term: LearntTerm, names: Sequence[str]) -> dict[str, object]:
-    """The flat parameters of a term."""
+def parameters_of(
+    name: str, term: LearntTerm, names: Sequence[str], values: Mapping[str, object]
+) -> dict[str, object]:
+    """The flat parameters of a term; `values` are those of the robot that it was learnt on."""
 
     def rounded(numbers: Array) -> list[float]:
         return [float(f"{number:.{_DIGITS}g}") for number in numbers.ravel()]
 
-    found: dict[str, object] = {"family": term.family.family_id}
+    found: dict[str, object] = {
+        "version": VERSION,
+        "robot": _owner(values),
+        "family": term.family.family_id,
+    }
     if term.wheels:
         found["wheels"] = [names[wheel] for wheel in term.wheels]
     found["unit"] = term.unit

@@ -19,7 +19,7 @@ class Besides:
     torque: Sequence[float] = (0.0, 0.0, 0.0)  # that resists at the wheels [N m]
     driver: Sequence[float] = (0.0, 0.0, 0.0)  # drawn besides by the drivers [W]
     supply: float = 0.0  # drawn besides at the supply [W]
-    outside: bool = False  # beyond some table
+    outside: tuple[str, ...] = ()  # families of the terms that are beyond their tables
 
 
 NOTHING = Besides()
@@ -32,6 +32,7 @@ class _Memory:
     time: float = 0.0  # s
     x: float = 0.0  # m
     y: float = 0.0
+    speed: Array = field(factory=lambda: np.zeros(3))  # of the wheels [rad/s]
     since: Array = field(factory=lambda: np.full(3, LONG_AGO))  # s
     turned: Array = field(factory=lambda: np.full(3, LONG_AGO))  # rad
 
@@ -64,11 +65,13 @@ class OnlineTerms:
         middle = heading + 0.5 * wz * tick
         cos, sin = np.cos(middle), np.sin(middle)
         velocity = cos * vx - sin * vy, sin * vx + cos * vy
-        moves = np.abs(wheels) >= STANDING
+        # A wheel that has turned about stood in between.
+        moves = (np.abs(wheels) >= STANDING) & (wheels * before.speed >= 0.0)
         now = _Memory(
             before.time + tick,
             before.x + tick * velocity[0],
             before.y + tick * velocity[1],
+            wheels,
             np.where(moves, np.minimum(before.since + tick, LONG_AGO), 0.0),
             np.where(moves, np.minimum(before.turned + tick * np.abs(wheels), LONG_AGO), 0.0),
         )
@@ -81,7 +84,7 @@ class OnlineTerms:
             time=body(now.time),
             speed=wheels[None],
             current=np.array([current], dtype=np.float64),
-            angle=np.nan_to_num(np.array([angle], dtype=np.float64)),
+            angle=np.array([angle], dtype=np.float64),
             heading=body(middle),
             x=body(now.x),
             y=body(now.y),
@@ -97,7 +100,7 @@ class OnlineTerms:
             _summed([item.torque[0] for item in found]),
             _summed([item.driver[0] for item in found]),
             sum(float(item.supply[0]) for item in found),
-            any(term.outside(motion) > 0.0 for term in self._terms),
+            tuple(term.family.family_id for term in self._terms if term.outside(motion) > 0.0),
         )
 
 

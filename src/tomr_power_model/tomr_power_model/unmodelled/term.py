@@ -27,12 +27,6 @@ class Actions:
     driver: Array  # power drawn besides by the drivers [W], (n, 3)
     supply: Array  # power drawn besides at the supply alone [W], (n,)
 
-    def plus(self, other: "Actions") -> "Actions":
-        """Both together."""
-        return Actions(
-            self.torque + other.torque, self.driver + other.driver, self.supply + other.supply
-        )
-
 
 @frozen(eq=False)
 class LearntTerm:
@@ -62,21 +56,30 @@ class LearntTerm:
         else:
             found = torque if self.family.acts == "torque" else driver
             for wheel, values in zip(self.wheels, self.values, strict=True):
-                place = min(wheel, coordinates.shape[1] - 1)
-                found[:, wheel] = factor[:, wheel] * self._at(values, coordinates[:, place])
+                at = _of_place(coordinates, wheel)
+                found[:, wheel] = factor[:, wheel] * self._at(values, at)
         return Actions(torque, driver, supply)
 
     def _at(self, values: Array, at: Array) -> Array:
-        return value_at(self.family, self.knots, values, at)
+        """Nothing where the variables are not known."""
+        known = np.all(np.isfinite(at), axis=1, keepdims=True)
+        found = value_at(self.family, self.knots, values, np.where(known, at, 0.0))
+        return np.where(known[:, 0], found, 0.0)
 
     def outside(self, motion: Motion) -> float:
-        """Share of a drive that lies beyond the table."""
+        """Share of a drive that lies beyond the table, where the term acts."""
         ones = np.ones(math.prod(len(points) for points in self.knots))
+        coordinates = self.family.coordinates(motion)
         found = [
-            self._at(ones, column) < 1.0 - _ROUNDING
-            for column in np.moveaxis(self.family.coordinates(motion), 1, 0)
+            (self._at(ones, at) < 1.0 - _ROUNDING) & np.all(np.isfinite(at), axis=1)
+            for at in (_of_place(coordinates, wheel) for wheel in self.wheels or (0,))
         ]
         return float(np.mean(found))
+
+
+def _of_place(coordinates: Array, wheel: int) -> Array:
+    """Those of a wheel, or of the body where wheels share them, (n, axes)."""
+    return coordinates[:, min(wheel, coordinates.shape[1] - 1)]
 
 
 def basis_at(family: type[Family], knots: tuple[Array, ...], at: Array) -> Array:

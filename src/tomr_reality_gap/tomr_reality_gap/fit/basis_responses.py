@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from tomr_power_model.estimation.noise import Local, rows_of
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_reality_gap.alignment.channels import MOTOR_KINDS
+from tomr_reality_gap.alignment.motion import motion_in
 from tomr_reality_gap.fit.dataset import Dataset
-from tomr_reality_gap.mismatch.probes import Family, families, motion_of
+from tomr_reality_gap.mismatch.probes import Family, families
 
 Array = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ def basis_responses(
         orders: at which its power swings with wheel angles [1/rev].
         only: names of variables; None: all.
     """
-    motions = [motion_of(item, robot, item.run(robot)) for item in dataset.simulations]
+    motions = [motion_in(item, robot) for item in dataset.simulations]
     tried = tuple(
         family for family in families(motions, orders) if only is None or family.variable in only
     )

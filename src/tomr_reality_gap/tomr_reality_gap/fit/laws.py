@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tomr_power_model.unmodelled import LearntTerm
-from tomr_reality_gap.explanation import Estimate, FittedLaw
+from tomr_reality_gap.explanation import FittedLaw
 from tomr_reality_gap.fit.learnt import Table
+from tomr_reality_gap.rules import estimate_of
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,7 @@ _TINY = 1e-9
 _NEGLIGIBLE = 1e-6  # of the largest eigenvalue
 _POSITIVE = ("slack", "radius", "decay")
 _BEYOND = 1.0  # of the range, on either side, that a law is trusted beyond the table
+SMOOTH = 0.25  # of the distance between knots, of a step
 _FINER = {1: 4, 2: 2}  # knots of a law's table for each of the learnt one, by its axes
 
 
@@ -39,6 +41,8 @@ class Law:
     units: Mapping[str, str]
     starts: Callable[[Array, Array], Sequence[Sequence[float]]]  # places (k, axes), values (c, k)
     value: Callable[[Array, Array], Array]  # of parameters and places: (c, k) or (k,)
+    # The same of one variable x as an effect's file has it; WIDTH: over which a step is smooth.
+    formula: str = ""
 
 
 def _apart(p: Array, at: Array) -> tuple[Array, Array]:
@@ -104,6 +108,7 @@ def _harmonic_starts(at: Array, values: Array) -> list[list[float]]:
 
 _SPEEDS = ("torque.speed", "driver.speed", "driver.current", "torque.current", "supply.current")
 _MEMORY = ("torque.since_stand", "torque.turned", "torque.time")
+_STEP = "/ (1.0 + math.exp(min((threshold - x) / WIDTH, 50.0)))"
 _X, _Y = {"x": "m", "y": "m"}, {"x": "m/s", "y": "m/s"}
 LAWS: tuple[Law, ...] = (
     Law(
@@ -145,6 +150,7 @@ LAWS: tuple[Law, ...] = (
         {"size": "*", "exponent": ""},
         lambda at, values: [[_extreme(values) / at.max() ** n, n] for n in (0.5, 1.0, 2.0, 3.0)],
         lambda p, at: p[0] * np.maximum(at[:, 0], _TINY) ** np.clip(p[1], 0.0, 6.0),
+        "size * x**exponent",
     ),
     Law(
         "square beyond a threshold",
@@ -155,6 +161,7 @@ LAWS: tuple[Law, ...] = (
             [_extreme(values) / at.max() ** 2, part * at.max()] for part in (0.1, 0.3, 0.5, 0.7)
         ],
         lambda p, at: p[0] * at[:, 0] ** 2 * _above(at[:, 0], p[1]),
+        f"size * x * x {_STEP}",
     ),
     Law(
         "step",
@@ -163,6 +170,7 @@ LAWS: tuple[Law, ...] = (
         {"size": "*", "threshold": "variable"},
         _curve_starts(0.1, 0.3, 0.5, 0.7),
         lambda p, at: p[0] * _above(at[:, 0], p[1]),
+        f"size {_STEP}",
     ),
     Law(
         "exponential",
@@ -171,6 +179,7 @@ LAWS: tuple[Law, ...] = (
         {"size": "*", "decay": "variable"},
         _curve_starts(0.05, 0.15, 0.4),
         lambda p, at: p[0] * np.exp(-np.minimum(at[:, 0] / max(abs(p[1]), _TINY), 50.0)),
+        "size * math.exp(-min(x / decay, 50.0))",
     ),
     Law(
         "periodic",
@@ -179,13 +188,14 @@ LAWS: tuple[Law, ...] = (
         {"size": "*", "order": "1/rev", "phase": "rad"},
         _harmonic_starts,
         lambda p, at: p[0] * np.sin(round(p[1]) * at[:, 0] + p[2]),
+        "size * math.sin(order * x + phase)",
     ),
 )
 
 
 def _above(values: Array, threshold: float) -> Array:
     """A step as smooth as the table."""
-    width = 0.25 * float(np.min(np.diff(np.unique(values)))) + _TINY
+    width = SMOOTH * float(np.min(np.diff(np.unique(values)))) + _TINY
     return np.asarray(1.0 / (1.0 + np.exp(np.clip((threshold - values) / width, -50.0, 50.0))))
 
 
@@ -223,14 +233,20 @@ class LawAt:
     @property
     def fitted(self) -> FittedLaw:
         """As a report has it."""
-        variable, estimates = self.table.family.axes[0].unit, {}
+        estimates = {}
         for (name, unit), value, sigma in zip(
             self.law.units.items(), self.parameters.tolist(), self.sigma.tolist(), strict=True
         ):
-            value = abs(value) if name in _POSITIVE else value
-            unit = {"*": self.learnt.unit, "variable": variable}.get(unit, unit)
-            estimates[name] = Estimate(value, value - 1.96 * sigma, value + 1.96 * sigma, unit)
+            value, least = (abs(value), 0.0) if name in _POSITIVE else (value, -math.inf)
+            unit = unit_of(unit, self.learnt)
+            bounds = (least, math.inf)
+            estimates[name] = estimate_of(value, sigma, offset=value, unit=unit, bounds=bounds)
         return FittedLaw(self.law.name, self.law.words, estimates, self.share)
+
+
+def unit_of(unit: str, term: LearntTerm) -> str:
+    """Of a law's parameter, from what it is in `Law.units`."""
+    return {"*": term.unit, "variable": term.family.axes[0].unit}.get(unit, unit)
 
 
 def laws_of(table: Table, learnt: LearntTerm, evidence: Evidence) -> list[LawAt]:

@@ -6,12 +6,11 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.drive.motion import turned_angle
 from tomr_power_model.effects.scales import Scales
-from tomr_power_model.geometry.kinematics import wheels_to_twist
 from tomr_power_model.robot import WHEELS, Robot
-from tomr_power_model.unmodelled import Actions, Family, LearntTerm, Motion, motion_of
+from tomr_power_model.unmodelled import Actions, Family, LearntTerm, Motion
 from tomr_power_model.unmodelled.term import basis_at, smoothness
+from tomr_reality_gap.alignment.motion import motion_in
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.basis_responses import own_rows
 from tomr_reality_gap.fit.dataset import Dataset
@@ -23,22 +22,6 @@ _MOST_KNOTS = 90
 _LENGTH = 1.5  # knots over which a table is smooth
 _LEAST_FLOOR = 0.2  # m: who goes no farther sees no floor
 _SMALL = 1e-9
-
-
-def motion_in(simulation: RecordingSimulation, robot: Robot) -> Motion:
-    """The motion that a robot makes in a recording."""
-    run, line, recorded = simulation.run(robot), simulation.timeline, simulation.recorded
-    angle = [
-        np.interp(line.middle, recorded.encoder_time, turned_angle(recorded, wheel))
-        for wheel in range(WHEELS)
-    ]
-    return motion_of(
-        wheels_to_twist(robot),
-        line.middle,
-        speed=run.speed,
-        current=run.current,
-        angle=np.stack(angle, axis=1),
-    )
 
 
 def with_terms(

@@ -14,11 +14,11 @@ from tomr_power_model.estimation.linear_gaussian import Gram, Matrix, solve
 from tomr_power_model.estimation.noise import Noise, rows_of
 from tomr_power_model.estimation.parameter import prior_stds
 from tomr_power_model.robot import Robot
+from tomr_reality_gap.alignment.motion import motion_in
 from tomr_reality_gap.alignment.simulation import RecordingSimulation, Tick
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection
 from tomr_reality_gap.fit.jacobian import linearise
-from tomr_reality_gap.fit.learnt import motion_in
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.refine import refine
 from tomr_reality_gap.fit.unmodelled import Unmodelled

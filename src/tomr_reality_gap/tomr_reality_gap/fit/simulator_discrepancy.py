@@ -16,15 +16,16 @@ from tomr_power_model.estimation.discrepancy import SIMULATOR
 from tomr_power_model.estimation.linear_gaussian import Gram, solve
 from tomr_power_model.estimation.noise import Local, noise_of, rows_of
 from tomr_power_model.robot import WHEELS, Robot
+from tomr_power_model.unmodelled import Motion
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.basis_responses import basis_responses
 from tomr_reality_gap.fit.dataset import Dataset
-from tomr_reality_gap.mismatch.probes import Family, Motion
+from tomr_reality_gap.mismatch.probes import Family
 
 Array = NDArray[np.float64]
 
-_VARIABLES = ("signed wheel speed [rad/s]", "load current [sqrt W]", "direction of travel [rad]")
+_VARIABLES = ("signed wheel speed [rad/s]", "motor current [A]", "direction of travel [rad]")
 
 
 @frozen

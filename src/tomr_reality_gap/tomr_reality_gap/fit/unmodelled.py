@@ -5,6 +5,7 @@ of what the named model leaves there. What changes with time alone can predict n
 judged by moments left out between others, and called not repeatable.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,10 +19,11 @@ from tomr_power_model.estimation.statistics import autocorrelation_time, robust_
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_power_model.unmodelled import FAMILIES, Family, LearntTerm, Motion
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
+from tomr_reality_gap.alignment.motion import motion_in
 from tomr_reality_gap.explanation import FittedLaw, Shape
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.laws import Evidence, laws_of
-from tomr_reality_gap.fit.learnt import Table, motion_in
+from tomr_reality_gap.fit.learnt import Table
 from tomr_reality_gap.fit.polish import polished
 
 Array = NDArray[np.float64]
@@ -32,10 +34,12 @@ _MOMENTS = 4
 _INEXACT = 0.01  # of a channel's standard deviation, besides its noise
 _SHOWS = 1.0  # eigenvalue of a nuisance's information beyond which it is fitted
 _WHEEL_SHARE = 0.1  # of the wheel that shows most
+_SURELY = 3.0  # standard deviations of a sum of squares of noise
 _TOLD = 0.3  # share of what is left that a term must predict
 _SMALL = 0.02  # of a channel's standard deviation: less is not worth a word
 _LAGS = 80
 _LAW = 0.8  # of the squares that are left: a law that explains so much is no chance
+_AS_MUCH = 0.95  # of what a wider family predicts
 _NEAR = 0.35  # of the best share: worth a closer look
 _EVENT = 0.45  # of what a term of time explains: as much of it, and it is repeatable
 
@@ -88,7 +92,7 @@ class Unmodelled:
     learnt: LearntTerm  # the table
     laws: tuple[FittedLaw, ...]  # that explain about as much, simplest first
     term: LearntTerm  # what is simulated: the first law, or else the table
-    share: float  # of what is left that it predicts where it was not fitted
+    share: float  # see `predicted_share`
     is_repeatable: bool
     evidence: float  # log, correlation of what is left accounted for
     is_large: bool  # in some channel, against what it shows in all
@@ -111,26 +115,39 @@ class Tried:
 
 
 def predicted_share(rest: Remainder, columns: Sequence[Array], labels: NDArray[np.intp]) -> float:
-    """Share of what is left, beyond noise, that columns predict of blocks left out one by one."""
+    """Share of what is left, beyond noise, that columns predict of blocks left out one by one.
+
+    At most 1, at least -1: predicted worse than by nothing. NaN where no more than noise is left.
+    """
     own = np.concatenate(columns, axis=1) * rest.weight[:, None]
-    joined, q = np.concatenate([rest.base, own], axis=1), rest.base.shape[1]
-    grams = [
-        Gram.of(joined[labels == label], rest.residual[labels == label])
-        for label in np.unique(labels)
-    ]
+    without, beside = (
+        _squares_unfitted(rest.residual, part, labels)
+        for part in (rest.base, np.concatenate([rest.base, own], axis=1))
+    )
+    # Channel by channel: one that the model knows better than its noise hides none of the others'.
+    parts = rows_of(rest.dataset.channels)
+    sums = [(float(without[part].sum()), int(part.stop - part.start)) for part in parts]
+    beyond = sum(
+        square - count
+        for square, count in sums
+        if square - count > _SURELY * math.sqrt(2.0 * count)
+    )
+    if not beyond:
+        return math.nan
+    return max(-1.0, min(1.0, float((without - beside).sum()) / beyond))
+
+
+def _squares_unfitted(residual: Array, columns: Array, labels: NDArray[np.intp]) -> Array:
+    """Squares of what columns leave of each block, fitted to the others, (n,)."""
+    blocks = [labels == label for label in np.unique(labels)]
+    grams = [Gram.of(columns[rows], residual[rows]) for rows in blocks]
     matrix = np.sum([gram.matrix for gram in grams], axis=0)
     vector = np.sum([gram.vector for gram in grams], axis=0)
-    square = float(rest.residual @ rest.residual)
-    left = []
-    for count in (q, joined.shape[1]):
-        error = 0.0
-        for gram in grams:
-            others = Gram(matrix - gram.matrix, vector - gram.vector, square)
-            at = solve(others, range(count)).mean
-            part = gram.matrix[:count, :count]
-            error += gram.square - 2.0 * float(at @ gram.vector[:count]) + float(at @ part @ at)
-        left.append(error)
-    return (left[0] - left[1]) / max(left[0] - len(rest.residual), 1e-9)
+    left = residual.copy()
+    for rows, gram in zip(blocks, grams, strict=True):
+        others = Gram(matrix - gram.matrix, vector - gram.vector, 0.0)
+        left[rows] -= columns[rows] @ solve(others, range(columns.shape[1])).mean
+    return np.asarray(left**2)
 
 
 def unmodelled_effect(
@@ -144,7 +161,7 @@ def unmodelled_effect(
     tried = families_tried(rest, robot, scales, motions)
     if not tried:
         return None
-    lasting = next((item for item in tried if not item.table.family.is_event), None)
+    lasting = _narrowest([item for item in tried if not item.table.family.is_event])
     events = next((item for item in tried if item.table.family.is_event), None)
     best = lasting or events
     if lasting and events and lasting.share < max(_EVENT * events.share, _TOLD):
@@ -159,10 +176,19 @@ def unmodelled_effect(
     return fitted(rest, best, robot, motions)
 
 
+def _narrowest(tried: Sequence[Tried]) -> Tried | None:
+    """The best, or the family within it that predicts as much."""
+    best = tried[0] if tried else None
+    for item in tried:
+        if best is not None and item.table.family.family_id == best.table.family.holds:
+            return item if item.share > _AS_MUCH * best.share else best
+    return best
+
+
 def families_tried(
     rest: Remainder, robot: Robot, scales: Scales, motions: Sequence[Motion]
 ) -> list[Tried]:
-    """All families that the recordings can show, best first."""
+    """All families that the recordings can show, best first; none where only noise is left."""
     stretch, moment = rest.blocks
     kinds = {channel.kind for channel in rest.dataset.channels}
     found = []
@@ -173,7 +199,9 @@ def families_tried(
             continue
         labels = moment if family.is_event else stretch
         columns = table.columns(rest.dataset, robot, motions, is_exact=False)
-        found.append(Tried(table, predicted_share(rest, columns, labels)))
+        share = predicted_share(rest, columns, labels)
+        if not math.isnan(share):
+            found.append(Tried(table, share))
     most = max((item.share for item in found), default=0.0)
     for number, item in enumerate(found):
         family = item.table.family

@@ -9,6 +9,7 @@ from attrs import evolve
 from tqdm import tqdm
 
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_OK
+from tomr_power_model.errors import one_line
 from tomr_power_model.files import make_folder, write_together
 from tomr_reality_gap.arguments import add_quiet, add_tolerance, tolerances_of
 from tomr_reality_gap.fleet.cases import Defaults, cases_of
@@ -89,7 +90,7 @@ def _fleet(options: argparse.Namespace) -> int:
         print(f"written: {options.out / overview.HTML}")
     bad = [item for item in overview.in_order(found) if not item.explained]
     for item in bad:
-        print(f"error: {item.name}: {item.sentence}", file=sys.stderr)
+        print(one_line(f"error: {item.name}: {item.sentence}"), file=sys.stderr)
     return EXIT_BAD_INPUT if bad else EXIT_OK
 
 

@@ -12,10 +12,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.drive.motion import turned_angle
-from tomr_power_model.geometry.kinematics import wheels_to_twist
-from tomr_power_model.robot import Robot
-from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
+from tomr_power_model.unmodelled import Motion
 
 Array = NDArray[np.float64]
 
@@ -23,55 +20,9 @@ _BUMPS = 10
 _LOWEST = (1.0, 2.0, 3.0, 4.0)  # harmonics
 _MOST_HARMONICS = 10
 _ALONE = 0.1  # orders closer than this are one
-_MOVING = 0.1  # rad/s: the sign of slower motion is not sure
 _ACROSS = 3  # bumps along each side of the floor
 _LEAST_FLOOR = 0.2  # m: who goes no farther sees no floor
 PLACE = "place on the floor [m]"
-
-
-@frozen
-class Motion:
-    """A robot's motion in a recording, by driver periods; wheels (n, 3), body (n, 1)."""
-
-    speed: Array  # rad/s
-    sign: Array  # of it, fading at standstill
-    angle: Array  # of the wheels as joint_states count them [rad]
-    load: Array  # root of the motors' copper loss [sqrt W]
-    time: Array  # s
-    direction: Array  # of travel in base_link [rad]
-    heading: Array  # rad
-    x: Array  # m, from dead reckoning
-    y: Array
-
-
-def motion_of(simulation: RecordingSimulation, robot: Robot, run: Run) -> Motion:
-    """The motion that a robot makes in a recording; `run` is of `simulation.run(robot)`."""
-    speed, line = run.speed, simulation.timeline
-    twist = speed @ wheels_to_twist(robot).T
-    heading = np.cumsum(run.yaw_rate) * line.period
-    cos, sin = np.cos(heading), np.sin(heading)
-    time = line.middle
-    # As measured: simulated speeds would add up to another angle after a hundred turns.
-    angle = np.stack(
-        [
-            np.interp(
-                time, simulation.recorded.encoder_time, turned_angle(simulation.recorded, wheel)
-            )
-            for wheel in range(speed.shape[1])
-        ],
-        axis=1,
-    )
-    return Motion(
-        speed=speed,
-        sign=np.tanh(speed / _MOVING),
-        angle=angle,
-        load=np.sqrt(run.copper),
-        time=time[:, None],
-        direction=np.arctan2(twist[:, 1], twist[:, 0])[:, None],
-        heading=heading[:, None],
-        x=(np.cumsum(cos * twist[:, 0] - sin * twist[:, 1]) * line.period)[:, None],
-        y=(np.cumsum(sin * twist[:, 0] + cos * twist[:, 1]) * line.period)[:, None],
-    )
 
 
 Variable = Callable[[Motion], tuple[Array, Array]]  # its values, and the sign of the torque
@@ -81,7 +32,7 @@ _SMOOTH: Mapping[str, Variable] = MappingProxyType(
         "wheel speed [rad/s]": lambda m: (np.abs(m.speed), m.sign),
         "signed wheel speed [rad/s]": lambda m: (m.speed, np.abs(m.sign)),
         "time [s]": lambda m: (m.time, m.sign),
-        "load current [sqrt W]": lambda m: (m.load, m.sign),
+        "motor current [A]": lambda m: (np.abs(m.current), m.sign),
     }
 )
 _PERIODIC: Mapping[str, Variable] = MappingProxyType(

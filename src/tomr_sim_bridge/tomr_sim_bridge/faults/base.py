@@ -14,11 +14,18 @@ from tomr_power_model.robot.parameters import ParameterSpec, Value, check_all
 Vector = NDArray[np.float64]
 
 
+def setting_spec(
+    name: str, description: str, unit: str, default: float, minimum: float, maximum: float
+) -> ParameterSpec:
+    """A number that may be changed while the simulation runs."""
+    return ParameterSpec(
+        name, description, "float", default, unit, minimum, maximum, read_only=False
+    )
+
+
 def severity_spec(description: str) -> ParameterSpec:
     """Severity of a fault: 0 is off."""
-    return ParameterSpec(
-        "severity", description, default=0.0, minimum=0.0, maximum=1.0, read_only=False
-    )
+    return setting_spec("severity", description, "", 0.0, 0.0, 1.0)
 
 
 WHEEL_SPEC = ParameterSpec(
@@ -34,15 +41,7 @@ WHEEL_SPEC = ParameterSpec(
 
 def size_spec(name: str, unit: str, default: float, maximum: float, what: str) -> ParameterSpec:
     """What a fault changes at severity 1; below it is that much less."""
-    return ParameterSpec(
-        name,
-        f"{what}, at severity 1",
-        unit=unit,
-        default=default,
-        minimum=0.0,
-        maximum=maximum,
-        read_only=False,
-    )
+    return setting_spec(name, f"{what}, at severity 1", unit, default, 0.0, maximum)
 
 
 @frozen

@@ -4,26 +4,25 @@ import math
 
 import numpy as np
 
-from tomr_power_model.robot.parameters import ParameterSpec
 from tomr_sim_bridge.faults.base import (
     Fault,
     FaultActions,
     Vector,
     register,
+    setting_spec,
     severity_spec,
     size_spec,
 )
 
 _CREEP = 0.05  # m/s: slower motion is resisted by less than the whole drag
 _AIR_DENSITY = 1.2  # kg/m^3
-AZIMUTH_SPEC = ParameterSpec(
+AZIMUTH_SPEC = setting_spec(
     "azimuth",
     "direction of the force in the world, anti-clockwise from x",
-    unit="rad",
-    default=0.0,
-    minimum=-2.0 * math.pi,
-    maximum=2.0 * math.pi,
-    read_only=False,
+    "rad",
+    0.0,
+    -2.0 * math.pi,
+    2.0 * math.pi,
 )
 
 
@@ -42,24 +41,15 @@ class Pushed(Fault):
         severity_spec("0: off; share of the force"),
         size_spec("force", "N/kg", 3.0, 20.0, "force over the mass of the robot"),
         AZIMUTH_SPEC,
-        ParameterSpec(
+        setting_spec(
             "lever",
             "of the force about the vertical through base_link, anti-clockwise",
-            unit="m",
-            default=0.0,
-            minimum=-2.0,
-            maximum=2.0,
-            read_only=False,
+            "m",
+            0.0,
+            -2.0,
+            2.0,
         ),
-        ParameterSpec(
-            "rise",
-            "time in which the force grows; 0: at once",
-            unit="s",
-            default=0.0,
-            minimum=0.0,
-            maximum=1e4,
-            read_only=False,
-        ),
+        setting_spec("rise", "time in which the force grows; 0: at once", "s", 0.0, 0.0, 1e4),
     )
 
     _begin: float | None = None  # s
@@ -85,14 +75,8 @@ class LoadTowed(Fault):
     parameters = (
         severity_spec("0: off; share of the drag"),
         size_spec("drag", "N", 15.0, 100.0, "force against the motion of the hitch"),
-        ParameterSpec(
-            "hitch",
-            "place of the hitch on the x axis of base_link",
-            unit="m",
-            default=-0.2,
-            minimum=-5.0,
-            maximum=5.0,
-            read_only=False,
+        setting_spec(
+            "hitch", "place of the hitch on the x axis of base_link", "m", -0.2, -5.0, 5.0
         ),
     )
 
@@ -116,15 +100,7 @@ class Tethered(Fault):
     parameters = (
         severity_spec("0: off; share of the stiffness"),
         size_spec("stiffness", "N/m", 20.0, 200.0, "force over the length beyond the slack"),
-        ParameterSpec(
-            "slack",
-            "length that costs no force",
-            unit="m",
-            default=0.2,
-            minimum=0.0,
-            maximum=1e3,
-            read_only=False,
-        ),
+        setting_spec("slack", "length that costs no force", "m", 0.2, 0.0, 1e3),
     )
 
     _anchor: Vector | None = None  # m
@@ -152,15 +128,7 @@ class Windy(Fault):
         severity_spec("0: off; share of the wind's speed"),
         size_spec("speed", "m/s", 10.0, 50.0, "of the wind"),
         AZIMUTH_SPEC,
-        ParameterSpec(
-            "drag_area",
-            "drag coefficient times frontal area",
-            unit="m^2",
-            default=0.2,
-            minimum=0.0,
-            maximum=10.0,
-            read_only=False,
-        ),
+        setting_spec("drag_area", "drag coefficient times frontal area", "m^2", 0.2, 0.0, 10.0),
     )
 
     def apply(self, actions: FaultActions) -> bool:

@@ -3,15 +3,13 @@
 import numpy as np
 
 from tomr_power_model.robot.parameters import ParameterSpec
-from tomr_sim_bridge.faults.base import Fault, FaultActions, register, severity_spec
+from tomr_sim_bridge.faults.base import Fault, FaultActions, register, setting_spec, severity_spec
 
 SLIPPERIEST = 0.02  # traction coefficient at severity 1: lubricated
 
 
 def _place(name: str, description: str, minimum: float = -1e4) -> ParameterSpec:
-    return ParameterSpec(
-        name, description, unit="m", default=0.0, minimum=minimum, maximum=1e4, read_only=False
-    )
+    return setting_spec(name, description, "m", 0.0, minimum, 1e4)
 
 
 @register

@@ -1,11 +1,11 @@
 """The power sensor of a wheel misleads; the robot itself is well."""
 
-from tomr_power_model.robot.parameters import ParameterSpec
 from tomr_sim_bridge.faults.base import (
     WHEEL_SPEC,
     Fault,
     FaultActions,
     register,
+    setting_spec,
     severity_spec,
 )
 
@@ -45,14 +45,7 @@ class PowerSensorScaled(Fault):
     parameters = (
         WHEEL_SPEC,
         severity_spec("0: off; how much of the way from 1 to the factor"),
-        ParameterSpec(
-            "factor",
-            "measured over true power, at severity 1",
-            default=0.5,
-            minimum=-2.0,
-            maximum=10.0,
-            read_only=False,
-        ),
+        setting_spec("factor", "measured over true power, at severity 1", "", 0.5, -2.0, 10.0),
     )
 
     def apply(self, actions: FaultActions) -> bool:
@@ -69,15 +62,7 @@ class PowerSensorBiased(Fault):
     parameters = (
         WHEEL_SPEC,
         severity_spec("0: off; share of the bias"),
-        ParameterSpec(
-            "bias",
-            "measured less true power, at severity 1",
-            unit="W",
-            default=4.0,
-            minimum=-1e3,
-            maximum=1e3,
-            read_only=False,
-        ),
+        setting_spec("bias", "measured less true power, at severity 1", "W", 4.0, -1e3, 1e3),
     )
 
     def apply(self, actions: FaultActions) -> bool:

@@ -17,6 +17,7 @@ from tomr_power_model.cli import run_main
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages import plain
 from tomr_power_model.messages.intake import Unusable, stamp_of, twist_of
+from tomr_power_model.messages.motion import transform_of
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.messages.types import TEXT
 from tomr_power_model.nodes.command_line import node_arguments
@@ -33,7 +34,7 @@ from tomr_power_model.robot.parameters import CMD_VEL_TYPE, ParameterSpec, Value
 from tomr_power_model.robot.urdf import urdf_of
 from tomr_sim_bridge.faults import all_parameters, split_name
 from tomr_sim_bridge.plant.drivers import COMMAND_TIMEOUT
-from tomr_sim_bridge.plant.samples import Sample, transform_of
+from tomr_sim_bridge.plant.samples import Sample
 from tomr_sim_bridge.plant.simulation import Simulation
 
 DESCRIPTION = """\

@@ -116,7 +116,8 @@ def build_model(robot: Robot, design: PlantDesign, timestep: float) -> mujoco.Mj
         timestep: integration step [s]; it must divide the control period.
 
     Raises:
-        InputError: wheels heavier or with more inertia than the whole robot.
+        InputError: wheels heavier or with more inertia than the whole robot, or sizes beyond what
+            MuJoCo takes.
     """
     root = ET.Element("mujoco", model="tomr")
     ET.SubElement(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
@@ -152,7 +153,13 @@ def build_model(robot: Robot, design: PlantDesign, timestep: float) -> mujoco.Mj
             motorconst=_text(motor.torque_constant), resistance=_text(motor.resistance),
             gear=_text(motor.gear_ratio),
         )  # fmt: skip
-    return mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
+    try:
+        return mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
+    except ValueError as error:
+        reason = str(error).partition("\n")[0]
+        raise InputError(
+            f"this robot cannot be simulated ({reason}): check its masses and radii"
+        ) from None
 
 
 def _add_inertial(

@@ -16,7 +16,7 @@ class TorqueRipple(Effect):
     parameters = MappingProxyType(
         {
             "torque": EffectParameter("N m", prior_std=0.05),
-            "order": EffectParameter("1/rev", 1e-2, start=1.0, prior_std=10.0),
+            "order": EffectParameter("1/rev", 1e-2, neutral=1.0, start=1.0, prior_std=10.0),
             "phase": EffectParameter("rad", -1e2, 1e2),
         }
     )

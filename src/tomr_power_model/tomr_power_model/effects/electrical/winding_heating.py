@@ -25,7 +25,9 @@ class WindingHeating(Effect):
     parameters = MappingProxyType(
         {
             "thermal_resistance": EffectParameter("K/W", prior_std=5.0),
-            "time_constant": EffectParameter("s", 1e-2, 1e6, start=100.0, prior_std=100.0),
+            "time_constant": EffectParameter(
+                "s", 1e-2, 1e6, neutral=100.0, start=100.0, prior_std=100.0
+            ),
             "initial": EffectParameter("K", -100.0, 500.0, default=0.0, prior_std=20.0),
         }
     )

@@ -4,26 +4,21 @@ from typing import ClassVar
 
 import numpy as np
 
-from tomr_power_model.unmodelled.base import Array, Axis, Family, family
+from tomr_power_model.unmodelled.base import Array, Axis, Family, Resistance, family
 from tomr_power_model.unmodelled.motion import Motion
 
 
+def _flowing(motion: Motion) -> Array:
+    return np.abs(motion.current)
+
+
 @family
-class TorqueByCurrent(Family):
+class TorqueByCurrent(Resistance):
     """A loss in the gear that grows otherwise than its load."""
 
     family_id = "torque.current"
-    acts = "torque"
-    axes: ClassVar = (Axis("motor current", "A", 10),)
+    axes: ClassVar = (Axis("motor current", "A", 10, _flowing),)
     words = "a torque that depends on the motor's load"
-
-    @staticmethod
-    def coordinates(motion: Motion) -> Array:
-        return np.abs(motion.current)[..., None]
-
-    @staticmethod
-    def factor(motion: Motion) -> Array:
-        return motion.sign
 
 
 @family
@@ -32,12 +27,8 @@ class DriverByCurrent(Family):
 
     family_id = "driver.current"
     acts = "driver"
-    axes: ClassVar = (Axis("motor current", "A", 12),)
+    axes: ClassVar = (Axis("motor current", "A", 12, _flowing),)
     words = "power lost in a driver that depends on its motor's current"
-
-    @staticmethod
-    def coordinates(motion: Motion) -> Array:
-        return np.abs(motion.current)[..., None]
 
 
 @family
@@ -46,9 +37,9 @@ class SupplyByCurrent(Family):
 
     family_id = "supply.current"
     acts = "supply"
-    axes: ClassVar = (Axis("sum of the motor currents", "A", 10),)
+    axes: ClassVar = (
+        Axis(
+            "sum of the motor currents", "A", 10, lambda m: _flowing(m).sum(axis=1, keepdims=True)
+        ),
+    )
     words = "power lost at the supply that depends on what the motors carry"
-
-    @staticmethod
-    def coordinates(motion: Motion) -> Array:
-        return np.asarray(np.abs(motion.current).sum(axis=1)[:, None, None])

@@ -2,31 +2,19 @@
 
 from typing import ClassVar
 
-import numpy as np
+from tomr_power_model.unmodelled.base import Axis, Family, Resistance, family
 
-from tomr_power_model.unmodelled.base import Array, Axis, Family, family
-from tomr_power_model.unmodelled.motion import Motion
-
-_FLOOR = (Axis("x", "m", 7), Axis("y", "m", 7))
+_FLOOR = (Axis("x", "m", 7, lambda m: m.x), Axis("y", "m", 7, lambda m: m.y))
 
 
 @family
-class TorqueByPlace(Family):
+class TorqueByPlace(Resistance):
     """A floor that is not the same everywhere."""
 
     family_id = "torque.place"
-    acts = "torque"
     axes: ClassVar = _FLOOR
     words = "a resistance that depends on the place on the floor"
     is_strange = True
-
-    @staticmethod
-    def coordinates(motion: Motion) -> Array:
-        return np.stack([motion.x, motion.y], axis=-1)
-
-    @staticmethod
-    def factor(motion: Motion) -> Array:
-        return motion.sign
 
 
 @family
@@ -38,7 +26,3 @@ class ForceByPlace(Family):
     axes: ClassVar = _FLOOR
     words = "a force on the body that depends on where it is"
     is_strange = True
-
-    @staticmethod
-    def coordinates(motion: Motion) -> Array:
-        return np.stack([motion.x, motion.y], axis=-1)

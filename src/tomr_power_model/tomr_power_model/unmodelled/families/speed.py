@@ -4,26 +4,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from tomr_power_model.unmodelled.base import Array, Axis, Family, family
+from tomr_power_model.unmodelled.base import Array, Axis, Family, Resistance, family
 from tomr_power_model.unmodelled.motion import Motion
+
+_SPEED = (Axis("wheel speed", "rad/s", 12, lambda m: np.abs(m.speed)),)
 
 
 @family
-class TorqueBySpeed(Family):
+class TorqueBySpeed(Resistance):
     """A friction that is no law of the vocabulary."""
 
     family_id = "torque.speed"
-    acts = "torque"
-    axes: ClassVar = (Axis("wheel speed", "rad/s", 12),)
+    axes: ClassVar = _SPEED
     words = "a torque that depends on the wheel's speed"
-
-    @staticmethod
-    def coordinates(motion: Motion) -> Array:
-        return np.abs(motion.speed)[..., None]
-
-    @staticmethod
-    def factor(motion: Motion) -> Array:
-        return motion.sign
 
 
 @family
@@ -32,12 +25,9 @@ class TorqueBySignedSpeed(Family):
 
     family_id = "torque.signed_speed"
     acts = "torque"
-    axes: ClassVar = (Axis("signed wheel speed", "rad/s", 16),)
+    axes: ClassVar = (Axis("signed wheel speed", "rad/s", 16, lambda m: m.speed),)
     words = "a torque that depends on the wheel's speed and the way it turns"
-
-    @staticmethod
-    def coordinates(motion: Motion) -> Array:
-        return motion.speed[..., None]
+    holds = "torque.speed"
 
     @staticmethod
     def factor(motion: Motion) -> Array:
@@ -50,9 +40,5 @@ class DriverBySpeed(Family):
 
     family_id = "driver.speed"
     acts = "driver"
-    axes: ClassVar = (Axis("wheel speed", "rad/s", 12),)
+    axes: ClassVar = _SPEED
     words = "power drawn by a driver that depends on its wheel's speed"
-
-    @staticmethod
-    def coordinates(motion: Motion) -> Array:
-        return np.abs(motion.speed)[..., None]

@@ -2,56 +2,49 @@
 
 from typing import ClassVar
 
-from tomr_power_model.unmodelled.base import Array, Axis, Family, family
-from tomr_power_model.unmodelled.motion import Motion
+from tomr_power_model.unmodelled.base import Axis, Family, Resistance, family
 
-_TIME = (Axis("time", "s", 12, spacing=1.0),)
-
-
-class _ByTime(Family):
-    axes: ClassVar = _TIME
-    is_event = True
-
-    @staticmethod
-    def coordinates(motion: Motion) -> Array:
-        return motion.time[..., None]
+_TIME = (Axis("time", "s", 12, lambda m: m.time, spacing=1.0),)
 
 
 @family
-class TorqueByTime(_ByTime):
+class TorqueByTime(Resistance):
     """Something that drags now and then, or runs in."""
 
     family_id = "torque.time"
-    acts = "torque"
+    axes: ClassVar = _TIME
     words = "a resistance that changes with time"
-
-    @staticmethod
-    def factor(motion: Motion) -> Array:
-        return motion.sign
+    is_event = True
 
 
 @family
-class ForceByTime(_ByTime):
+class ForceByTime(Family):
     """Gusts, pushes."""
 
     family_id = "force.time"
     acts = "force"
+    axes: ClassVar = _TIME
     words = "a force on the body that changes with time"
+    is_event = True
 
 
 @family
-class DriverByTime(_ByTime):
+class DriverByTime(Family):
     """Something that a driver does now and then."""
 
     family_id = "driver.time"
     acts = "driver"
+    axes: ClassVar = _TIME
     words = "power drawn by a driver that changes with time"
+    is_event = True
 
 
 @family
-class SupplyByTime(_ByTime):
+class SupplyByTime(Family):
     """A consumer that comes and goes."""
 
     family_id = "supply.time"
     acts = "supply"
+    axes: ClassVar = _TIME
     words = "power drawn at the supply that changes with time"
+    is_event = True

@@ -2,10 +2,7 @@
 
 from typing import ClassVar
 
-import numpy as np
-
-from tomr_power_model.unmodelled.base import Array, Axis, Family, family
-from tomr_power_model.unmodelled.motion import Motion
+from tomr_power_model.unmodelled.base import Axis, Family, family
 
 
 @family
@@ -14,10 +11,9 @@ class ForceByVelocity(Family):
 
     family_id = "force.velocity"
     acts = "force"
-    axes: ClassVar = (Axis("velocity along x", "m/s", 5), Axis("velocity along y", "m/s", 5))
+    axes: ClassVar = (
+        Axis("velocity along x", "m/s", 5, lambda m: m.velocity_x),
+        Axis("velocity along y", "m/s", 5, lambda m: m.velocity_y),
+    )
     words = "a force on the body that depends on its velocity in the world"
     is_strange = True
-
-    @staticmethod
-    def coordinates(motion: Motion) -> Array:
-        return np.stack([motion.velocity_x, motion.velocity_y], axis=-1)

@@ -1,0 +1,114 @@
+"""Robots that tell currents, or their total power alone."""
+
+import dataclasses
+import json
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from unittest.mock import Mock, patch
+
+import numpy as np
+import pytest
+import yaml
+from attrs import evolve
+
+from tomr_commission.cli import main
+from tomr_commission.injected import kinds_for
+from tomr_commission.observed import Observed
+from tomr_commission.rehearsal import Shoved
+from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS
+from tomr_power_model.recordings import RecordingWriter, open_recording
+from tomr_power_model.robot import read_sections
+
+BAGS = Path(__file__).resolve().parents[3] / "bags"
+HERE = "tomr_commission.commission"
+REPORT = {"sentence": "", "findings": [], "unexplained_share": 0.0, "holdout": None}
+SILENT = (*MOTORS, *ENCODERS)
+
+
+@pytest.fixture
+def rehearse() -> Iterator[Mock]:
+    """The long steps done at once; the simulated shoves."""
+    explained = {"report": REPORT, "explained": "", "files": {}, "levels": []}
+    with (
+        patch.dict(os.environ, OMP_NUM_THREADS="1"),
+        patch("tomr_fault_diag.residuals.calibrated._LEAST", 100),
+        patch(f"{HERE}.explain_drives", return_value=explained),
+        patch(f"{HERE}.try_simulated", return_value=[]),
+        patch(f"{HERE}.rehearse", return_value=Shoved((0.0,) * 60, (0.0,) * 20, 0.1)) as rehearse,
+    ):
+        yield rehearse
+
+
+def derived(path: Path, change: Callable[[str, Any], Any]) -> Path:
+    """The healthy recording with other messages; None drops one."""
+    with open_recording(BAGS / "square") as recording, RecordingWriter(path) as writer:
+        for topic, kind, message, received_ns in recording.messages():
+            changed = change(topic, message)
+            if changed is not None:
+                writer.write(topic, kind, changed, received_ns)
+    return path
+
+
+def commissioned(bag: Path, robot: str, out: Path) -> dict[str, Any]:
+    assert main([str(bag), "--robot", robot, "--out", str(out), "--quiet"]) == 1  # it is short
+    found: dict[str, Any] = json.loads((out / "commission.json").read_text())
+    assert [reason["remedy"] for reason in found["reasons"]] == [
+        "record the drive of tomr_commission plan, and give it as well"
+    ]
+    return found
+
+
+def test_currents_leave_the_alarm_level_where_it_is(tmp_path: Path, rehearse: Mock) -> None:
+    def without_voltage(topic: str, message: Any) -> Any:
+        is_motor = topic.endswith("/power")
+        return dataclasses.replace(message, voltage=np.nan) if is_motor else message
+
+    found = commissioned(derived(tmp_path / "bag", without_voltage), "reference", tmp_path / "out")
+    assert not rehearse.called
+    assert found["alarm"]["caution"] >= ClassifierSettings().caution
+    assert any("the robot tells currents, not powers" in note for note in found["notes"])
+    assert 0.0 < found["bands"]["current"] < 0.15  # A, the default
+    floors = {floor["kind"]: floor for floor in found["floors"]}
+    assert floors["power sensor biased"]["unit"] == "A"
+    assert floors["power sensor biased"]["everywhere"] <= 0.5
+    assert "motor draws more" not in floors
+    assert "<b>not known</b>" in (tmp_path / "out" / "commission.html").read_text()
+
+
+def test_total_alone_is_all_that_is_rehearsed(tmp_path: Path, rehearse: Mock) -> None:
+    bag = derived(
+        tmp_path / "bag", lambda topic, message: None if topic.endswith("/power") else message
+    )
+    # Told apart from sensors that were forgotten: in one line.
+    assert main([str(bag), "--robot", "reference", "--out", str(tmp_path / "no")]) == 2
+    sections = {name: {**flat} for name, flat in read_sections("reference").items()}
+    sections["/**"]["measurement.source"] = "total_only"
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(
+        yaml.safe_dump({name: {"ros__parameters": flat} for name, flat in sections.items()})
+    )
+    found = commissioned(bag, str(robot), tmp_path / "out")
+    assert all(call.args[4].silent == SILENT for call in rehearse.call_args_list)
+    assert found["trials"] == []  # no motor's sensor to fail
+    kinds = {line["kind"] for line in found["regimes"]}
+    assert kinds == {"total power", "wheel speed"}
+
+
+def test_silenced_residuals_are_unknown(healthy: Observed) -> None:
+    assert healthy.silent == ()
+    quiet = healthy.silenced(SILENT)
+    assert quiet.silent == SILENT
+    assert (quiet.missing[:, SILENT] == "not measured on this robot").all()
+    assert np.array_equal(quiet.residual[:, 0], healthy.residual[:, 0])
+    assert kinds_for(quiet) == ()
+
+
+def test_more_current_is_put_into_motors_whose_total_is_not_told(healthy: Observed) -> None:
+    units = healthy.units.copy()
+    units[list(SILENT)] = "A"
+    amperes = evolve(healthy, units=units)
+    assert not any(kind.in_total for kind in kinds_for(amperes))
+    assert any(kind.in_total for kind in kinds_for(amperes.silenced([0])))

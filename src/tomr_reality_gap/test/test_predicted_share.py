@@ -1,0 +1,60 @@
+"""What a term predicts of blocks that it was not fitted to, on residuals made by hand."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tomr_reality_gap.fit.unmodelled import Remainder, predicted_share
+
+SAMPLES, BLOCKS = 4000, 8
+LABELS = np.tile(np.arange(SAMPLES // 2) * 2 * BLOCKS // SAMPLES, 2)  # of two channels alike
+
+
+def _share(residual: np.ndarray, column: np.ndarray) -> float:
+    """One column, nothing else that is not exactly known."""
+    half = SimpleNamespace(time=np.arange(SAMPLES // 2))
+    rest = Remainder(
+        SimpleNamespace(channels=(half, half)),  # type: ignore[arg-type]
+        residual,
+        np.empty((SAMPLES, 0)),
+        np.ones(SAMPLES),
+    )
+    return predicted_share(rest, [column[:, None]], LABELS)
+
+
+def _made() -> tuple[np.ndarray, np.ndarray]:
+    random = np.random.default_rng(4)
+    return random.standard_normal(SAMPLES), random.standard_normal(SAMPLES)
+
+
+def test_a_column_predicts_its_part_of_what_is_left_beyond_noise() -> None:
+    """Two columns of the same size, of which one is tried."""
+    noise, column = _made()
+    other = np.random.default_rng(5).standard_normal(SAMPLES)
+    assert _share(2.0 * column + noise, column) == pytest.approx(1.0, abs=0.02)
+    assert _share(2.0 * column + 2.0 * other + noise, column) == pytest.approx(0.5, abs=0.03)
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.5, 0.0])
+def test_of_noise_alone_no_share_is_stated(scale: float) -> None:
+    """Nor where its size was taken for larger than it is."""
+    noise, column = _made()
+    assert math.isnan(_share(scale * noise, column))
+
+
+def test_a_channel_known_better_than_its_noise_hides_nothing_of_another() -> None:
+    """The first half hardly differs at all: less is left on the whole than noise would."""
+    noise, column = _made()
+    known = np.arange(SAMPLES) < SAMPLES // 2
+    residual = np.where(known, 0.01 * noise, noise + 0.5 * column)
+    assert residual @ residual < SAMPLES
+    assert _share(residual, np.where(known, 0.0, column)) == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_share_is_bounded_either_way() -> None:
+    """Nothing left once predicted, noise included; a column that is far larger in one block."""
+    _, column = _made()
+    assert _share(2.0 * column, column) == 1.0
+    assert _share(2.0 * column, np.where(LABELS == 3, 30.0, 1.0) * column) == -1.0

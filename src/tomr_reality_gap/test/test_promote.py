@@ -1,0 +1,256 @@
+"""From a learnt term's law to an effect: its file, its test, and how it joins the vocabulary."""
+
+import argparse
+import json
+import math
+import re
+import runpy
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from tomr_power_model.effects import EFFECTS, Wheel
+from tomr_power_model.effects.user import load_effects, load_named_effects
+from tomr_power_model.errors import InputError
+from tomr_power_model.robot import read_description, robot_from_parameters
+from tomr_power_model.unmodelled import FAMILIES, LearntTerm
+from tomr_power_model.unmodelled.described import parameters_of
+from tomr_reality_gap.arguments import add_inputs, inputs_of
+from tomr_reality_gap.cli import main
+from tomr_reality_gap.fit.laws import LAWS, SMOOTH
+from tomr_reality_gap.promote.learnt_law import learnt_law
+
+WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
+CUBE = {
+    "size": {"value": 1e-4, "ci95": [9e-5, 1.1e-4], "unit": "N m"},
+    "exponent": {"value": 3.0, "ci95": [2.9, 3.1], "unit": ""},
+}
+
+
+@pytest.fixture(autouse=True)
+def _vocabulary() -> Iterator[None]:
+    """As it was before, whatever a test lets join."""
+    before = dict(EFFECTS)
+    yield
+    for effect_id in list(EFFECTS):
+        if effect_id not in before:
+            EFFECTS.remove(effect_id)
+
+
+def _explained(
+    folder: Path, family: str = "torque.speed", laws: dict[str, object] | None = None
+) -> Path:
+    """What tomr_gap explain wrote: a description with a term, and its report."""
+    values = dict(read_description("reference"))
+    knots = (np.linspace(0.0, 12.0, 13),) * len(FAMILIES[family].axes)
+    rows = {"torque": 3, "driver": 3, "force": 2, "supply": 1}[FAMILIES[family].acts]
+    wheels = (0, 1, 2) if rows == 3 else ()
+    term = LearntTerm(FAMILIES[family], wheels, knots, np.zeros((rows, 13 ** len(knots))))
+    values.update(parameters_of("term_1", term, WHEELS, values))
+    path = folder / "robot_explained.yaml"
+    path.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}), encoding="utf-8")
+    told = [{"law": k, "parameters": v} for k, v in (laws or {"power law": CUBE}).items()]
+    report = {"findings": [{"effect": "unknown", "learnt": {"family": family, "laws": told}}]}
+    path.with_name("report.json").write_text(json.dumps(report), encoding="utf-8")
+    return path
+
+
+def _told(**values: float) -> dict[str, object]:
+    """Each known to a tenth."""
+    return {
+        name: {"value": value, "ci95": [value - 0.1 * abs(value), value + 0.1 * abs(value)]}
+        for name, value in values.items()
+    }
+
+
+@pytest.mark.parametrize("law", [law for law in LAWS if law.formula], ids=lambda law: law.name)
+def test_the_formula_of_a_law_is_the_law(law: object) -> None:
+    at = np.linspace(0.0, 8.0, 33)
+    values = {"size": 0.3, "exponent": 1.7, "threshold": 3.1, "decay": 1.3, "order": 2.0,
+              "phase": 0.4}  # fmt: skip
+    p = [values[name] for name in law.units]  # type: ignore[attr-defined]
+    expected = law.value(np.array(p), at[:, None])  # type: ignore[attr-defined]
+    names = {**values, "math": math, "WIDTH": SMOOTH * 0.25}
+    found = [eval(law.formula, {**names, "x": x}) for x in at]  # type: ignore[attr-defined]
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("family", "law", "told", "stem"),
+    [
+        ("torque.speed", "power law", CUBE, "power_law_by_speed"),
+        ("torque.speed", "step", _told(size=-0.1, threshold=4.0), "step_by_speed"),
+        ("torque.speed", "exponential", _told(size=0.1, decay=2.0), "exponential_by_speed"),
+        ("driver.current", "square beyond a threshold", _told(size=0.2, threshold=3.0),
+         "square_beyond_a_threshold_by_current"),
+        ("torque.angle", "periodic", _told(size=0.05, order=3.0, phase=-0.5),
+         "periodic_by_angle"),
+    ],
+)  # fmt: skip
+def test_a_promoted_law_is_an_effect_that_passes_its_own_test(
+    tmp_path: Path, family: str, law: str, told: dict[str, object], stem: str
+) -> None:
+    out = tmp_path / "effects"
+    explained = _explained(tmp_path, family, {law: told})
+    assert main(["promote", str(explained), "--law", law, "--out", str(out)]) == 0
+    assert sorted(path.name for path in out.iterdir()) == [f"{stem}.py", f"test_{stem}.py"]
+    own = runpy.run_path(str(out / f"test_{stem}.py"))
+    (mark,) = own["test_the_law_is_as_it_was_learnt"].pytestmark
+    for x, expected in mark.args[1]:
+        own["test_the_law_is_as_it_was_learnt"](x, expected)
+        assert expected != 0.0 or law == "square beyond a threshold"
+    own["test_what_was_learnt_is_within_the_ranges"]()
+    made = EFFECTS[f"learnt.{stem}"]
+    assert made.__doc__ is not None
+    assert "with 95 % intervals" in made.__doc__
+    assert made.prior is not None
+    size = made.parameters["size"]
+    assert made.prior.sign == (1 if size.start > 0.0 else -1)
+    assert (size.minimum < 0.0, size.maximum > 0.0) == (size.start < 0.0, size.start > 0.0)
+
+
+def test_units_ranges_and_priors_are_those_of_the_intervals(tmp_path: Path) -> None:
+    assert main(["promote", str(_explained(tmp_path)), "--out", str(tmp_path / "e")]) == 0
+    assert load_effects(tmp_path / "e") == ["learnt.power_law_by_speed"]
+    made = EFFECTS["learnt.power_law_by_speed"]
+    size, exponent = made.parameters["size"], made.parameters["exponent"]
+    assert (size.unit, size.minimum, size.neutral) == ("N m", 0.0, 0.0)
+    assert (size.maximum, size.prior_std, size.start) == pytest.approx((2e-4, 1e-5, 1e-4))
+    assert (exponent.minimum, exponent.maximum) == pytest.approx((2.0, 4.0))
+    assert made.prior is not None
+    assert made.prior.sign == 1
+    wheel = Wheel(5.0, 50.0, 0.0, 0.0, 0.05, 20.0)
+    assert made.moving_torque(1e-4, 3.0, wheel) == pytest.approx(0.0125)
+    assert made.moving_torque(1e-4, 3.0, wheel._replace(speed=-5.0)) == pytest.approx(-0.0125)
+    key = "physics.learnt.power_law_by_speed"
+    values = {**read_description("reference"), f"{key}.size": 1e-4, f"{key}.exponent": 3.0}
+    assert robot_from_parameters(values, "made").effect("learnt.power_law_by_speed", 1)
+    with pytest.raises(InputError, match=r"size = 0\.001 .*at most 0\.0002"):
+        robot_from_parameters({**values, f"{key}.size": 1e-3}, "made")
+
+
+@pytest.mark.parametrize(
+    ("family", "laws", "more", "message"),
+    [
+        ("force.place", {"spring": _told(stiffness=4.0, slack=0.5, x=0.1, y=0.1)}, (),
+         "no effect acts on that"),
+        ("torque.speed", {"power law": CUBE}, ("--term", "term_2"), "has no learnt term 'term_2'"),
+        ("torque.speed", {"power law": CUBE}, ("--law", "step"), "no law 'step'.* power law"),
+        ("torque.speed", {"moon": CUBE}, (), "it has none"),
+        ("torque.speed", {"power law": {**CUBE, "size": {"value": 1.0, "ci95": [None, None]}}}, (),
+         "no value with an interval"),
+        ("torque.speed", {"power law": {**CUBE, "size": {"value": math.inf, "ci95": [0, 1]}}}, (),
+         "not finite"),
+        ("torque.speed", {"step": _told(size=0.1, threshold=-1.0)}, (), "its threshold is -1"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_promoted_is_refused_with_one_line(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    family: str,
+    laws: dict[str, object],
+    more: tuple[str, ...],
+    message: str,
+) -> None:
+    explained = _explained(tmp_path, family, laws)
+    assert main(["promote", str(explained), *more, "--out", str(tmp_path / "effects")]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert re.search(message, said)
+    assert not (tmp_path / "effects").exists()
+
+
+def test_laws_are_those_of_the_terms_own_family(tmp_path: Path) -> None:
+    explained = _explained(tmp_path)
+    report = json.loads(explained.with_name("report.json").read_text(encoding="utf-8"))
+    laws = [{"law": "power law", "parameters": _told(size=9.0, exponent=0.5)}]
+    other = {"effect": "unknown", "learnt": {"family": "driver.current", "laws": laws}}
+    both = {"findings": [other, *report["findings"], other, {"effect": "friction.coulomb"}]}
+    explained.with_name("report.json").write_text(json.dumps(both), encoding="utf-8")
+    found = learnt_law(explained).parameters
+    assert {name: item.value for name, item in found.items()} == {"size": 1e-4, "exponent": 3.0}
+
+
+def test_a_description_without_a_report_or_a_term_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    explained = _explained(tmp_path)
+    explained.with_name("report.json").write_text("[1, 2]", encoding="utf-8")
+    assert main(["promote", str(explained), "--out", str(tmp_path / "e")]) == 2
+    explained.with_name("report.json").unlink()
+    assert main(["promote", str(explained), "--out", str(tmp_path / "e")]) == 2
+    plain = tmp_path / "plain.yaml"
+    values = read_description("reference")
+    plain.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}), encoding="utf-8")
+    assert main(["promote", str(plain), "--out", str(tmp_path / "e")]) == 2
+    first, second, third = capsys.readouterr().err.splitlines()
+    assert "is no report of tomr_gap explain" in first
+    assert "cannot be read" in second
+    assert "has no learnt term" in third
+
+
+OWN = '''
+from types import MappingProxyType
+from tomr_power_model.effects import Effect, EffectParameter, effect
+
+@effect
+class Own(Effect):
+    """Nothing much."""
+
+    effect_id = "{effect_id}"
+    label = "Nothing much"
+    parameters = MappingProxyType({{name: EffectParameter("W") for name in {names!r}}})
+
+    @staticmethod
+    def driver_power(*given: float) -> float:
+        return 0.0
+'''
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (OWN.format(effect_id="friction.coulomb", names=["a"]), "is there already"),
+        (OWN.format(effect_id="own.x", names=["a", "b", "c", "d"]), "one to 3 parameters"),
+        (OWN.format(effect_id="own.x", names=[]), "one to 3 parameters"),
+        ("this is no Python", "cannot be used"),
+        ("import nothing_of_that_name", "cannot be used"),
+        ("x = 1", "no file registers an effect"),
+    ],
+)
+def test_files_that_are_no_effects_are_refused(tmp_path: Path, text: str, message: str) -> None:
+    before = dict(EFFECTS)
+    (tmp_path / "own.py").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=message):
+        load_effects(tmp_path)
+    assert dict(EFFECTS) == before
+
+
+def test_effects_of_a_user_join_only_where_their_folder_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "own.py").write_text(OWN.format(effect_id="own.x", names=["a"]), encoding="utf-8")
+    (tmp_path / "test_own.py").write_text("raise RuntimeError", encoding="utf-8")
+    monkeypatch.delenv("TOMR_EFFECTS", raising=False)
+    load_named_effects()
+    assert "own.x" not in EFFECTS
+    monkeypatch.setenv("TOMR_EFFECTS", str(tmp_path))
+    load_named_effects()
+    assert "own.x" in EFFECTS
+    assert load_effects(tmp_path) == ["own.x"]  # the same file again is no clash
+    with pytest.raises(InputError, match="holds no effects"):
+        load_effects(tmp_path / "nowhere")
+
+
+def test_an_option_names_the_folder(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(OWN.format(effect_id="own.x", names=["a"]), encoding="utf-8")
+    parser = argparse.ArgumentParser()
+    add_inputs(parser)
+    given = ["--robot", "reference", "--real", str(tmp_path)]
+    inputs_of(parser.parse_args(given))
+    assert "own.x" not in EFFECTS
+    inputs_of(parser.parse_args([*given, "--effects", str(tmp_path)]))
+    assert "own.x" in EFFECTS

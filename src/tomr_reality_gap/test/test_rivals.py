@@ -1,0 +1,109 @@
+"""What the data can hardly tell from a finding, from responses made by hand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from attrs import evolve, frozen
+
+from tomr_power_model.estimation.parameter import Parameter
+from tomr_reality_gap.fit.rivals import Responses
+from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
+
+SAMPLES = 2000
+RANDOM = np.random.default_rng(7)
+NUISANCE, SHOWN, OTHER = RANDOM.standard_normal((3, SAMPLES))
+
+
+def _hypothesis(name: str, **changes: object) -> Hypothesis:
+    """One size, from nothing up; `changes` are its parameter's."""
+    given = {"lower": 0.0, "upper": 100.0, **changes}
+    return Hypothesis(name, ("body",), (Parameter("size", (name,), "", 1.0, **given),))  # type: ignore[arg-type]
+
+
+@frozen
+class _Model:
+    """As far as rivals look at one."""
+
+    hypotheses: tuple[Hypothesis, ...]
+    offsets: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def names(self) -> set[str]:
+        return {item.name for item in self.hypotheses}
+
+    @property
+    def described(self) -> SimpleNamespace:
+        return SimpleNamespace(robot=self.hypotheses)
+
+    def without(self, number: int) -> "_Model":
+        kept = [item for place, item in enumerate(self.hypotheses) if place != number]
+        return evolve(self, hypotheses=tuple(kept))
+
+    def swapped(self, number: int, item: Hypothesis, offsets: tuple[float, ...]) -> "_Model":
+        changed = list(self.hypotheses)
+        changed[number] = item
+        return _Model(tuple(changed), (offsets,))
+
+
+def _nearest(*shown: tuple[Hypothesis, np.ndarray], size: float = 3.0) -> list[_Model]:
+    """Rivals of the first, of which so much is in the data; the first column is a nuisance."""
+    hypotheses, columns = zip(*shown, strict=True)
+    found, by_name = hypotheses[0], {item.name: column for item, column in shown}
+    matrix = np.stack([NUISANCE, *columns], axis=1)
+    value = size * columns[0] + RANDOM.standard_normal(SAMPLES)
+    places = {item.key: slice(row, row + 1) for row, item in enumerate(hypotheses, start=1)}
+    model = _Model((found,))
+    jacobian = SimpleNamespace(
+        matrix=matrix,
+        sensors=slice(1, 1),
+        model=_Model(()),
+        own=(),
+        candidates=places,
+    )
+    best = SimpleNamespace(model=model, value=size * columns[0])
+
+    def predict(robots: list[tuple[Hypothesis, ...]]) -> list[np.ndarray]:
+        return [
+            sum((size * by_name[item.name] for item in robot), np.zeros(SAMPLES))
+            for robot in robots
+        ]
+
+    responses = Responses(
+        SimpleNamespace(predict=predict, value=value),  # type: ignore[arg-type]
+        SimpleNamespace(
+            rounds=[SimpleNamespace(jacobian=jacobian)],
+            noise=SimpleNamespace(weight=np.ones(SAMPLES)),
+        ),  # type: ignore[arg-type]
+        hypotheses,
+    )
+    return responses.nearest(best, 0)  # type: ignore[arg-type, return-value]
+
+
+def test_what_spans_nearly_the_same_is_a_rival_with_the_size_that_stands_in() -> None:
+    """At 1 and 3 degrees of the finding; a loss of 1/2 |d|^2 sin^2 of 2.7 and 25; at 90 of 9000."""
+    found, near, far, none = map(_hypothesis, ("found", "near", "far", "none"))
+    tried = _nearest(
+        (found, SHOWN),
+        (near, 2.0 * (SHOWN + 0.017 * OTHER)),
+        (far, SHOWN - 0.052 * OTHER),
+        (none, OTHER),
+    )
+    assert [model.hypotheses[0].effect for model in tried] == ["near", "far"]
+    assert tried[0].offsets[0] == pytest.approx((1.5,), rel=0.02)
+
+
+def test_what_only_nuisances_tell_apart_is_a_rival() -> None:
+    found, beside, near = map(_hypothesis, ("found", "beside", "near"))
+    tried = _nearest((found, SHOWN), (beside, SHOWN + NUISANCE), (near, SHOWN + 0.03 * OTHER))
+    assert [model.hypotheses[0].effect for model in tried] == ["beside", "near"]
+
+
+@pytest.mark.parametrize(
+    "changes", [{"lower": -100.0, "upper": 0.0}, {"discrete_offset": 1.0}, {"upper": 2.0}]
+)
+def test_what_would_have_to_be_beyond_its_bounds_or_has_no_derivative_is_none(
+    changes: dict[str, float],
+) -> None:
+    found, same = _hypothesis("found"), _hypothesis("same", **changes)
+    assert _nearest((found, SHOWN), (same, SHOWN)) == []

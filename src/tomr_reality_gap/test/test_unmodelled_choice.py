@@ -1,0 +1,106 @@
+"""Which family is taken for what no name explains, from what each of them predicts."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from tomr_power_model.unmodelled import FAMILIES
+from tomr_reality_gap import explain
+from tomr_reality_gap.fit import unmodelled
+from tomr_reality_gap.fit.unmodelled import unmodelled_effect
+
+PLACE, SPEED, TIME = "force.place", "torque.speed", "supply.time"
+SIGNED = "torque.signed_speed"
+
+
+def _chosen(
+    monkeypatch: pytest.MonkeyPatch,
+    shares: dict[str, float],
+    *,
+    law: float = 0.0,
+    is_sure: bool = False,
+) -> str | None:
+    """The family that is fitted; what depends on place is a law that explains `law`."""
+
+    def fitted(rest: object, item: SimpleNamespace, *_: object) -> SimpleNamespace:
+        family = item.table.family
+        laws = ("a law",) if family.is_strange and law else ()
+        return SimpleNamespace(family=family, laws=laws, explained=law)
+
+    tried = [
+        SimpleNamespace(table=SimpleNamespace(family=FAMILIES[name]), share=share)
+        for name, share in sorted(shares.items(), key=lambda item: -item[1])
+    ]
+    monkeypatch.setattr(unmodelled, "families_tried", lambda *_: tried)
+    monkeypatch.setattr(unmodelled, "fitted", fitted)
+    rest = SimpleNamespace(dataset=SimpleNamespace(simulations=()))
+    found = unmodelled_effect(rest, None, None, is_sure=is_sure)  # type: ignore[arg-type]
+    return None if found is None else found.family.family_id
+
+
+@pytest.mark.parametrize(
+    ("shares", "expected"),
+    [
+        ({PLACE: 0.9, SPEED: 0.8, TIME: 0.95}, PLACE),  # what predicts a stretch comes first
+        ({PLACE: 0.42, TIME: 0.9}, PLACE),  # 0.45 of what time explains: repeatable
+        ({PLACE: 0.39, TIME: 0.9}, TIME),
+        ({PLACE: 0.29, TIME: 0.31}, TIME),  # too little to be told
+        ({PLACE: 0.29, TIME: 0.29}, None),
+        ({SPEED: 0.31}, SPEED),
+        ({SPEED: 0.59, SIGNED: 0.61}, SPEED),  # the way it turns tells no more
+        ({SPEED: 0.57, SIGNED: 0.61}, SIGNED),
+        ({SPEED: 0.61, SIGNED: 0.59}, SPEED),
+        ({SIGNED: 0.61, PLACE: 0.6}, SIGNED),
+        ({SPEED: 0.29}, None),
+        ({TIME: 0.31}, TIME),
+        ({}, None),
+    ],
+)
+def test_what_predicts_stretches_is_repeatable_and_what_only_follows_time_is_not(
+    monkeypatch: pytest.MonkeyPatch, shares: dict[str, float], expected: str | None
+) -> None:
+    assert _chosen(monkeypatch, shares) == expected
+
+
+def test_where_something_is_there_for_sure_little_is_told_as_well(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert _chosen(monkeypatch, {SPEED: 0.1}, is_sure=True) == SPEED
+    assert _chosen(monkeypatch, {}, is_sure=True) is None
+
+
+@pytest.mark.parametrize(("law", "expected"), [(0.81, PLACE), (0.79, TIME)])
+def test_a_law_of_place_that_explains_nearly_all_is_no_event(
+    monkeypatch: pytest.MonkeyPatch, law: float, expected: str
+) -> None:
+    """Few stretches of one drive meet again."""
+    assert _chosen(monkeypatch, {PLACE: 0.1, TIME: 0.9}, law=law) == expected
+
+
+@pytest.mark.parametrize(
+    ("share", "size", "has_names", "looked"),
+    [
+        (0.5, 0.03, True, True),  # names that leave much are doubted, however little that is
+        (0.5, 0.03, False, False),
+        (0.2, 0.03, True, False),
+        (0.2, 0.16, False, True),
+        (0.2, 0.14, True, False),
+    ],
+)
+def test_what_is_left_is_looked_into_where_it_is_large_or_names_leave_much(
+    monkeypatch: pytest.MonkeyPatch, share: float, size: float, has_names: bool, looked: bool
+) -> None:
+    asked = []
+    model = SimpleNamespace(
+        described=SimpleNamespace(robot=None), hypotheses=("a name",) * has_names
+    )
+    best = SimpleNamespace(model=model, evidence=0.0)
+    found = SimpleNamespace(best=best, without=best)
+    dataset = SimpleNamespace(predict=lambda _: (None, None), value=())
+    ready = SimpleNamespace(base=SimpleNamespace(robot=None), scales=None)
+    monkeypatch.setattr(explain, "residuals_of", lambda *_: ())
+    monkeypatch.setattr(explain, "unexplained", lambda _: (share, size))
+    monkeypatch.setattr(explain, "_remainder", lambda *_: None)
+    monkeypatch.setattr(explain, "unmodelled_effect", lambda *_, is_sure: asked.append(is_sure))
+    assert explain._unmodelled(dataset, found, ready) is None  # type: ignore[arg-type]
+    assert asked == [False] * looked

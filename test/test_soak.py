@@ -1,0 +1,65 @@
+"""A short soak over DDS, and that its judge sees what it should: see bench/soak.py."""
+
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+BENCH = Path(__file__).parents[1] / "bench"
+sys.path.insert(0, str(BENCH))
+
+from soak.acts import FAULTS, Flood, Jump, Kill, Pause, Rest, acts  # noqa: E402
+from soak.judge import Delays, Process, memory_items, table  # noqa: E402
+
+
+@pytest.mark.serial
+def test_a_minute_passes(tmp_path: Path, ros_environment: Mapping[str, str]) -> None:
+    run = subprocess.run(
+        [
+            *(sys.executable, BENCH / "soak.py", "--out", tmp_path),
+            *("--minutes", "0.7", "--flood", "1"),
+        ],
+        env=dict(ros_environment),
+        capture_output=True,
+        text=True,
+        timeout=170,
+    )
+    assert run.returncode == 0, run.stdout + run.stderr + (tmp_path / "course.txt").read_text()
+    for what in ("flood of encoders", "killed", "clock jumps", "silent", "lost comes", "lost goes"):
+        assert what in run.stdout
+    assert "FAIL" not in run.stdout
+
+
+def test_a_course_holds_every_fault_and_every_interruption() -> None:
+    course = [act for act, _ in zip(acts(1, 20.0), range(60), strict=False)]
+    assert {act.condition.fault for act in course} == {"", *(fault.fault for fault in FAULTS)}
+    kinds = {type(one) for act in course for one in act.interruptions}
+    assert kinds == {Flood, Jump, Kill, Pause, Rest}
+    jumps = {one.by for act in course for one in act.interruptions if isinstance(one, Jump)}
+    assert min(jumps) < 0.0 < max(jumps)
+
+
+def test_a_late_verdict_is_a_miss() -> None:
+    delays = Delays()
+    delays.add("gap", 1.9)
+    delays.add("fault goes", 2.9)  # recovery_time is waited for as well
+    assert all(item.passed for item in delays.items())
+    delays.add("gap", 2.1)
+    gone, gap = sorted(delays.items(), key=lambda item: item.passed, reverse=True)
+    assert gone.passed
+    assert not gap.passed
+    assert "1 late" in gap.found
+    assert "FAIL" in table(delays.items())
+
+
+@pytest.mark.parametrize(("growth", "passed"), [(0.04, True), (0.06, False), (-0.06, False)])
+def test_memory_that_changes_after_warm_up_is_a_miss(growth: float, passed: bool) -> None:
+    ages = range(0, 1000, 10)
+    samples = [(age, 50.0 if age < 100 else 100.0 * (1.0 + growth * age / 990)) for age in ages]
+    steady = [(float(age), 80.0) for age in ages]
+    lives = [Process("a", samples), Process("a", steady), Process("a", steady[:3])]
+    (item,) = memory_items(lives, 100.0)
+    assert item.passed == passed
+    assert "in 2 lives" in item.found
