@@ -15,7 +15,7 @@ import pytest
 import rclpy
 from attrs import frozen
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 
@@ -42,7 +42,7 @@ NODES: dict[str, Callable[[], Node]] = {
 }
 NUMBERS = (nan, inf, -inf, 3e38, -1.0, 0.0)
 LENGTHS = (0, 1, 3, 4, 10, 200)
-TEXTS = ("", "nan", "inf", "1e300", "-1", NAME, "inputs: \x00")
+TEXTS = ("", "1e300", "-1", NAME, "inputs: \x00", "inf", "nan")
 # What the nodes look for in a status.
 KEYS = ("residual", "band", "modelled", "code", "state", "p normal", "severity", "wheel", "topic")
 SECOND = 10**9
@@ -66,10 +66,11 @@ class Hostile:
     def message(self, kind: Any) -> Any:
         made = kind()
         for name, type_name in kind.get_fields_and_field_types().items():
+            setattr(made, name, self._value(getattr(made, name), type_name))
+        if kind is DiagnosticStatus and self.length > 1:
             # A sentence ends with a unit, or its numbers are not looked at.
-            unit = name == "message" and self.length > 1
-            value = "1 W" if unit else self._value(getattr(made, name), type_name)
-            setattr(made, name, value)
+            made.message = "1 W"
+            made.name = NAME if self.length == 3 else made.name
         return made
 
     def _value(self, old: Any, type_name: str) -> Any:

@@ -122,7 +122,7 @@ def test_robot_on_topics(operator: Operator, spawn: Callable, wait_until: Callab
     )
     message.twist.linear.y = math.nan
     outlet.publish(message)
-    bridge.wait_for_output("ignored, the last command is kept")
+    bridge.wait_for_output("is not finite: ignored, the last command is kept")
 
     assert operator.set("faults.encoder_lost.wheel", 2) == (True, "")
     assert operator.set("faults.encoder_lost.severity", 1.0) == (True, "")
