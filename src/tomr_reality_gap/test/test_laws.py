@@ -5,7 +5,8 @@ import pytest
 from attrs import evolve
 
 from tomr_power_model.unmodelled import FAMILIES, LearntTerm
-from tomr_reality_gap.fit import laws
+from tomr_power_model.unmodelled.term import value_at
+from tomr_reality_gap.fit import laws, polish
 from tomr_reality_gap.fit.laws import LAWS, Evidence, laws_of, words_of
 from tomr_reality_gap.fit.learnt import Table
 
@@ -154,3 +155,34 @@ def test_a_law_is_told_in_words_with_its_numbers() -> None:
     found = [item.fitted for item in laws_of(table, term, _evidence(values[None]))]
     assert words_of(found[0]) == "0.3 N m that dies out over 0.9 s"
     assert len({law.name for law in LAWS}) == len(LAWS)
+
+
+def test_a_law_is_brought_to_its_best_however_small_its_size_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A wheel that answers to 0.1 N m at most: a step of 0.005 of N m at 1 rad/s is 0.6 at 5."""
+    knots = np.linspace(0.0, 8.0, 12)
+    table, true = _table("torque.speed", knots), 3e-4 * knots[None] ** 3
+    term = LearntTerm(table.family, (), table.knots, true)
+    law = laws_of(table, term, _evidence(true))[0]
+    speed = np.random.default_rng(3).uniform(0.0, 5.0, (2000, 1))
+
+    def shown(_: object, __: object, ___: object, terms: list[LearntTerm]) -> np.ndarray:
+        torques = [value_at(item.family, item.knots, item.values[0], speed) for item in terms]
+        return 0.1 * np.tanh(np.array(torques) / 0.1)
+
+    monkeypatch.setattr(polish, "changes_of", shown)
+    (residual,) = shown(None, None, None, [law.term])
+    off = evolve(law, parameters=law.parameters * [1.2, 0.95])
+    best, change = polish.polished(
+        off,
+        None,  # type: ignore[arg-type]
+        None,  # type: ignore[arg-type]
+        (),
+        residual=1e3 * residual,
+        base=np.empty((len(speed), 0)),
+        weight=np.full(len(speed), 1e3),
+        inflation=1.0,
+    )
+    assert best.parameters == pytest.approx(law.parameters, rel=0.01)
+    np.testing.assert_allclose(change, residual, atol=1e-3)

@@ -16,7 +16,8 @@ Array = NDArray[np.float64]
 
 _ROUNDS = 4
 _STEP = 0.02  # of a parameter, for its derivative
-_LEAST = 0.005  # the same, in its unit
+_LEAST = 0.005  # the same, in its unit, of what may be nothing: places, speeds, angles
+_SIZES = ("size", "coefficient", "stiffness")  # however small, a step is a part of them
 
 
 def changes_of(
@@ -65,9 +66,10 @@ def polished(
         """Without what the base makes of it."""
         return np.asarray(columns - base @ (inner @ (base.T @ columns)))
 
+    least = np.array([1e-12 if name in _SIZES else _LEAST for name in law.law.units])
     best, change, cost = law, np.zeros_like(residual), np.inf
     for _ in range(_ROUNDS):
-        steps = np.maximum(_STEP * np.abs(law.parameters), _LEAST)
+        steps = np.maximum(_STEP * np.abs(law.parameters), least)
         moved = [evolve(law, parameters=law.parameters + row) for row in np.diag(steps)]
         terms = [item.term for item in (law, *moved)]
         rows = changes_of(dataset, robot, motions, terms) * weight
