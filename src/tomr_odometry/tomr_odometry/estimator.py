@@ -251,8 +251,8 @@ class SlipOdometry:
             rims, inertial, forces,
         )  # fmt: skip
         self._trusted += dt
-        if self._is_aided and is_incredible(self._x, noise):
-            # The wheels slid while they were taken for gripping.
+        if self._is_aided and not self._has_stood and is_incredible(self._x, noise):
+            # The wheels slid from the start while they were taken for gripping.
             since = min(self._trusted, _DOUBTED)
             self._x, self._P = start_again(
                 self._robot, noise, self.settings.creep, (self._x, self._P), since
