@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from attrs import frozen
 from mcap_records import MEGA, channel, chunk, closing, header, indexed, message, zeros
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
@@ -234,21 +235,27 @@ def test_texts_that_are_too_large_or_none(tmp_path: Path) -> None:
         read_text(Path("zero\0byte"))
 
 
+@frozen
 class _Pickled:
-    def __reduce__(self) -> tuple[Callable[[str], int], tuple[str]]:
-        return os.system, ("touch /tmp/pickled",)
+    made: Path  # by whoever unpickles it
+
+    def __reduce__(self) -> tuple[Callable[[Path], None], tuple[Path]]:
+        return Path.touch, (self.made,)
 
 
 def test_arrays_are_read_without_pickle_and_within_limits(tmp_path: Path) -> None:
     good = tmp_path / "good.npz"
     np.savez(good, a=np.ones(3))
     assert read_arrays(good, ["a"])["a"].tolist() == [1.0, 1.0, 1.0]
-    bad = {name: tmp_path / name for name in ("cut", "bare", "pickled", "bomb", "text", "words")}
+    names = ("cut", "bare", "pickled", "bomb", "text", "words", "complex", "flags")
+    bad = {name: tmp_path / name for name in names}
     bad["cut"].write_bytes(good.read_bytes()[:-30])
     with bad["bare"].open("wb") as file:
         np.save(file, np.ones(3))
     for name, arrays in (
-        ("pickled", np.array([_Pickled()], dtype=object)),
+        ("pickled", np.array([_Pickled(tmp_path / "made")], dtype=object)),
+        ("complex", np.array([1j])),
+        ("flags", np.array([True])),
         ("words", np.array(["one"])),
         ("bomb", np.zeros(30_000_000)),
     ):
@@ -260,6 +267,7 @@ def test_arrays_are_read_without_pickle_and_within_limits(tmp_path: Path) -> Non
             read_arrays(path, ["a"])
         assert str(path) in str(failure.value)
         assert ("TOMR_LIMIT_ARRAYS_BYTES" in str(failure.value)) == (name == "bomb")
+    assert not (tmp_path / "made").exists()  # nothing of a file is executed
 
 
 def test_limits_are_set_by_the_environment() -> None:

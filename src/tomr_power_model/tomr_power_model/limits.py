@@ -41,7 +41,7 @@ class Limits:
     chunk_bytes: int = _limit(64 * _MEGA, "unpacked chunks of a recording that are read at once")
     message_bytes: int = _limit(64 * _MEGA, "a message of a recording")
     messages: int = _limit(20_000_000, "messages of a recording that are read")
-    topic_rate: int = _limit(2_000, "messages a second of a topic that a node takes")
+    topic_rate: int = _limit(1_200, "messages a second of a topic that a node takes")
     topic_message_bytes: int = _limit(_MEGA, "a message that a node takes")
     samples: int = _limit(2_000_000, "samples of one topic that a fit holds")
     mission_phases: int = _limit(100_000, "phases of a mission, repeats counted")
