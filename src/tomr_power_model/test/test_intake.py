@@ -174,7 +174,7 @@ class TestInputsOfAStage:
 
 @pytest.mark.parametrize(
     ("period_us", "taken"),
-    [(10_000, 100), (1_000, 100), (200, 34), (50, 10)],  # a sample each 0.5 ms is enough
+    [(10_000, 100), (1_000, 100), (200, 20), (50, 6)],  # a sample each 0.83 ms is enough
 )
 def test_a_flood_of_encoders_is_thinned(period_us: int, taken: int) -> None:
     stamps: list[int] = []

@@ -32,7 +32,7 @@ from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.robot import Robot
 
 # Samples closer than this to the one before tell nothing more: a flood costs little so.
-CLOSEST = NANOSECONDS // 2000
+CLOSEST = NANOSECONDS // 1200  # the nodes take so many of a topic
 _MOST_KINDS = 200  # of complaints that are told apart: their words may be a message's
 Take = Callable[[Any, int], Arrival | str | None]
 
