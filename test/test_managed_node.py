@@ -39,6 +39,11 @@ class Manager:
         self._executor.spin_once(0.02)
         return True
 
+    def hears_that_it_waits(self) -> bool:
+        """On a busy machine samples may be late at first."""
+        self.spin()
+        return any(words.startswith("waiting") for words in self.said)
+
     def ask(self, kind: Any, name: str, request: Any) -> Any:
         client = self.node.create_client(kind, name)
         assert client.wait_for_service(20.0)
@@ -94,8 +99,7 @@ def test_a_manager_has_the_node_in_hand(
     for _ in range(2):
         assert manager.change(T.TRANSITION_ACTIVATE) == (True, "active")
         manager.said.clear()
-        wait_until(lambda: manager.spin() and manager.said, "a diagnosis")
-        assert manager.said[0].startswith("waiting")
+        wait_until(manager.hears_that_it_waits, "a diagnosis")
         assert manager.change(T.TRANSITION_DEACTIVATE) == (True, "inactive")
         # sim_bridge listens to commands.
         wait_until(lambda: manager.connections()[0] == {0, 1}, "nobody listens")

@@ -68,6 +68,16 @@ def test_one_process_is_retuned_as_its_stages_are(node: DiagnosisNode) -> None:
     assert node.pipeline._classifier.settings.recovery_time == to_ns(2.5)
 
 
+@pytest.mark.parametrize("node", ["diagnosis"], indirect=True)
+def test_what_was_heard_before_a_pause_counts_for_nothing(node: DiagnosisNode) -> None:
+    before = node.pipeline
+    node.on_deactivate()
+    assert node.pipeline is not before
+    assert not list(node.subscriptions)
+    node.on_activate()
+    assert "/joint_states" in {subscription.topic_name for subscription in node.subscriptions}
+
+
 @pytest.fixture
 def named(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     """The fault that is named, empty: none."""
