@@ -138,6 +138,10 @@ BAD: dict[str, tuple[Callable[[list[Raw], Path], Path], list[str]]] = {
     "cut early": (_cut_to(0.01), ["cut.mcap", "cut off", "another copy"]),
     "no messages": (_of(lambda _: []), ["no messages", "record again"]),
     "sqlite never closed": (_unclosed_sqlite, ["killed", "never closed", "to mcap"]),
+    "sqlite topic that is no text": (
+        _sqlite_with("UPDATE topics SET name = x'00' WHERE id % 3 = 0"),
+        ["tables", "no text", "record it again"],
+    ),
     "sqlite stamp that is a text": (
         _sqlite_with("UPDATE messages SET timestamp = 'x' WHERE id % 50 = 0"),
         ["tables", "damaged", "record it again"],

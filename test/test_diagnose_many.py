@@ -227,3 +227,14 @@ def test_a_fault_outweighs_what_is_undecided(
     assert run(capsys, bag, FAULTY)[0] == 1
     shutil.rmtree(bag)
     assert run(capsys, bag, FAULTY)[0] == 2
+
+
+def test_what_a_recording_is_called_is_escaped(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    missing = [tmp_path / name for name in ("<script>a", "<script>b")]
+    code, _, _ = run(capsys, *missing, "--html", tmp_path / "pages")
+    assert code == 2
+    index = (tmp_path / "pages" / "index.html").read_text()
+    assert "<script>a" not in index
+    assert "&lt;script&gt;a" in index

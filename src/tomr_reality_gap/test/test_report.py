@@ -216,3 +216,11 @@ def test_shares_are_not_rounded_to_all_or_nothing(share: float, words: str) -> N
 def test_every_effect_of_the_vocabulary_has_words() -> None:
     assert [effect for effect in EFFECTS if effect_words(effect) == effect] == []
     assert effect_words("parameter.robot.mass") == "Wrong value of robot.mass"
+
+
+def test_what_a_description_names_is_escaped(mismatch: Explanation) -> None:
+    (finding,) = mismatch.findings
+    named = evolve(mismatch, findings=(evolve(finding, where=("<script>x",)),))
+    page = report_page(named, "my_robot.yaml")
+    assert "<script>x" not in page
+    assert "&lt;script&gt;x" in page

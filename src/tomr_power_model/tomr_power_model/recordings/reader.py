@@ -180,6 +180,8 @@ def open_recording(path: Path | str) -> Iterator[Recording]:
                 f"{source} holds messages, but no topic that they belong to: its index is damaged, "
                 f"{_ANOTHER_COPY}"
             )
+        if not all(isinstance(text, str) for names in topics.items() for text in names):
+            raise InputError(f"{source}: a topic's name or type is no text: {_ANOTHER_COPY}")
         yield Recording(
             path=source,
             topics=dict(sorted(topics.items())),
