@@ -61,6 +61,21 @@ def test_rate_is_kept_where_evidence_comes_in_clusters() -> None:
     assert np.median(rates) > 0.3 * wanted
 
 
+def test_a_rare_cause_of_much_evidence_is_not_hidden_by_a_frequent_one_of_little() -> None:
+    """One shove in twenty leaves four times the evidence: its law is the tail's."""
+    wanted, per_hour = 0.05, 30.0
+    rates = []
+    for seed in range(60):
+        peaks = exponential(2.0, 390, seed)
+        peaks[::20] = exponential(8.0, len(peaks[::20]), seed + 1000)
+        level = alarm_level([Tail.of("", peaks, per_hour, CHOICE)], wanted, 11.0, CHOICE)
+        beyond = level.needed + SURE
+        rates.append(per_hour * (0.95 * np.exp(-beyond / 2.0) + 0.05 * np.exp(-beyond / 8.0)))
+    assert kept_share(rates, 4.0 * wanted) > 0.8
+    # By the frequent ones' law alone: level 2 ln 600 = 12.8, 30 x 0.05 exp(-12.8 / 8) = 0.3.
+    assert np.median(rates) < 0.15
+
+
 def test_rarer_alarms_ask_for_more_caution() -> None:
     tail = Tail.of("shoves", exponential(2.0, 300), 10.0, CHOICE)
     needed = [alarm_level([tail], rate, 11.0, CHOICE).needed for rate in (1.0, 0.1, 0.01)]

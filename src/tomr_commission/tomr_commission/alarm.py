@@ -9,9 +9,11 @@ where the classifier is exact), so that
 
 What the peaks leave open of P (Jeffreys) and of the scale (gamma, a usual scale counting as a few
 peaks) is drawn by chance, and the level is taken at which so many of the draws as `confidence` says
-have the chosen rate or less. A source without any peak has no tail to extrapolate: it counts as
-nothing, and the report says for how long it was watched. A generalised Pareto tail is fitted
-beside, and its shape reported.
+have the chosen rate or less. Where the peaks over u have a heavier tail (their coefficient of
+variation is over 1 at the 5 % level: del Castillo, Daoudi & Lockhart 2014), u is raised to the
+highest half of them, and so on: what is rare may have another cause than what is frequent. A source
+without any peak has no tail to extrapolate: it counts as nothing, and the report says for how long
+it was watched. A generalised Pareto tail is fitted beside, and its shape reported.
 """
 
 import math
@@ -32,6 +34,7 @@ _CAP = MOST_CAUTION + SURE  # decades: higher peaks are known to be higher, no m
 _USUAL_SCALE, _USUAL_WEIGHT = 4.0, 4  # decades of a tail, and the peaks that this counts as
 _DRAWS, _SEED = 4000, 1
 _LEAST_RATE = 1e-12
+_FIVE_PERCENT = 1.645  # quantile of a standard normal, one-sided
 
 
 @frozen
@@ -54,11 +57,7 @@ class Tail:
     ) -> "Tail":
         """The tail of the peaks of all events, 0 for those without evidence."""
         values = np.minimum(np.asarray(peaks, dtype=float), _CAP)
-        positive = values[values > 0.0]
-        threshold = float(np.quantile(values, 1.0 - choice.kept)) if len(values) else 0.0
-        over = positive[positive > threshold]
-        if len(over) < choice.least_peaks:
-            threshold, over = 0.0, positive
+        threshold, over = _tail_of(values, choice)
         known = over[over < _CAP]
         certain = _USUAL_WEIGHT + len(known)  # a peak at the cap is longer than is known
         scale = (_USUAL_WEIGHT * _USUAL_SCALE + float((over - threshold).sum())) / certain
@@ -93,6 +92,28 @@ class Tail:
 
     def _beyond(self, level: float) -> float:
         return max(level - self.threshold, 0.0)
+
+
+def _tail_of(values: Array, choice: AlarmChoice) -> tuple[float, Array]:
+    """The threshold of a tail that is exponential, or as high as there are peaks for, and these."""
+    threshold, over = 0.0, values[values > 0.0]
+    share = choice.kept
+    while True:
+        higher = float(np.quantile(values, 1.0 - share)) if len(values) else 0.0
+        peaks = values[values > max(higher, 0.0)]
+        if len(peaks) < choice.least_peaks:
+            return threshold, over
+        threshold, over = max(higher, 0.0), peaks
+        known = over[over < _CAP] - threshold
+        if len(known) < choice.least_peaks or not _is_heavier(known):
+            return threshold, over
+        share /= 2.0
+
+
+def _is_heavier(excesses: Array) -> bool:
+    """Whether they vary by more than exponential ones would, at the 5 % level."""
+    variation = float(excesses.std(ddof=1) / excesses.mean())
+    return math.sqrt(len(excesses)) * (variation - 1.0) > _FIVE_PERCENT
 
 
 @frozen
