@@ -287,8 +287,7 @@ def _moved(pose: Array, twist: Array, dt: float) -> Array:
     yaw = pose[2] + 0.5 * dt * twist[2]
     c, s = np.cos(yaw), np.sin(yaw)
     x, y, turn = dt * twist
-    moved: Array = pose + np.array([c * x - s * y, s * x + c * y, turn])
-    return moved
+    return np.asarray(pose + np.array([c * x - s * y, s * x + c * y, turn]))
 
 
 def bound(options: argparse.Namespace) -> int:

@@ -67,6 +67,17 @@ def test_the_floor_is_marked_where_contacts_slid() -> None:
     assert far.cells.size < 10
 
 
+def test_contacts_turn_with_the_robot() -> None:
+    floor = Floor(ROBOT)
+    pose, angle = np.array([10.0, 10.0, 0.7]), ROBOT.wheel_offset + 0.7  # on a corner of cells
+    floor.take(pose, np.array([True, False, False]), np.zeros(3))
+    grid = floor.grid()
+    assert grid is not None
+    first = pose[:2] + ROBOT.robot_radius * np.array([np.cos(angle), np.sin(angle)])
+    column, row = ((first - grid.corner) // SIDE).astype(int)
+    assert grid.cells[row, column] == 100
+
+
 @pytest.fixture(scope="module")
 def slipping() -> list[Estimate]:
     return list(play(drive(ice(3.0, 6.0)), settings=SETTINGS))

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tomr_odometry.creep import Creep
 from tomr_odometry.kernel import (
+    AX,
     CREEP,
     RIM,
     SIZE,
@@ -90,3 +92,17 @@ def test_a_robot_at_rest_on_a_slope_feels_it_as_a_pull_back() -> None:
     rows = motion_rows(x, NOISE, RIMS * 0.0 + [[0.0], [1e-6]], np.array([0, 0, 0, -0.3, 0.0, 9.8]))
     correct(x, doubt, *rows, NOISE.gate, False)
     assert x[SLOPE] == pytest.approx(0.3, abs=0.02)
+
+
+def test_forces_that_accelerate_the_body_as_it_does_are_no_news() -> None:
+    x, change = np.zeros(SIZE), np.array([0.7, -0.4, 1.1])
+    x[AX : AX + 3] = change
+    force = BODY.to_twist.T @ BODY.inertia @ change
+    rows = np.stack([np.arange(3.0), force, np.ones(3), np.ones(3)], axis=1)
+    assert force_rows(x, BODY, rows)[1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_creep_grows_with_the_square_of_traction() -> None:
+    creep = Creep((0.1, 0.2, 0.3), 4.0, 0.0)
+    expected = np.array([0.5, 1.0, 1.5]) * 0.5 * (1.0 + 4.0 * 0.25)
+    assert creep.shape(np.full(3, 0.5)) == pytest.approx(expected)

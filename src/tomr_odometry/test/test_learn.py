@@ -112,8 +112,8 @@ def test_a_reference_from_tf_is_that_of_the_named_frame(tmp_path: Path) -> None:
         for k in range(20):
             stamp = 1_000_000_000 + k * 10_000_000
             both = [
-                transform("base_link", stamp, 0.1 * k, 0.4 * k),
                 transform("camera", stamp, 5.0, 0.0),
+                transform("base_link", stamp, 0.1 * k, 0.4 * k),
             ]
             message = bag_message("tf2_msgs/msg/TFMessage", transforms=both)
             writer.write("/tf", "tf2_msgs/msg/TFMessage", message, stamp)
