@@ -198,11 +198,11 @@ class ResidualStage:
             for window in self._windows:
                 window.clear()
             for flow in self._flows:
-                flow.clear()
+                flow.leap()
             for watch in self._repeats:
                 watch.clear()
             self._decided = 0
-            self._encoders.clear()
+            self._encoders.leap()
             self._predictions.clear()
             self._recent.clear()
         return arrival

@@ -84,7 +84,7 @@ def test_a_tick_rests_on_what_came_up_to_it() -> None:
 
 def test_after_a_leap_of_the_stamps_comes_a_gap_and_not_at_the_start() -> None:
     first, leapt = flow(1000), flow(1000)
-    leapt.clear()
+    leapt.leap()
     assert leapt.is_misplaced(BASE + 5000 * MS)  # heard before the leap and not since
     leapt.take(BASE + 5000 * MS)
     assert not first.is_broken(BASE)

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from attrs import evolve
 
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.model.commanded import CommandPath, CommandTiming, Seen
@@ -26,25 +27,25 @@ def _path() -> CommandPath:
 
 def test_nothing_is_known_before_the_first_command() -> None:
     path = CommandPath(ROBOT, CommandTiming(50 * MS))
-    found = RestingDrivers(ROBOT.controller, 3, 24.0).voltages(path, REST, REST, 1.0)
+    found = RestingDrivers(ROBOT).voltages(path, REST, REST, 1.0)
     assert all(math.isnan(volts) for volts in found)
 
 
 def test_a_wheel_pushed_aside_is_pulled_back(path: CommandPath) -> None:
     # k_i = 12 V/rad: 0.1 rad ahead are -1.2 V.
-    drivers = RestingDrivers(ROBOT.controller, 3, 24.0)
+    drivers = RestingDrivers(ROBOT)
     assert drivers.voltages(path, REST, REST, 1.0) == pytest.approx(REST)
     assert drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0)[0] == pytest.approx(-1.2)
 
 
 def test_voltages_are_those_of_the_time_asked_for(path: CommandPath) -> None:
-    drivers = RestingDrivers(ROBOT.controller, 3, 24.0)
+    drivers = RestingDrivers(ROBOT)
     drivers.voltages(path, REST, REST, 1.0)
     assert drivers.voltages(path, (0.1, 0.0, 0.0), REST, 0.25)[0] == pytest.approx(-0.3)
 
 
 def test_what_a_start_left_different_fades_in_motion(path: CommandPath) -> None:
-    drivers = RestingDrivers(ROBOT.controller, 3, 24.0)
+    drivers = RestingDrivers(ROBOT)
     drivers.voltages(path, REST, REST, 1.0)
     assert path.state is not None
     asked = path.wheel(at.ASKED)[0]
@@ -55,7 +56,7 @@ def test_what_a_start_left_different_fades_in_motion(path: CommandPath) -> None:
 
 def _sum_after(path: CommandPath, angle: float, speed: float) -> float:
     """Of the first wheel's simulated errors, 40 ticks after it was moved [rad]."""
-    drivers = RestingDrivers(ROBOT.controller, 3, 24.0)
+    drivers = RestingDrivers(ROBOT)
     drivers.voltages(path, REST, REST, 1.0)
     for _ in range(40):
         drivers.voltages(path, (angle, 0.0, 0.0), (speed, 0.0, 0.0), 1.0)
@@ -63,7 +64,7 @@ def _sum_after(path: CommandPath, angle: float, speed: float) -> float:
 
 
 def test_what_a_push_leaves_in_a_driver_is_expected_of_its_wheel(path: CommandPath) -> None:
-    drivers = RestingDrivers(ROBOT.controller, 3, 24.0)
+    drivers = RestingDrivers(ROBOT)
     drivers.voltages(path, REST, REST, 1.0)
     for _ in range(40):
         volts = drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0)
@@ -84,7 +85,7 @@ def test_nothing_is_taken_over_from_an_encoder_that_no_push_explains(path: Comma
 def test_sums_that_had_nothing_in_common_have_when_the_wheel_turns_as_expected(
     path: CommandPath,
 ) -> None:
-    drivers = RestingDrivers(ROBOT.controller, 3, 24.0)
+    drivers = RestingDrivers(ROBOT)
     for angle, speed in ((0.0, 0.0), (0.6, 0.0), (0.1, 0.0)):
         drivers.voltages(path, (angle, 0.0, 0.0), (speed, 0.0, 0.0), 1.0)
     assert path.wheel(at.INTEGRAL)[0] == 0.0
@@ -101,3 +102,32 @@ def test_a_simulated_wheel_that_creeps_takes_over_nothing(path: CommandPath) -> 
 
 def test_an_angle_that_is_not_known_leaves_the_simulation_alone(path: CommandPath) -> None:
     assert _sum_after(path, math.nan, 0.0) == 0.0
+
+
+def test_a_sum_that_would_turn_the_wheel_is_not_the_drivers(path: CommandPath) -> None:
+    drivers = RestingDrivers(ROBOT)
+    drivers.voltages(path, REST, REST, 1.0)
+    drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0)
+    taken = path.wheel(at.INTEGRAL)[0]
+    assert taken < 0.0
+    assert path.state is not None
+    path.state[at.STATE_HEADER + at.SPEED] = -0.02  # it gives way
+    for _ in range(3):
+        drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0)
+        path.state[at.STATE_HEADER + at.SPEED] = 0.0
+    assert path.wheel(at.INTEGRAL)[0] == taken
+
+
+def test_a_wheel_without_dry_friction_holds_nothing(path: CommandPath) -> None:
+    physics = {name: sets for name, sets in ROBOT.physics.items() if name != "friction.coulomb"}
+    drivers = RestingDrivers(evolve(ROBOT, physics=physics))
+    for angle in (0.0, 0.1, 0.1):
+        drivers.voltages(path, (angle, 0.0, 0.0), REST, 1.0)
+    assert path.wheel(at.INTEGRAL)[0] == 0.0
+
+
+def test_after_what_is_not_known_the_sums_are_taken_for_equal(path: CommandPath) -> None:
+    drivers = RestingDrivers(ROBOT)
+    drivers.voltages(path, REST, REST, 1.0)
+    drivers.forget()
+    assert drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0) == pytest.approx(REST)

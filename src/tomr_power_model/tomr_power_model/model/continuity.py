@@ -40,6 +40,7 @@ _LONGEST = to_ns(0.6)  # of a gap, as far as `share` goes
 # In place of how far a message went back.
 _REFUSED = -1
 _MISPLACED = -2
+_REPEATED = -3
 
 
 class Continuity:
@@ -50,9 +51,15 @@ class Continuity:
         self._read, self._was_read = 0, False
         self.clear()
 
-    def clear(self) -> None:
+    def leap(self) -> None:
         """Forget the stream where its stamps leap, but for having been heard."""
-        self._was_read = self._was_read or self._read > 0
+        was_read = self._was_read or self._read > 0
+        self.clear()
+        self._was_read = was_read
+
+    def clear(self) -> None:
+        """Forget the stream."""
+        self._was_read = False
         self._ahead: deque[tuple[int, int]] = deque()  # stamp, and how far a message went back
         self._read = 0  # newest stamp that came
         self._last = 0  # newest one up to the last tick
@@ -80,7 +87,7 @@ class Continuity:
         if self._read > stamp_ns > 0:
             self._ahead.append((self._read, self._read - stamp_ns))
         else:
-            self.misplace()
+            self._ahead.append((self._read, _REPEATED if stamp_ns > 0 else _MISPLACED))
 
     def misplace(self) -> None:
         """Take note of a message whose stamp is none, repeated, or too old to be of use."""
@@ -159,8 +166,9 @@ class Continuity:
         """Count a message that is none of the samples."""
         if back != _REFUSED:
             self._misplaced += 1
+        if back not in (_REFUSED, _REPEATED):
             self._in_order.append(False)
-        if back != _MISPLACED:
+        if back not in (_MISPLACED, _REPEATED):
             self.refused, self.refused_at = self.refused + 1, stamp
             self.refused_since += 1
         if back > 0:

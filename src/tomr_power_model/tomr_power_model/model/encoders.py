@@ -123,9 +123,17 @@ class EncoderWindow:
 
     def clear(self) -> None:
         """Forget all samples."""
+        self._forget()
+        self.continuity.clear()
+
+    def leap(self) -> None:
+        """Forget all samples where the stamps leap: a gap, if there were any."""
+        self._forget()
+        self.continuity.leap()
+
+    def _forget(self) -> None:
         self._samples.clear()
         self._stamps = RecentStamps()
-        self.continuity.clear()
         self._leaps = 0
 
     def add(self, sample: EncoderSample) -> bool:

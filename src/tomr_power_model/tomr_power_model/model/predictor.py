@@ -63,7 +63,7 @@ class PowerPredictor:
         self._clock = TickClock(given.ticks)
         timing = CommandTiming(given.ticks.period, given.command_timeout, given.stale)
         self._path = CommandPath(robot, timing, is_compiled=is_compiled)
-        self._resting = RestingDrivers(robot.controller, WHEELS, robot.supply.nominal_voltage)
+        self._resting = RestingDrivers(robot)
         self._encoders = EncoderWindow(
             given.encoder_window, given.ticks.period, given.stale, fastest_wheel(robot)
         )
@@ -180,6 +180,7 @@ class PowerPredictor:
         measured = self._model.measured(motion)
         from_encoders = self._readings(self._where_known(measured, motion), self._measured)
         if commanded is None or self._is_silent(tick, commanded, speed):
+            self._resting.forget()
             return Prediction(tick, UNKNOWN, UNKNOWN, _UNKNOWN, UNKNOWN_READING, from_encoders)
         means = self._model.commanded(commanded, windows)
         return Prediction(

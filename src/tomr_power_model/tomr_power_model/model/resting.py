@@ -12,20 +12,23 @@ What a push leaves in a driver's sum stays while friction holds the wheel, secon
 is expected of the wheel then would be wrong. So while a wheel stands that in the simulation stands
 too, or turns slowly and no faster than it is asked to, the simulation's sum follows the driver's.
 Elsewhere it must not: what a faulty wheel does would be expected of it. No push makes a difference
-as large as an encoder that reads standstill: from such a one on the sums have nothing in common
-until the wheel turns as expected.
+as large as an encoder that reads standstill, and no friction holds a wheel with a sum that makes
+the simulated one creep: from then on the sums have nothing in common until the wheel turns as
+expected.
 """
 
 from collections.abc import Sequence
 from typing import Protocol
 
 from tomr_power_model.dynamics import layout as at
-from tomr_power_model.robot import Controller
+from tomr_power_model.effects import EFFECTS
+from tomr_power_model.robot import WHEELS, Robot
 
 _UNKNOWN = float("nan")
 MOVING = 1.0  # rad/s
 FADES = 0.01  # share of the difference in a tick in motion
 STANDS = 0.05  # rad/s
+CREEPS = 0.01  # rad/s: faster than it is asked to
 SLOW = 0.5  # rad/s
 FOLLOWS = 0.5  # share of the difference in a tick
 PUSHED = 0.25  # most that a push leaves, as a share of the supply's voltage
@@ -51,20 +54,25 @@ class SimulatedDrivers(Protocol):
 class RestingDrivers:
     """Sums of the drivers, one per wheel."""
 
-    def __init__(self, controller: Controller, wheels: int, voltage: float) -> None:
-        """`voltage` of the supply [V]."""
-        self._proportional = controller.proportional
-        self._integral = controller.integral
-        self._wheels = wheels
-        unlike = PUSHED * voltage
-        self._most = unlike / controller.integral if controller.integral else 0.0  # rad
+    def __init__(self, robot: Robot) -> None:
+        """Of a robot; only dry friction holds a wheel that its driver turns."""
+        self._proportional = robot.controller.proportional
+        self._integral = robot.controller.integral
+        unlike = PUSHED * robot.supply.nominal_voltage
+        self._most = unlike / self._integral if self._integral else 0.0  # rad
+        self._sticks = any(EFFECTS[name].dry_torque is not None for name in robot.physics)
         self.clear()
 
     def clear(self) -> None:
         """What the drivers' sums hold is not known until the next command."""
-        self._offset = [_UNKNOWN] * self._wheels  # rad
-        self._before = [_UNKNOWN] * self._wheels  # V, at the end of the last tick
-        self._strange = [False] * self._wheels  # differences that no push makes
+        self._offset = [_UNKNOWN] * WHEELS  # rad
+        self._before = [_UNKNOWN] * WHEELS  # V, at the end of the last tick
+        self._strange = [False] * WHEELS  # differences that no push makes
+        self._followed = [False] * WHEELS  # in the last tick
+
+    def forget(self) -> None:
+        """The drivers were asked for what is not known: what their sums differ by means nothing."""
+        self._offset = [_UNKNOWN] * WHEELS
 
     def voltages(
         self, path: SimulatedDrivers, angle: Sequence[float], speed: Sequence[float], share: float
@@ -78,7 +86,7 @@ class RestingDrivers:
             share: of the tick at that time.
         """
         if path.state is None:
-            return [_UNKNOWN] * self._wheels
+            return [_UNKNOWN] * WHEELS
         found = []
         asked, sums = path.wheel(at.ASKED), path.wheel(at.INTEGRAL)
         for wheel, apart in enumerate(self._differences(path, angle, speed)):
@@ -98,7 +106,7 @@ class RestingDrivers:
         turned, simulated = path.wheel(at.TURNED), path.wheel(at.SPEED)
         asked = path.wheel(at.ASKED)
         found = []
-        for wheel in range(self._wheels):
+        for wheel in range(WHEELS):
             ahead = turned[wheel] - angle[wheel]
             if ahead == ahead and self._offset[wheel] != self._offset[wheel]:
                 self._offset[wheel] = -ahead
@@ -110,9 +118,16 @@ class RestingDrivers:
                 self._strange[wheel] = True
             elif abs(speed[wheel]) > MOVING:
                 self._strange[wheel] = False
-            is_slow = abs(simulated[wheel]) < min(SLOW, abs(asked[wheel]) + STANDS)
-            stands = is_slow and abs(speed[wheel]) < STANDS
-            if stands and apart == apart and not self._strange[wheel]:
+            stands = abs(speed[wheel]) < STANDS
+            excess = abs(simulated[wheel]) - abs(asked[wheel])
+            if self._followed[wheel] and excess > CREEPS:
+                # With such a sum it would turn, and it does not: the difference is another's.
+                self._strange[wheel], self._offset[wheel] = True, -ahead
+            is_slow = excess < CREEPS and abs(simulated[wheel]) < SLOW
+            self._followed[wheel] = (
+                self._sticks and stands and is_slow and apart == apart and not self._strange[wheel]
+            )
+            if self._followed[wheel]:
                 path.add_to_sum(wheel, FOLLOWS * apart)
                 self._offset[wheel] -= FOLLOWS * apart
         return found

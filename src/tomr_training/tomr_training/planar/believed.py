@@ -71,7 +71,7 @@ def run_believed(drive: Drive, signals: Signals, share: Array) -> Expected:
     excitation = Excitation(0.0, inputs, nothing, nothing, 0.0, np.zeros(WHEELS))
     variant, step = Variant(laid_out(vehicle_of(robot))), timing_of(robot.controller.rate).step
     path = _Path(variant, WHEELS)
-    drivers = RestingDrivers(robot.controller, WHEELS, robot.supply.nominal_voltage)
+    drivers = RestingDrivers(robot)
     steps = int(variant.numbers[at.SUBSTEPS])
     out = np.empty((len(inputs), steps * at.output_size(WHEELS)))
     ends, held = np.zeros((len(inputs) * steps + 1, WHEELS)), np.empty((ticks, WHEELS))
