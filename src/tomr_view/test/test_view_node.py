@@ -50,7 +50,7 @@ def test_a_page_sees_a_robot_and_switches_a_fault_of_the_simulator(
             {"id": "encoder_lost", "wheel": 2, "severity": 1},
         ):
             client.send(json.dumps({"ask": "fault", **wish}))
-        while not picture["faults"]:
+        while not picture["faults"] or picture["message"] == "no diagnosis yet":
             picture = next_of(client, "picture")["picture"]
         assert picture["faults"] == [{"id": "encoder_lost", "wheel": 2}]
         assert picture["message"].startswith("waiting")
