@@ -206,3 +206,24 @@ class TestEncoderWindow:
     def test_stale_samples_say_nothing(self) -> None:
         samples = [EncoderSample(BASE - at * MS, (1.0,) * 3, NAN3) for at in (450, 440, 430)]
         assert np.isnan(self._fit(samples)[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("lost", "turning", "doubted"), [(None, True, 0), (20, True, 10), (20, False, 0)]
+)
+def test_after_a_lost_command_drivers_are_not_compared(
+    monkeypatch: pytest.MonkeyPatch, lost: int | None, turning: bool, doubted: int
+) -> None:
+    """Half a second, and only where the command changed meanwhile."""
+    predictor = PowerPredictor(shipped_robot("reference"))
+    forgotten: list[bool] = []
+    monkeypatch.setattr(predictor._resting, "forget", lambda: forgotten.append(True))
+    start = 1_700_000_000_000_000_000
+    for tick in range(60):
+        stamp = start + tick * 50_000_000
+        if tick != lost:
+            predictor.command(stamp, (0.01 * tick if turning else 0.1, 0.0, 0.0))
+        for part in range(5):
+            predictor.encoders(stamp + part * 10_000_000, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        predictor.due()
+    assert abs(len(forgotten) - doubted) <= 1

@@ -3,6 +3,7 @@
 import math
 from collections import deque
 from collections.abc import Sequence
+from statistics import median
 
 import numpy as np
 from attrs import evolve
@@ -42,6 +43,9 @@ ENCODERS = "joint_states"
 IMU = "imu/data"
 
 _RESTS = 0.05  # rad/s: a slower wheel may stand still
+_INTERVALS = 5  # between commands, of which the middle one is usual
+_LOST = 1.5  # of the usual: a command was lost
+_UNSURE = to_ns(0.5)  # until robot and simulation do the same again
 _UNKNOWN: Readings = (UNKNOWN_READING, UNKNOWN_READING, UNKNOWN_READING)
 
 
@@ -87,6 +91,9 @@ class PowerPredictor:
         self._encoders.clear()
         self._commands.clear()
         self._gyro: tuple[int, float] | None = None
+        self._given: tuple[int, Triple] | None = None  # the newest command
+        self._intervals: deque[int] = deque(maxlen=_INTERVALS)  # of the commands [ns]
+        self._unsure_until = 0  # ns
         self._heading = 0.0  # at the start of the next tick, against the first [rad]
         self._model.clear()
         self._stamps: list[deque[tuple[int]]] = [deque() for _ in range(WHEELS + 1)]
@@ -97,11 +104,25 @@ class PowerPredictor:
         """Take a commanded twist (v_x, v_y [m/s], omega_z [rad/s]) in base_link."""
         arrival = self._arrive(COMMANDS, stamp_ns, periodic=False)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
+            self._look_for_losses(stamp_ns, twist)
             self._path.command(stamp_ns, twist)
             self._commands.take(stamp_ns)
         elif arrival is Arrival.REPEATED:
             self._commands.precedes(stamp_ns)
         return arrival
+
+    def _look_for_losses(self, stamp_ns: int, twist: Triple) -> None:
+        """After a lost command robot and simulation were asked for different things a while."""
+        if self._given is not None:
+            before, same = self._given
+            interval = stamp_ns - before
+            is_late = len(self._intervals) == _INTERVALS and interval > _LOST * median(
+                self._intervals
+            )
+            if is_late and twist != same:
+                self._unsure_until = stamp_ns + _UNSURE
+            self._intervals.append(interval)
+        self._given = stamp_ns, twist
 
     def encoders(self, stamp_ns: int, position: Triple, velocity: Triple) -> Arrival:
         """Take wheel angles [rad] and speeds [rad/s], NaN for what a message lacks."""
@@ -179,8 +200,10 @@ class PowerPredictor:
         self._heading += turned
         measured = self._model.measured(motion)
         from_encoders = self._readings(self._where_known(measured, motion), self._measured)
-        if commanded is None or self._is_silent(tick, commanded, speed):
+        is_silent = commanded is None or self._is_silent(tick, commanded, speed)
+        if is_silent or tick <= self._unsure_until:
             self._resting.forget()
+        if commanded is None or is_silent:
             return Prediction(tick, UNKNOWN, UNKNOWN, _UNKNOWN, UNKNOWN_READING, from_encoders)
         means = self._model.commanded(commanded, windows)
         return Prediction(
