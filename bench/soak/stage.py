@@ -29,7 +29,7 @@ from soak.acts import (
 from soak.crew import Crew
 from soak.judge import GOES, Delays, Item, memory_items, table
 from soak.relay_node import PLANT, Relay
-from tomr_fault_diag.classifier.states import FAULTLESS, POWER_SENSOR, UNKNOWN
+from tomr_fault_diag.classifier.states import DISOBEYS, FAULTLESS, POWER_SENSOR, UNKNOWN
 from tomr_power_model.errors import InputError
 from tomr_power_model.files import write_text
 from tomr_power_model.messages.plain import NANOSECONDS
@@ -257,6 +257,8 @@ class Soak:
             self._until(lambda: self._relay.now_ns > stamp, "the robot's next message")
             self._await_verdict(self._doing, [suite for suite in SUITES if name in SUITES[suite]])
             return
+        # It stands until commands find it again, and that may be said.
+        self._allowed.add(DISOBEYS.name)
         self._until(lambda: self._relay.now_ns > stamp, "the simulator is back")
         self._set_fault(self._condition, self._condition.severity)
         self._await_verdict(self._doing)
