@@ -131,6 +131,7 @@ PROMPT: dict[str, object] = {
     "filter_time": 0.0,
     "confirm_time": 0.0,
     "recovery_time": 0.0,
+    "slip_recovery_time": 0.0,
 }
 
 

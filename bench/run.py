@@ -208,7 +208,7 @@ def _print_latency(console: Console, found: dict[str, Any]) -> None:
         "takes the 50 ms up to t (decision_rate 20 Hz) and is made when every live stream has "
         "passed t and one of them t + 20 ms (settle_time). Here every decision is published "
         "(report_period 0.05) and no filter holds a change back (filter_time, confirm_time, "
-        "recovery_time 0).\n"
+        "recovery_time, slip_recovery_time 0).\n"
     )
 
 

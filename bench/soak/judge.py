@@ -6,8 +6,6 @@ from collections.abc import Iterable, Sequence
 from attrs import define, field, frozen
 
 WITHIN = 2.0  # s in which a verdict must be found again
-RECOVERY = 1.0  # s for which normal must lead besides, after a fault: recovery_time of the nodes
-GOES = " goes"  # of what goes by itself
 FLAT = 0.05  # of the memory after warm-up
 _BASE = 0.1  # share of a process's samples that its memory is held against
 
@@ -49,10 +47,11 @@ class Delays:
 
 
 def _delay(what: str, taken: Sequence[float]) -> Item:
-    most = WITHIN + RECOVERY if what.endswith(GOES) else WITHIN
-    late = sum(seconds > most for seconds in taken)
+    late = sum(seconds > WITHIN for seconds in taken)
     median = statistics.median(taken)
-    found = f"{len(taken)} times, within {most:g} s, median {median:.2f} s, most {max(taken):.2f} s"
+    found = (
+        f"{len(taken)} times, within {WITHIN:g} s, median {median:.2f} s, most {max(taken):.2f} s"
+    )
     return Item(f"verdict after: {what}", found + (f", {late} late" if late else ""), not late)
 
 

@@ -27,7 +27,7 @@ from soak.acts import (
     acts,
 )
 from soak.crew import Crew
-from soak.judge import GOES, Delays, Item, memory_items, table
+from soak.judge import Delays, Item, memory_items, table
 from soak.relay_node import PLANT, Relay
 from tomr_fault_diag.classifier.states import DISOBEYS, FAULTLESS, POWER_SENSOR, UNKNOWN
 from tomr_power_model.errors import InputError
@@ -169,7 +169,7 @@ class Soak:
         before, self._condition = self._condition, condition
         if condition == before:
             return
-        self._doing = f"{condition.words} comes" if condition.fault else f"{before.words}{GOES}"
+        self._doing = f"{condition.words} comes" if condition.fault else f"{before.words} goes"
         self._allowed |= _true_words(condition)
         self._set_fault(before, 0.0)
         self._set_fault(condition, condition.severity)

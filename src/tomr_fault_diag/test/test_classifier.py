@@ -124,7 +124,7 @@ def test_a_fault_is_named_after_its_time_and_recovers_after_its_own() -> None:
     assert [name for name, _ in changes] == ["normal", "motor system fault 1", "normal"]
     named, recovered = changes[1][1], changes[2][1]
     assert 41 < named <= 41 + 8
-    assert 61 + 20 <= recovered <= 61 + 26
+    assert 61 + 12 <= recovered <= 61 + 18
 
 
 def test_a_blip_is_no_fault() -> None:

@@ -21,6 +21,7 @@ from tomr_fault_diag.classifier.belief import (
     STATE_OF,
     WEAKS,
     Belief,
+    _transitions,
     named_of,
     of_states,
 )
@@ -250,6 +251,38 @@ def test_what_looks_like_another_fault_every_moment_is_none_that_is_known() -> N
     for _ in range(30):
         belief.update(_against_all_but(DRAGS.start, 20.0))
     assert belief.shares[DRAGS.start] > 0.99
+
+
+@pytest.mark.parametrize("fault", [CONTROLS.start + 1, ENCODERS.start + 1])
+def test_a_wheel_that_catches_up_after_a_fault_has_no_other(fault: int) -> None:
+    """The transient of 0.4 s and its passing out of the window look like a weak motor."""
+    belief = Belief(0.5, 11.0)
+    for _ in range(40):
+        belief.update(_against_all_but(fault, 20.0))
+    caught_up = [_against_all_but(WEAKS.start + 1, 8.0)] * 14 + [_against_all_but(NORMAL, 3.0)] * 8
+    named = [named_of(belief.update(likelihoods)) for likelihoods in caught_up]
+    assert max(share[NAMED.index(DEGRADED[1])] for share in named) < 0.5
+    assert all(share[NORMAL] > 0.5 for share in named[8:])
+    assert belief.shares[NORMAL] > 0.9
+
+
+@pytest.mark.parametrize("next_one", [WEAKS.start + 1, CONTROLS.start, METERS.start + 1])
+def test_another_fault_that_stays_is_named_after_all(next_one: int) -> None:
+    """Of the wheel that had one it takes a second: so long it may be catching up."""
+    belief = Belief(0.5, 11.0)
+    for _ in range(40):
+        belief.update(_against_all_but(ENCODERS.start + 1, 20.0))
+    lasted = next(
+        k for k in range(99) if belief.update(_against_all_but(next_one, 20.0))[next_one] > 0.99
+    )
+    assert lasted < (30 if next_one == WEAKS.start + 1 else 6)
+
+
+def test_no_chance_is_lost_between_states() -> None:
+    for caution in (0.0, 4.0, 11.0, 30.0):
+        moves = _transitions(10.0**-caution)
+        np.testing.assert_allclose(moves.sum(axis=1), 1.0, atol=1e-12)
+        assert (moves > -1e-12).all()
 
 
 class Saying:

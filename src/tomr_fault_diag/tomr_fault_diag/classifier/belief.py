@@ -9,7 +9,8 @@ be told apart from normal in this motion has l = 0 and leaves the belief as it i
 
 A force from outside is one hypothesis of the network and two states here: pushes are frequent and
 soon over, loads are as rare as faults and stay. What looks like one fault now and like another
-then is none that is known: `OTHER` takes each window as any of the faults.
+then is none that is known: `OTHER` takes each window as any of the faults. When a motor obeys
+again its wheel has to catch up, which for a second looks like any fault of that wheel: `ENDED`.
 """
 
 import numpy as np
@@ -43,22 +44,28 @@ METERS = slice(14, 17)
 EXTERNAL = 17  # a push, while it is young
 OTHER = 18
 LOADED = 19  # the same force, here to stay
-_STATES = 20
+# A lost signal or encoder of wheels 1-3 is back, and the wheel catches up: tick by tick.
+_CATCHING_UP = 16  # ticks at most: 0.4 s, and as long until the last is out of the window
+ENDED = slice(20, 20 + 3 * _CATCHING_UP)
+_STATES = ENDED.stop
 _FAULTS = slice(SLIP, METERS.stop)
+_CATCHES_UP = [*range(CONTROLS.start, ENCODERS.stop)]  # after the fault, the wheel
 # What each is called.
 STATE_OF: tuple[State, ...] = (
     *STATES[:CONTROL], *(STATES[CONTROL],) * 3, *STATES[MOTOR:], *DRAGGING, *DEGRADED,
-    *POWER_SENSOR, PUSHED, UNKNOWN, BURDENED,
+    *POWER_SENSOR, PUSHED, UNKNOWN, BURDENED, *(STATES[NORMAL],) * (ENDED.stop - ENDED.start),
 )  # fmt: skip
 _CLIP = 24.0  # no window says more than so much against anything
 _ENDING = 1e-4  # likelihood that a fault ends within a tick ...
 _SLIP_ENDING = 5e-3  # ... and that a slippery place is left
+_CAUGHT_UP = 0.15  # ... and that the wheel has caught up
 _PUSH = 1e-3  # that somebody pushes, and ...
 _PUSH_ENDING = 0.15  # ... that it is over: a push of 6 s is as unlikely as a load
 _OTHER = 1e-6  # and that one fault becomes another
 _STRANGE = 1e-2  # of a fault of no known kind, over that of a known one
 _SLIPPERY = 1e5  # of slip, over that of other faults: it may be over soon
 _SLOW = 1e-4  # of what a description that is off looks like, all the time
+_GUESSED = np.log(2.5)  # what a wheel that catches up looks like is not known as a fault is
 _LEAST = 1e-60  # far below the rarest onset that `caution` allows, or that would count for more
 
 
@@ -77,7 +84,7 @@ class Belief:
         self.shares[NORMAL] = 1.0
 
     def update(self, likelihoods: Array) -> Array:
-        """Take the log-likelihoods (20,) of a window; returns the probabilities (20,)."""
+        """Take the log-likelihoods of a window, as `of_states`; returns the probabilities."""
         relative = np.maximum(likelihoods - likelihoods.max(), -_CLIP)
         shares = (self.shares @ self._moves) * np.exp(self._weight * relative)
         self.shares = np.asarray(np.maximum(shares / shares.sum(), _LEAST))
@@ -85,17 +92,19 @@ class Belief:
 
 
 def of_states(likelihoods: Array) -> Array:
-    """Log-likelihoods (20,) of the states from those of the network's hypotheses (19,)."""
+    """Log-likelihoods of the states from those of the network's hypotheses (19,)."""
     found = np.append(likelihoods, likelihoods[EXTERNAL])
     faults = found[_FAULTS]
     most = faults.max()
     any_fault = most + np.log(np.mean(np.exp(faults - most)))
     found[OTHER] = np.logaddexp(found[OTHER], any_fault) - np.log(2.0)
-    return found
+    of_wheel = np.max([found[kind] for kind in (CONTROLS, ENCODERS, DRAGS, WEAKS)], axis=0)
+    ended = np.maximum(of_wheel, found[NORMAL]) - _GUESSED
+    return np.concatenate([found, np.tile(ended, _CATCHING_UP)])
 
 
 def _transitions(onset: float) -> Array:
-    """P(j -> k), (20, 20)."""
+    """P(j -> k)."""
     onset = min(onset, _PUSH)  # a fault, slip as well, is no likelier than a push
     moves = np.full((_STATES, _STATES), _OTHER)
     moves[:, LOADED] *= onset / _PUSH  # as rare beside a push as it is without a fault
@@ -104,18 +113,35 @@ def _transitions(onset: float) -> Array:
     moves[[NORMAL, EXTERNAL]] = onset
     moves[[NORMAL, EXTERNAL], SLIP] = min(_SLIPPERY * onset, _PUSH)
     for kind in (DRAGS, WEAKS, METERS):
-        moves[[NORMAL, EXTERNAL], kind] *= _SLOW
+        moves[[NORMAL, EXTERNAL, *_CATCHES_UP], kind] *= _SLOW
     moves[:, OTHER] *= _STRANGE
     moves[NORMAL, EXTERNAL] = _PUSH
     moves[EXTERNAL, NORMAL] = _PUSH_ENDING
+    _let_catch_up(moves)
     np.fill_diagonal(moves, 0.0)
     np.fill_diagonal(moves, 1.0 - moves.sum(axis=1))
     return moves
 
 
+def _let_catch_up(moves: Array) -> None:
+    """From a lost signal or encoder back to normal by way of `ENDED`, a tick after the other."""
+    ticks = np.arange(ENDED.start, ENDED.stop).reshape(_CATCHING_UP, 3)
+    moves[_CATCHES_UP, NORMAL] = 0.0
+    moves[:, ENDED] = 0.0
+    for kind in (CONTROLS, ENCODERS):
+        moves[range(kind.start, kind.stop), ticks[0]] = _ENDING
+    moves[ENDED] = moves[NORMAL]
+    moves[ENDED, NORMAL] = _CAUGHT_UP
+    moves[ticks[:-1], ticks[1:]] = 1.0 - moves[ticks[:-1]].sum(axis=-1)
+    moves[ticks[-1], NORMAL] += 1.0 - moves[ticks[-1]].sum(axis=-1)
+
+
 def named_of(shares: Array) -> Array:
     """Probabilities (..., 18) of `states.NAMED`: of a lost signal the wheel does not matter."""
     control = shares[..., CONTROLS].sum(axis=-1, keepdims=True)
-    first, last = shares[..., : CONTROLS.start], shares[..., EXTERNAL : EXTERNAL + 1]
+    well = shares[..., [NORMAL]] + shares[..., ENDED].sum(axis=-1, keepdims=True)
+    slip, last = shares[..., [SLIP]], shares[..., EXTERNAL : EXTERNAL + 1]
     middle = shares[..., ENCODERS.start : METERS.stop]
-    return np.concatenate([first, control, middle, last, shares[..., [LOADED, OTHER]]], axis=-1)
+    return np.concatenate(
+        [well, slip, control, middle, last, shares[..., [LOADED, OTHER]]], axis=-1
+    )

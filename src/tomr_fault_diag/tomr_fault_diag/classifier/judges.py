@@ -18,6 +18,7 @@ from tomr_fault_diag.classifier.belief import (
     CONTROLS,
     DRAGS,
     ENCODERS,
+    ENDED,
     EXTERNAL,
     LOADED,
     METERS,
@@ -58,7 +59,7 @@ _STANDING = 6  # ticks
 _STILL = 0.2  # of the expected speed: a slower wheel stands
 # Hypotheses that are named together.
 _GROUPS: tuple[list[int], ...] = (
-    [NORMAL, EXTERNAL],
+    [NORMAL, EXTERNAL, *range(ENDED.start, ENDED.stop)],
     [SLIP],
     list(range(CONTROLS.start, CONTROLS.stop)),
     *([kind.start + wheel for kind in (ENCODERS, DRAGS, WEAKS)] for wheel in range(WHEELS)),

@@ -65,7 +65,20 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
     _live("confirm_time", "of wang2024: a fault must lead so long to be named", 0.15, "s", 0.0, 10),
     _live("raise_time", "a fault must be sure so long to be named", 0.0, "s", 0.0, 60.0),
     _live(
-        "recovery_time", "normal must lead this long before it is named again", 1.0, "s", 0.0, 60.0
+        "recovery_time",
+        "normal must lead this long before it is named again after a fault",
+        0.6,
+        "s",
+        0.0,
+        60.0,
+    ),
+    _live(
+        "slip_recovery_time",
+        "the same after slip, which shows only while a wheel has to push",
+        1.0,
+        "s",
+        0.0,
+        60.0,
     ),
     _S(
         "latch",
@@ -90,7 +103,8 @@ class ClassifierSettings:
     filter_time: int = to_ns(0.15)
     confirm_time: int = to_ns(0.15)
     raise_time: int = 0
-    recovery_time: int = to_ns(1.0)
+    recovery_time: int = to_ns(0.6)
+    slip_recovery_time: int = to_ns(1.0)
     latch: bool = False
     report_period: int = to_ns(1.0)
     hardware_id: str = NAMELESS
@@ -119,6 +133,7 @@ class ClassifierSettings:
             confirm_time=to_ns(number("confirm_time")),
             raise_time=to_ns(number("raise_time")),
             recovery_time=to_ns(number("recovery_time")),
+            slip_recovery_time=to_ns(number("slip_recovery_time")),
             latch=bool(values["latch"]),
             report_period=to_ns(number("report_period")),
             hardware_id=str(values["hardware_id"]) or NAMELESS,

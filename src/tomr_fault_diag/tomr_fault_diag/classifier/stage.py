@@ -13,6 +13,7 @@ from tomr_fault_diag.classifier.states import (
     NOT_OBSERVABLE,
     POWER_SENSOR,
     PUSHED,
+    SLIP,
     STALE,
     STATES,
     UNKNOWN,
@@ -208,8 +209,14 @@ class FaultClassifier:
             self._enter(quiet, stamp, None)
         elif self.settings.latch:
             return
-        elif stamp - self._candidate_since >= self.settings.recovery_time:
+        elif stamp - self._candidate_since >= self._recovery:
             self._enter(quiet, self._candidate_since, None)
+
+    @property
+    def _recovery(self) -> int:
+        """How long normal must lead before what is named is let go [ns]."""
+        slips = self._state is STATES[SLIP]
+        return self.settings.slip_recovery_time if slips else self.settings.recovery_time
 
     def _enter(self, state: State, since: int, wheel: int | None) -> None:
         self._wheel = wheel
