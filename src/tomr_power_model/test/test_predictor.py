@@ -208,22 +208,24 @@ class TestEncoderWindow:
         assert np.isnan(self._fit(samples)[0]).all()
 
 
+@pytest.mark.parametrize("early", [0, 45], ids=["in time", "arriving early"])
 @pytest.mark.parametrize(
-    ("lost", "turning", "doubted"), [(None, True, 0), (20, True, 10), (20, False, 0)]
+    ("lost", "turning", "doubted"), [(None, True, 0), (20, True, 11), (20, False, 0)]
 )
 def test_after_a_lost_command_drivers_are_not_compared(
-    monkeypatch: pytest.MonkeyPatch, lost: int | None, turning: bool, doubted: int
+    monkeypatch: pytest.MonkeyPatch, lost: int | None, turning: bool, doubted: int, early: int
 ) -> None:
-    """Half a second, and only where the command changed meanwhile."""
+    """Half a second from the next one's stamp on, and only where the command changed meanwhile."""
     predictor = PowerPredictor(shipped_robot("reference"))
     forgotten: list[bool] = []
     monkeypatch.setattr(predictor._resting, "forget", lambda: forgotten.append(True))
-    start = 1_700_000_000_000_000_000
-    for tick in range(60):
-        stamp = start + tick * 50_000_000
-        if tick != lost:
-            predictor.command(stamp, (0.01 * tick if turning else 0.1, 0.0, 0.0))
-        for part in range(5):
-            predictor.encoders(stamp + part * 10_000_000, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    events = [(t - early, t, True) for t in range(0, 3000, 50) if t != 50 * (lost or -1)]
+    events += [(t, t, False) for t in range(0, 3000, 10)]
+    for _, at_ms, is_command in sorted(events):
+        if is_command:
+            speed = 2e-4 * at_ms if turning else 0.1
+            predictor.command(BASE + at_ms * MS, (speed, 0.0, 0.0))
+        else:
+            predictor.encoders(BASE + at_ms * MS, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         predictor.due()
-    assert abs(len(forgotten) - doubted) <= 1
+    assert len(forgotten) == doubted
