@@ -210,22 +210,50 @@ class TestEncoderWindow:
 
 @pytest.mark.parametrize("early", [0, 45], ids=["in time", "arriving early"])
 @pytest.mark.parametrize(
-    ("lost", "turning", "doubted"), [(None, True, 0), (20, True, 11), (20, False, 0)]
+    ("lost", "turning", "doubted"),
+    [
+        ((), True, 0),
+        ((20,), True, 11),
+        ((20,), False, 0),
+        ((3,), True, 0),  # before it is known what is usual
+        ((20, 23), True, 14),
+    ],
 )
 def test_after_a_lost_command_drivers_are_not_compared(
-    monkeypatch: pytest.MonkeyPatch, lost: int | None, turning: bool, doubted: int, early: int
+    monkeypatch: pytest.MonkeyPatch, lost: tuple[int, ...], turning: bool, doubted: int, early: int
 ) -> None:
     """Half a second from the next one's stamp on, and only where the command changed meanwhile."""
+    assert _doubted(monkeypatch, lost, turning, early) == doubted
+
+
+def test_while_commands_pause_drivers_are_not_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert _doubted(monkeypatch, tuple(range(20, 30)), False) > 10
+
+
+def test_a_lost_command_is_forgotten_where_the_clock_leaps(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert _doubted(monkeypatch, (20,), True, passes=2) == 11
+
+
+def _doubted(
+    monkeypatch: pytest.MonkeyPatch,
+    lost: tuple[int, ...],
+    turning: bool,
+    early: int = 0,
+    passes: int = 1,
+) -> int:
+    """In how many ticks the drivers' sums are forgotten; commands are lost in the first pass."""
     predictor = PowerPredictor(shipped_robot("reference"))
     forgotten: list[bool] = []
     monkeypatch.setattr(predictor._resting, "forget", lambda: forgotten.append(True))
-    events = [(t - early, t, True) for t in range(0, 3000, 50) if t != 50 * (lost or -1)]
-    events += [(t, t, False) for t in range(0, 3000, 10)]
-    for _, at_ms, is_command in sorted(events):
-        if is_command:
-            speed = 2e-4 * at_ms if turning else 0.1
-            predictor.command(BASE + at_ms * MS, (speed, 0.0, 0.0))
-        else:
-            predictor.encoders(BASE + at_ms * MS, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        predictor.due()
-    assert len(forgotten) == doubted
+    for number in range(passes):
+        missing = [50 * place for place in lost] if number == 0 else []
+        events = [(t - early, t, True) for t in range(0, 3000, 50) if t not in missing]
+        events += [(t, t, False) for t in range(0, 3000, 10)]
+        for _, at_ms, is_command in sorted(events):
+            if is_command:
+                speed = 2e-4 * at_ms if turning else 0.1
+                predictor.command(BASE + at_ms * MS, (speed, 0.0, 0.0))
+            else:
+                predictor.encoders(BASE + at_ms * MS, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+            predictor.due()
+    return len(forgotten)
