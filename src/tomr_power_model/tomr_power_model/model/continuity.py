@@ -48,7 +48,6 @@ class Continuity:
 
     def __init__(self, tolerance: Tolerance) -> None:
         self._tolerance = tolerance
-        self._read, self._was_read = 0, False
         self.clear()
 
     def leap(self) -> None:
