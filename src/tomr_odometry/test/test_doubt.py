@@ -42,14 +42,18 @@ def test_a_change_of_speed_goes_on_for_less() -> None:
         assert item.twist[0] == pytest.approx(speed, abs=1e-6)
 
 
-@pytest.mark.parametrize("has_imu", [True, False])
-def test_an_imu_tells_its_biases_where_the_robot_stands(has_imu: bool) -> None:
-    core = standing(has_imu)
-    assert core._has_stood == has_imu
+@pytest.mark.parametrize(
+    ("has_imu", "seconds", "is_sure"), [(True, 1.0, True), (True, 0.1, False), (False, 1.0, False)]
+)
+def test_an_imu_tells_its_biases_where_the_robot_stands(
+    has_imu: bool, seconds: float, is_sure: bool
+) -> None:
+    core = standing(has_imu, seconds)
+    assert core._has_stood == is_sure
     core._travel = np.array([1.0, 0.0])
     item = core._estimate(core._time)
     # Else wheels may slide unseen.
-    assert (item.twist_covariance[0, 0] > 0.3) != has_imu
+    assert (item.twist_covariance[0, 0] > 0.3) != is_sure
 
 
 @pytest.mark.parametrize(("seconds", "spread"), [(3.0, 3.0), (-4.0, 4.0), (100.0, 10.0)])
@@ -69,7 +73,7 @@ def test_biases_that_no_imu_has_are_a_start_that_misled(has_stood: bool) -> None
     core = standing(has_imu=True, seconds=0.1)
     core._has_stood, core._is_aided, core._trusted = has_stood, True, 2.0
     core._x[0], core._x[VX], core._x[GYRO] = 3.0, 0.5, 0.1
-    core._x[RIM : RIM + 3] = 7.0
+    core._x[RIM : RIM + 3], core._P[1, 1] = 7.0, 100.0
     ways = np.stack([np.full(3, 7.0), np.full(3, 1e-6)])
     core._advance(START, 0.001, ways, np.full(6, np.nan), np.zeros((0, 4)))
     assert (core._x[GYRO] == 0.0) != has_stood
@@ -77,5 +81,6 @@ def test_biases_that_no_imu_has_are_a_start_that_misled(has_stood: bool) -> None
     assert core._x[0] == pytest.approx(3.0, abs=0.01)  # what is known of the way is kept
     assert core._x[RIM] == pytest.approx(7.0, abs=0.01)
     assert (np.sqrt(core._P[0, 0]) > 0.9) != has_stood  # 2 s at 0.5 m/s
+    assert core._P[1, 1] > 99.0
     assert (np.sqrt(core._P[VX, VX]) > 0.4) != has_stood
     assert core._trusted == pytest.approx(2.001 if has_stood else 0.0)

@@ -21,9 +21,9 @@ from tomr_odometry.topics import (
     odometry_inputs,
 )
 from tomr_power_model.drive.sources import PowerReading
-from tomr_power_model.messages.bag import bag_message, to_bag
+from tomr_power_model.messages.bag import bag_header, bag_message, to_bag
 from tomr_power_model.messages.intake import Unusable
-from tomr_power_model.messages.types import TWIST
+from tomr_power_model.messages.types import TWIST, TWIST_STAMPED
 from tomr_power_model.model.ticks import Arrival
 
 SETTINGS = OdometrySettings()
@@ -99,9 +99,11 @@ def test_a_command_without_a_stamp_counts_when_it_comes() -> None:
     core = SlipOdometry(ROBOT)
     command = next(item for item in odometry_inputs(ROBOT, core) if item.topic == "cmd_vel")
     speed = bag_message("geometry_msgs/msg/Vector3", x=0.3)
-    twist = bag_message(TWIST, linear=speed)
-    assert command.take(twist, START) is None
-    assert core.command(START, (0.3, 0.0, 0.0)) is Arrival.REPEATED
+    plain = bag_message(TWIST, linear=speed)
+    unstamped = bag_message(TWIST_STAMPED, header=bag_header(0), twist=plain)
+    for stamp, message in ((START, plain), (START + 50_000_000, unstamped)):
+        assert command.take(message, stamp) is None
+        assert core.command(stamp, (0.3, 0.0, 0.0)) is Arrival.REPEATED
 
 
 def test_sensors_that_are_not_to_be_used_are_not() -> None:
@@ -111,11 +113,13 @@ def test_sensors_that_are_not_to_be_used_are_not() -> None:
         stamp, angle = START + 10_000_000 * sample, 0.05 * sample
         off.command(stamp, (0.3, 0.0, 0.0))
         off.encoders(stamp, (angle, angle, angle), (0.0, 0.0, 0.0))
+        off.imu(stamp, (0.0, 0.0, 0.0, 0.0, 0.0, 13.0 if sample > 20 else 9.81))
         for wheel in range(3):
             off.power(PowerReading(wheel, stamp, 5.0, 5.0 / 24.0, 24.0))
     last = list(off.due())[-1]
     assert np.isnan(last.traction).all()
     assert "imu/data" in last.missing
+    assert not last.is_carried
 
 
 def test_what_an_imu_says_that_it_does_not_measure_is_not_known() -> None:

@@ -122,6 +122,21 @@ def test_nothing_is_known_of_a_stream_most_of_which_cannot_be_placed(stamp: int)
     assert mixed.is_broken(BASE + 1980 * MS)
 
 
+@pytest.mark.parametrize("refused", [True, False], ids=["refused", "repeated"])
+def test_what_is_no_sample_takes_nothing_from_the_order_of_those_that_are(refused: bool) -> None:
+    stream = flow(1000)
+    for t in range(1000, 2000, 20):
+        stream.take(BASE + t * MS)
+        for _ in range(3):
+            if refused:
+                stream.refuse()
+            else:
+                stream.precedes(BASE + t * MS)
+    stream.misplace()
+    assert not stream.is_broken(BASE + 1980 * MS)
+    assert stream.refused == (150 if refused else 0)
+
+
 def test_it_is_said_once_a_second_and_on_a_change() -> None:
     reporter, stream = InputReporter(), flow(1520)
     for t in range(50, 4000, 50):
