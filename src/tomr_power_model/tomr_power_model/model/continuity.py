@@ -50,12 +50,6 @@ class Continuity:
         self._tolerance = tolerance
         self.clear()
 
-    def leap(self) -> None:
-        """Forget the stream where its stamps leap, but for having been heard."""
-        was_read = self._was_read or self._read > 0
-        self.clear()
-        self._was_read = was_read
-
     def clear(self) -> None:
         """Forget the stream."""
         self._was_read = False
@@ -75,6 +69,12 @@ class Continuity:
         self.gaps = 0
         self.resumed = 0  # first stamp after the last gap, 0: there was none
         self._until = 0
+
+    def leap(self) -> None:
+        """Forget the stream where its stamps leap, but for having been heard."""
+        was_read = self._was_read or self._read > 0
+        self.clear()
+        self._was_read = was_read
 
     def take(self, stamp_ns: int) -> None:
         """Take the stamp of a sample, newer than those before."""
