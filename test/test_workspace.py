@@ -151,6 +151,7 @@ def test_package_xml_agrees_with_setup(package: Path) -> None:
         ("maintainer", "maintainer"),
     ):
         assert root.findtext(tag) == told[key]
+    assert told["version"] == setup_arguments(PACKAGES[0])["version"]
     address = root.find("maintainer").attrib["email"]  # type: ignore[union-attr]
     assert address == told["maintainer_email"]
     # colcon builds plain Python, without a word, where it takes the address for invalid.

@@ -8,7 +8,7 @@ NAME = "tomr_odometry"
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="Odometry of an omni robot that knows of slip, from encoders, power and an IMU.",
     maintainer="TOMR maintainers",
     maintainer_email="maintainers@tomr.dev",

@@ -10,12 +10,15 @@ from attrs import evolve
 
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL, Residual, ResidualFrame
 from tomr_fault_diag.residuals.messages import frame_of, residual_message
+from tomr_fault_diag.residuals.settings import ResidualSettings
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
+from tomr_power_model.drive.sources import PowerReading
 from tomr_power_model.messages.bag import bag_header, bag_message, to_bag
 from tomr_power_model.messages.intake import Unusable
 from tomr_power_model.messages.readings import SupplyReading
 from tomr_power_model.model.prediction import Prediction
+from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.robot import Robot, shipped_robot
 
 MS = 1_000_000
@@ -41,6 +44,11 @@ def _battery(stamp: int, voltage: float, current: float) -> Any:
     return bag_message(
         "sensor_msgs/msg/BatteryState", header=bag_header(stamp), voltage=voltage, current=current
     )
+
+
+def _unstamped(message: Any) -> Any:
+    message.header = bag_header(0)
+    return message
 
 
 def _joints(stamp: int, effort: tuple[float, ...] = ()) -> Any:
@@ -217,6 +225,43 @@ def test_a_sensor_not_heard_since_the_stamps_leapt_is_not_silent_either() -> Non
     }
 
 
+def test_a_power_is_too_late_where_no_decision_can_rest_on_it() -> None:
+    def taken(at_ms: int, begun_ms: int = 0) -> Arrival | str:
+        stage = ResidualStage(_robot())
+        stage._decided = BASE + 10_000 * MS
+        if begun_ms:
+            stage.power(PowerReading(1, BASE + 10_000 * MS, 10.0, 10.0 / 24.0, 24.0))
+            stage.power(PowerReading(1, BASE + begun_ms * MS, 10.0, 10.0 / 24.0, 24.0))
+        return stage.power(PowerReading(1, BASE + at_ms * MS, 10.0, 10.0 / 24.0, 24.0))
+
+    stale = ResidualSettings().stale // MS
+    assert taken(10_000 - stale + 1) is Arrival.TAKEN
+    assert "too old" in str(taken(10_000 - stale))
+    assert taken(1_010, begun_ms=1_000) is Arrival.TAKEN  # the clock begins anew
+
+
+def test_after_a_leap_back_the_stage_is_as_at_its_start() -> None:
+    def frames(stage: ResidualStage, power: float, start: int) -> list[ResidualFrame]:
+        takers, found = {item.topic: item.take for item in residual_inputs(_robot(), stage)}, []
+        watts = {topic: lambda t: _battery(t, 24.0, -power / 24.0) for topic in WATTS}
+        for step in range(80):
+            stamp = start + step * 10 * MS
+            if step % 5 == 0:
+                stage.prediction(_prediction(stamp, power))
+            for name, make in (ALL | watts).items():
+                takers[name](make(stamp), stamp)
+            found += stage.due()
+        return found
+
+    used, fresh = ResidualStage(_robot()), ResidualStage(_robot())
+    frames(used, 10.0, BASE + 100_000 * MS)
+    again, wanted = frames(used, 14.0, BASE), frames(fresh, 14.0, BASE)
+    # Encoders are a gap at first: who knows what happened meanwhile.
+    assert again[6:] == wanted[6:]
+    motors = [[frame.residuals[place] for place in MOTORS] for frame in again[1:]]
+    assert motors == [[frame.residuals[place] for place in MOTORS] for frame in wanted[1:]]
+
+
 def test_what_no_supply_can_deliver_is_no_sample() -> None:
     def absurd(at: int, message: Any) -> Any:
         if at == 600:
@@ -229,16 +274,22 @@ def test_what_no_supply_can_deliver_is_no_sample() -> None:
 
 
 @pytest.mark.parametrize(
-    ("topic", "bad"),
+    ("topic", "bad", "words"),
     [
-        ("wheel_2/power", lambda t: _battery(t, 24.0, NAN)),
-        ("wheel_2/power", lambda t: _battery(t, 1e30, 1.0)),
-        ("battery_state", lambda t: _battery(t, NAN, -1.0)),
-        ("joint_states", lambda t: Message(header=_joints(t).header, name=None)),
+        ("wheel_2/power", lambda t: _battery(t, 24.0, NAN), "sends what cannot be used"),
+        ("wheel_2/power", lambda t: _battery(t, 1e30, 1.0), "sends what cannot be used"),
+        ("battery_state", lambda t: _battery(t, NAN, -1.0), "sends what cannot be used"),
+        (
+            "joint_states",
+            lambda t: Message(header=_joints(t).header, name=None),
+            "sends what cannot be used",
+        ),
+        ("joint_states", lambda t: _unstamped(_joints(t)), "its stamps do not fit"),
+        ("battery_state", lambda t: _unstamped(ALL["battery_state"](t)), "its stamps do not fit"),
     ],
 )
 def test_an_input_that_sends_what_cannot_be_used_says_so(
-    topic: str, bad: Callable[[int], Any]
+    topic: str, bad: Callable[[int], Any], words: str
 ) -> None:
     robot = _robot()
     stage = ResidualStage(robot)
@@ -254,7 +305,7 @@ def test_an_input_that_sends_what_cannot_be_used_says_so(
         stage.due()
         for report in stage.reports():
             said.update({status.name: status.message for status in report.statuses})
-    assert said.pop(f"inputs: {topic}") == "sends what cannot be used"
+    assert said.pop(f"inputs: {topic}") == words
     assert set(said.values()) == {"as it should be"}
 
 

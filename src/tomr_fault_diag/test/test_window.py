@@ -232,6 +232,37 @@ def test_a_force_is_a_push_first_and_a_load_when_it_lasts() -> None:
     assert belief.shares[NORMAL] > 0.99
 
 
+@pytest.mark.parametrize(
+    ("state", "decades"),
+    [(SLIP, -4), (ENCODERS.start, -9), (DRAGS.start, -13), (OTHER, -11), (EXTERNAL, -3)],
+)
+def test_how_rare_each_state_is_before_anything_was_seen(state: int, decades: int) -> None:
+    belief = Belief(0.5, 9.0)
+    belief.update(_against_all_but(state, 10.0))
+    odds = belief.shares[state] / belief.shares[NORMAL]
+    assert np.log10(odds / np.exp(5.0)) == pytest.approx(decades, abs=0.2)
+
+
+def test_a_slippery_place_is_left_sooner_than_a_fault_ends() -> None:
+    ends = []
+    for state in (SLIP, ENCODERS.start):
+        belief = Belief(0.5, 9.0)
+        belief.shares = np.eye(len(STATE_OF))[state]
+        ends.append(belief.update(np.zeros(len(STATE_OF)))[NORMAL])
+    assert ends == pytest.approx([5e-3, 1e-4], rel=0.01)
+
+
+def test_evidence_is_none_where_windows_speak_against_the_fault() -> None:
+    network = Saying()
+    network.likelihoods[:] = -20.0
+    network.likelihoods[[NORMAL, ENCODERS.start]] = 0.0, -6.0
+    settings = ClassifierSettings(caution=30.0, striking=-100.0)
+    judge = WindowJudge(network, settings)  # type: ignore[arg-type]
+    for tick in range(20):
+        judge.judge(frame(tick), 50 * MS, Unseen())
+    assert judge.evidence() == 0.0
+
+
 def test_a_push_is_no_load_either_where_a_fault_was_believed() -> None:
     belief = Belief(0.5, 11.0)
     for _ in range(20):
@@ -514,6 +545,16 @@ def test_a_robot_that_stands_says_the_same_again_and_again() -> None:
     assert share(slight, ENCODERS.start, Unseen()) < 0.01
     assert share(slight, ENCODERS.start, still) > 0.99
     assert share(striking, ENCODERS.start, still) < 0.01
+
+    def believed(size: float) -> float:
+        network = Saying()
+        judge = WindowJudge(network, settings)  # type: ignore[arg-type]
+        network.likelihoods[ENCODERS.start] = size
+        for tick in range(40):
+            judge.judge(frame(tick), 50 * MS, still)
+        return float(judge._belief.shares[ENCODERS.start])
+
+    assert believed(-10.0) == believed(0.0)
 
 
 def test_robots_that_lack_a_sensor_look_as_modelled_there() -> None:

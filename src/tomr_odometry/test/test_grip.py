@@ -1,9 +1,12 @@
 """How much traction there is, and where it gave way."""
 
+import math
+
 import numpy as np
 import pytest
 from odometry_drives import ROBOT, START, drive, ice, play
 
+from tomr_odometry import grip
 from tomr_odometry.estimate import Estimate
 from tomr_odometry.grip import SIDE, UNKNOWN, Available, Floor
 from tomr_odometry.settings import OdometrySettings
@@ -69,13 +72,33 @@ def test_the_floor_is_marked_where_contacts_slid() -> None:
 
 def test_contacts_turn_with_the_robot() -> None:
     floor = Floor(ROBOT)
-    pose, angle = np.array([10.0, 10.0, 0.7]), ROBOT.wheel_offset + 0.7  # on a corner of cells
+    pose, angle = np.array([10.0, 10.0, 2.5]), ROBOT.wheel_offset + 2.5  # on a corner of cells
     floor.take(pose, np.array([True, False, False]), np.zeros(3))
     grid = floor.grid()
     assert grid is not None
     first = pose[:2] + ROBOT.robot_radius * np.array([np.cos(angle), np.sin(angle)])
     column, row = ((first - grid.corner) // SIDE).astype(int)
     assert grid.cells[row, column] == 100
+    assert (grid.cells > 0).sum() == 1
+
+
+def test_of_a_large_floor_the_newest_cells_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(grip, "_MOST_CELLS", 6)
+    floor = Floor(ROBOT)
+    for x in (0.0, 5.0, 10.0):
+        floor.take(np.array([x, 0.0, 0.0]), NO, np.zeros(3))
+    floor.take(np.array([math.nan, 0.0, 0.0]), NO, np.zeros(3))
+    grid = floor.grid()
+    assert grid is not None
+    assert (grid.cells != UNKNOWN).sum() <= 6
+    assert 4.0 < grid.corner[0] < 5.0
+
+
+def test_what_a_wheel_transmitted_long_ago_may_be_gone() -> None:
+    limit = Available()
+    limit.take(np.full(3, 8.0), STD, NO, 0.01)
+    limit.take(np.full(3, 1.0), STD, NO, 4.0)
+    assert limit.interval[:, 0] == pytest.approx(7.0 * math.exp(-2.0))
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from attrs import evolve
 
+from tomr_odometry.learn import drives
 from tomr_odometry.learn.drives import Leg, leg_of, read_legs
 from tomr_odometry.learn.fit import Batch, fit_creep
 from tomr_odometry.reference import Path2D, reference_of
 from tomr_odometry.start import body_of
+from tomr_power_model.errors import InputError
 from tomr_power_model.messages.bag import bag_header, bag_message
 from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import shipped_robot
@@ -51,14 +54,16 @@ def test_several_floors_share_one_coefficient_and_say_how_far_they_are_apart() -
     assert 0.1 < found.uncertainty < 0.3
 
 
-def _straight(lag: float = 0.0, jump: float = 0.0, turned: float = 0.0) -> Leg | None:
-    """4 s of which 3 s are driven at 0.5 m/s, heading 0.4 rad, seen by a reference."""
+def _straight(
+    lag: float = 0.0, jump: float = 0.0, turned: float = 0.0, speed: float = 0.5
+) -> Leg | None:
+    """4 s of which 3 s are driven at a speed [m/s], heading 0.4 rad, seen by a reference."""
     seconds = np.arange(0.0, 4.0, 0.01)
     stamps = (1e9 * seconds).astype(np.int64)
-    way = 0.5 * np.clip(seconds - lag - 0.5, 0.0, 3.0)
+    way = speed * np.clip(seconds - lag - 0.5, 0.0, 3.0)
     pose = np.stack([way * math.cos(0.4), way * math.sin(0.4), np.full(400, 0.4 + turned)], axis=1)
     pose[200:, 0] += jump
-    rims = 0.5 * np.clip(seconds - 0.5, 0.0, 3.0)[:, None] * (BODY.rows @ (1.0, 0.0, 0.0))
+    rims = speed * np.clip(seconds - 0.5, 0.0, 3.0)[:, None] * (BODY.rows @ (1.0, 0.0, 0.0))
     return leg_of(stamps, rims, np.zeros((400, 3)), Path2D(stamps, pose), -turned)
 
 
@@ -91,6 +96,41 @@ def test_legs_of_a_recording_end_where_it_did() -> None:
     assert leg.way == pytest.approx(4.8, abs=0.1)
 
 
+def test_long_drives_are_cut_into_legs_of_the_time_of_the_reference(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = shipped_robot("reference")
+    (whole,) = read_legs(BAG, robot, "ground_truth/odom")
+    monkeypatch.setattr(drives, "LEG_S", 4.0)
+    legs = read_legs(BAG, robot, "ground_truth/odom")
+    assert len(legs) > 2
+    assert max(len(leg.steps) for leg in legs) <= 400
+    assert sum(leg.way for leg in legs) == pytest.approx(whole.way, abs=0.3)
+    monkeypatch.undo()
+    with open_recording(BAG) as recording:
+        known = reference_of(recording, "ground_truth/odom")
+    late = Path2D(known.stamps[200:], known.pose[200:])
+    monkeypatch.setattr(drives, "reference_of", lambda *_: late)
+    (rest,) = read_legs(BAG, robot, "ground_truth/odom")
+    missing = 1e-7 * (known.stamps[200] - known.stamps[0])  # samples of 10 ms
+    assert len(whole.steps) - len(rest.steps) == pytest.approx(missing, abs=2)
+
+
+def test_learning_needs_power_and_a_pose() -> None:
+    robot = shipped_robot("reference")
+    deaf = evolve(robot, measurement=evolve(robot.measurement, source="total_only"))
+    with pytest.raises(InputError, match="no motor power"):
+        read_legs(BAG, deaf, "ground_truth/odom")
+    for topic in ("joint_states", "ground_truth/odom:base_link"):
+        with pytest.raises(InputError, match="give a nav_msgs/Odometry, a pose, or tf:CHILD"):
+            read_legs(BAG, robot, topic)
+
+
+def test_a_leg_that_hardly_moved_is_left_out() -> None:
+    assert _straight(speed=0.05) is None
+    assert _straight(speed=0.1) is not None
+
+
 def test_a_reference_from_tf_is_that_of_the_named_frame(tmp_path: Path) -> None:
     def transform(frame: str, stamp: int, x: float, yaw: float) -> Any:
         turn = bag_message(
@@ -113,10 +153,11 @@ def test_a_reference_from_tf_is_that_of_the_named_frame(tmp_path: Path) -> None:
             stamp = 1_000_000_000 + k * 10_000_000
             both = [
                 transform("camera", stamp, 5.0, 0.0),
-                transform("base_link", stamp, 0.1 * k, 0.4 * k),
+                transform("/base_link", stamp, math.nan if k == 7 else 0.1 * k, 0.4 * k),
             ]
             message = bag_message("tf2_msgs/msg/TFMessage", transforms=both)
             writer.write("/tf", "tf2_msgs/msg/TFMessage", message, stamp)
     with open_recording(tmp_path / "bag") as recording:
         path = reference_of(recording, "tf:base_link")
     assert path.pose[-1] == pytest.approx((1.9, 0.0, 7.6))  # the heading goes on beyond a turn
+    assert len(path.pose) == 19

@@ -3,13 +3,15 @@
 import math
 
 import pytest
+from attrs import evolve
 
+from tomr_odometry.start import body_of
 from tomr_odometry.traction import Tractions
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.binding import plain
 from tomr_power_model.dynamics.numbers import laid_out
 from tomr_power_model.dynamics.vehicle import vehicle_of
-from tomr_power_model.robot import shipped_robot
+from tomr_power_model.robot import Robot, shipped_robot
 
 ROBOT = shipped_robot("reference")
 WHEELS = 3
@@ -55,3 +57,79 @@ def test_nothing_is_said_without_a_command_or_power() -> None:
     tractions.command(200_000_000, (0.3, 0.0, 0.0))
     assert tractions.power(200_000_000, 0, math.nan) is None
     assert tractions.power(200_000_000, 0, 5.0) is not None
+
+
+def _started(robot: Robot, last: int, change: float = 20.0) -> Tractions:
+    """Wheels at 10 rad/s that change their speed from 0.8 s on [rad/s^2], until `last` [10 ms]."""
+    tractions = Tractions(robot)
+    tractions.command(0, (0.3, 0.0, 0.0))
+    for sample in range(1, last + 1):
+        time = 0.01 * sample
+        angle = 10.0 * time + 0.5 * change * max(time - 0.8, 0.0) ** 2
+        tractions.encoders(10_000_000 * sample, (angle,) * 3)
+    return tractions
+
+
+def test_speeds_are_those_in_the_middle_of_what_a_power_averages() -> None:
+    robot = evolve(ROBOT, sensors=evolve(ROBOT.sensors, power_window=0.02))
+    found = _started(robot, 100).power(1_000_000_000, 0, 20.0)
+    assert found is not None
+    assert found.speed == pytest.approx(10.0 + 20.0 * 0.19, abs=1e-6)
+
+
+def test_a_power_long_after_the_last_encoder_sample_tells_nothing() -> None:
+    assert _started(ROBOT, 100).power(1_200_000_000, 0, 20.0) is not None
+    assert _started(ROBOT, 100).power(1_300_000_000, 0, 20.0) is None
+
+
+@pytest.mark.parametrize(("signed", "speed", "sign"), [(True, -1.0, 1.0), (False, -1.0, -1.0)])
+def test_a_magnitude_of_current_is_taken_to_drive(signed: bool, speed: float, sign: float) -> None:
+    measurement = evolve(ROBOT.measurement, quantity="motor_current", signed=signed)
+    tractions = Tractions(evolve(ROBOT, measurement=measurement))
+    tractions.command(0, (0.3, 0.0, 0.0))
+    for sample in range(1, 20):
+        tractions.encoders(10_000_000 * sample, (0.1 * speed * sample,) * 3)
+    found = tractions.power(190_000_000, 0, 2.0)
+    assert found is not None
+    assert math.copysign(1.0, found.force) == sign
+
+
+def _one_of_two(law: float, change: float = -20.0) -> tuple[list[float], float, float, float]:
+    """Both currents of a power, which is taken for a law's voltage between them, noise, rolling."""
+    tractions, motion = Tractions(ROBOT), _motion(4.0, change)
+    numbers, laws = laid_out(vehicle_of(ROBOT)).tolist(), plain(tuple(ROBOT.physics))
+    power, both = [0.0] * 12, [0.0] * 6
+    laws.drive_power(numbers, motion, power, WHEELS)
+    laws.motor_currents(numbers, motion, power[at.POWER_DRAWN :: at.POWER_WHEEL], both, WHEELS)
+    current = both[0] + law * (both[1] - both[0])
+    motor = ROBOT.motors[0]
+    held = motor.resistance * current + motor.wheel_constant * 4.0
+    motion[at.MOTION_HEADER + at.MOTION_VOLTAGE] = held
+    found, noise, _ = tractions._current(0, power[at.POWER_DRAWN], motion)
+    return both[:2], found, noise, power[at.POWER_CURRENT]
+
+
+def test_the_drivers_law_tells_which_current_it_is_and_rolling_where_that_does_not() -> None:
+    for law, side in ((0.0, 0), (1.0, 1)):
+        both, found, noise, _ = _one_of_two(law)
+        assert found == both[side]
+        assert noise < 0.1 * (both[1] - both[0])
+    sure = noise
+    both, found, noise, rolling = _one_of_two(0.5)
+    assert abs(found - rolling) < 0.5 * (both[1] - both[0])
+    assert noise > 1.05 * sure  # the other one is not beyond doubt
+
+
+def test_what_a_driver_has_summed_up_follows_the_measured_power() -> None:
+    """So its law tells the voltage that it holds, whatever it held when it was heard first."""
+    measurement, motor = evolve(ROBOT.measurement, quantity="motor_current"), ROBOT.motors[0]
+    tractions, (body, radius) = Tractions(evolve(ROBOT, measurement=measurement)), body_of(ROBOT)
+    x, y, turning = (body.to_twist @ (10.0 * radius)).tolist()  # what the wheels do is asked for
+    tractions.command(0, (x, y, turning))
+    for sample in range(1, 200):
+        tractions.encoders(10_000_000 * sample, (0.1 * sample,) * 3)
+        tractions.power(10_000_000 * sample, 0, 0.5)
+    motion = tractions._motion(2_000_000_000)
+    assert motion is not None
+    held = motor.resistance * 0.5 + motor.wheel_constant * 10.0
+    assert motion[at.MOTION_HEADER + at.MOTION_VOLTAGE] == pytest.approx(held, rel=0.02)

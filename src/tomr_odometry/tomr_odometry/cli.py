@@ -16,7 +16,7 @@ from tomr_odometry.reference import Path2D, reference_of, wheel_path
 from tomr_odometry.settings import PARAMETERS, OdometrySettings
 from tomr_odometry.summary import lines, summary
 from tomr_odometry.topics import estimate_messages
-from tomr_power_model.cli import EXIT_OK, run_main
+from tomr_power_model.cli import EXIT_OK, PrintAndLeave, run_main
 from tomr_power_model.errors import InputError
 from tomr_power_model.files import make_folder, write_together
 from tomr_power_model.messages.bag import to_bag
@@ -54,21 +54,15 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--reference", metavar="TOPIC", help="a known pose, to compare with")
     parser.add_argument("--namespace", help="of the robot's topics, if the bag holds several")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE")
-    parser.add_argument("--parameters", action=_ListParameters, help="list all parameters")
+    parser.add_argument(
+        "--parameters",
+        action=PrintAndLeave,
+        nargs=0,
+        const=lambda: (spec.summary for spec in PARAMETERS),
+        help="list all parameters",
+    )
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
     return parser
-
-
-class _ListParameters(argparse.Action):
-    """Prints the table of parameters and leaves."""
-
-    def __init__(self, option_strings: Sequence[str], dest: str, help: str | None = None) -> None:
-        super().__init__(option_strings, dest, nargs=0, help=help)
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        for spec in PARAMETERS:
-            print(spec.summary)
-        parser.exit()
 
 
 def _play(

@@ -208,22 +208,55 @@ class TestEncoderWindow:
         assert np.isnan(self._fit(samples)[0]).all()
 
 
+@pytest.mark.parametrize("early", [0, 45], ids=["in time", "arriving early"])
 @pytest.mark.parametrize(
-    ("lost", "turning", "doubted"), [(None, True, 0), (20, True, 10), (20, False, 0)]
+    ("lost", "turning", "doubted"),
+    [
+        ((), True, 0),
+        ((20,), True, 11),
+        ((20,), False, 0),
+        ((3,), True, 0),  # before it is known what is usual
+        ((20, 23), True, 14),
+    ],
 )
 def test_after_a_lost_command_drivers_are_not_compared(
-    monkeypatch: pytest.MonkeyPatch, lost: int | None, turning: bool, doubted: int
+    monkeypatch: pytest.MonkeyPatch, lost: tuple[int, ...], turning: bool, doubted: int, early: int
 ) -> None:
-    """Half a second, and only where the command changed meanwhile."""
+    """Half a second from the next one's stamp on, and only where the command changed meanwhile."""
+    assert _doubted(monkeypatch, lost, turning, early) == doubted
+
+
+def test_while_commands_pause_drivers_are_not_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert _doubted(monkeypatch, tuple(range(20, 30)), False) > 10
+
+
+def test_a_lost_command_is_forgotten_where_the_clock_leaps(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert _doubted(monkeypatch, (20,), True, passes=(1200, 3000)) == 3
+
+
+def _doubted(
+    monkeypatch: pytest.MonkeyPatch,
+    lost: tuple[int, ...],
+    turning: bool,
+    early: int = 0,
+    passes: tuple[int, ...] = (3000,),
+) -> int:
+    """In how many ticks the drivers' sums are forgotten; commands are lost in the first pass.
+
+    `passes`: length of each [ms]; the clock begins anew with it.
+    """
     predictor = PowerPredictor(shipped_robot("reference"))
     forgotten: list[bool] = []
     monkeypatch.setattr(predictor._resting, "forget", lambda: forgotten.append(True))
-    start = 1_700_000_000_000_000_000
-    for tick in range(60):
-        stamp = start + tick * 50_000_000
-        if tick != lost:
-            predictor.command(stamp, (0.01 * tick if turning else 0.1, 0.0, 0.0))
-        for part in range(5):
-            predictor.encoders(stamp + part * 10_000_000, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        predictor.due()
-    assert abs(len(forgotten) - doubted) <= 1
+    for number, end in enumerate(passes):
+        missing = [50 * place for place in lost] if number == 0 else []
+        events = [(t - early, t, True) for t in range(0, end, 50) if t not in missing]
+        events += [(t, t, False) for t in range(0, end, 10)]
+        for _, at_ms, is_command in sorted(events):
+            if is_command:
+                speed = 2e-4 * at_ms if turning else 0.1
+                predictor.command(BASE + at_ms * MS, (speed, 0.0, 0.0))
+            else:
+                predictor.encoders(BASE + at_ms * MS, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+            predictor.due()
+    return len(forgotten)

@@ -4,6 +4,7 @@
 of the command itself 70 (sysexits.h: EX_SOFTWARE), results that could not be said 74 (EX_IOERR).
 """
 
+import argparse
 import contextlib
 import errno
 import os
@@ -58,6 +59,15 @@ def run_main(main: Main, arguments: Sequence[str] | None = None) -> int:
         return EXIT_PIPE_CLOSED
     except Exception as error:  # noqa: BLE001 the outermost place: 1 must not come of it
         return _interrupted() if _signals else _fail(*_told(error))
+
+
+class PrintAndLeave(argparse.Action):
+    """An option, with `nargs=0`, that prints the lines that its `const` gives, and nothing else."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        for line in self.const():
+            print(line)
+        parser.exit()
 
 
 def run_module(name: str) -> int:

@@ -37,7 +37,7 @@ from tomr_fault_diag.diagnosis.words import (
     total_line,
     verdict,
 )
-from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_MISMATCH, EXIT_OK, run_main
+from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_MISMATCH, EXIT_OK, PrintAndLeave, run_main
 from tomr_power_model.errors import InputError, one_line
 from tomr_power_model.files import make_folder
 from tomr_power_model.messages.plain import NANOSECONDS
@@ -103,20 +103,14 @@ def _parser() -> argparse.ArgumentParser:
         help="a parameter; --parameters lists them",
     )
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
-    parser.add_argument("--parameters", action=_ListParameters, help="list all keys of robot.yaml")
+    parser.add_argument(
+        "--parameters",
+        action=PrintAndLeave,
+        nargs=0,
+        const=summaries,
+        help="list all keys of robot.yaml",
+    )
     return parser
-
-
-class _ListParameters(argparse.Action):
-    """Prints the table of parameters and leaves."""
-
-    def __init__(self, option_strings: Sequence[str], dest: str, help: str | None = None) -> None:
-        super().__init__(option_strings, dest, nargs=0, help=help)
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        for line in summaries():
-            print(line)
-        parser.exit()
 
 
 def _tasks(options: argparse.Namespace) -> list[Task]:

@@ -84,8 +84,9 @@ def test_a_tick_rests_on_what_came_up_to_it() -> None:
 
 def test_after_a_leap_of_the_stamps_comes_a_gap_and_not_at_the_start() -> None:
     first, leapt = flow(1000), flow(1000)
-    leapt.leap()
-    assert leapt.is_misplaced(BASE + 5000 * MS)  # heard before the leap and not since
+    for _ in range(2):
+        leapt.leap()
+        assert leapt.is_misplaced(BASE + 5000 * MS)  # heard before the leap and not since
     leapt.take(BASE + 5000 * MS)
     assert not first.is_broken(BASE)
     assert leapt.is_broken(BASE + 5040 * MS)
@@ -109,15 +110,31 @@ def test_a_sensor_whose_stamps_do_not_fit_is_not_silent_and_says_so(stamp: int) 
     assert not stream.is_misplaced(BASE + 1020 * MS)
 
 
-def test_nothing_is_known_of_a_stream_most_of_which_cannot_be_placed() -> None:
+@pytest.mark.parametrize("stamp", [0, BASE], ids=["without a stamp", "old"])
+def test_nothing_is_known_of_a_stream_most_of_which_cannot_be_placed(stamp: int) -> None:
     ordered, mixed = flow(1000), flow(1000)
     for t in range(1000, 2000, 20):
         for stream, strays in ((ordered, 1), (mixed, 3)):
             stream.take(BASE + t * MS)
             for _ in range(strays):
-                stream.precedes(BASE + (t - 300) * MS)
+                stream.precedes(stamp)
     assert not ordered.is_broken(BASE + 1980 * MS)
     assert mixed.is_broken(BASE + 1980 * MS)
+
+
+@pytest.mark.parametrize("refused", [True, False], ids=["refused", "repeated"])
+def test_what_is_no_sample_takes_nothing_from_the_order_of_those_that_are(refused: bool) -> None:
+    stream = flow(1000)
+    for t in range(1000, 2000, 20):
+        stream.take(BASE + t * MS)
+        for _ in range(3):
+            if refused:
+                stream.refuse()
+            else:
+                stream.precedes(BASE + t * MS)
+    stream.misplace()
+    assert not stream.is_broken(BASE + 1980 * MS)
+    assert stream.refused == (150 if refused else 0)
 
 
 def test_it_is_said_once_a_second_and_on_a_change() -> None:

@@ -73,6 +73,16 @@ def test_what_a_push_leaves_in_a_driver_is_expected_of_its_wheel(path: CommandPa
     assert path.wheel(at.INTEGRAL)[1:] == [0.0, 0.0]
 
 
+def test_a_wheel_that_hardly_moves_stands(path: CommandPath) -> None:
+    assert _sum_after(path, 0.1, 0.03) < 0.0
+
+
+def test_nothing_is_taken_over_from_a_wheel_that_is_to_turn(path: CommandPath) -> None:
+    assert path.state is not None
+    path.state[at.STATE_HEADER + at.SPEED] = path.state[at.STATE_HEADER + at.ASKED] = 0.6
+    assert _sum_after(path, 0.1, 0.0) == 0.0
+
+
 def test_nothing_is_taken_over_from_a_wheel_in_motion(path: CommandPath) -> None:
     assert _sum_after(path, 0.1, 2.0) == 0.0
 
@@ -100,8 +110,24 @@ def test_a_simulated_wheel_that_creeps_takes_over_nothing(path: CommandPath) -> 
     assert _sum_after(path, 0.1, 0.0) == 0.0
 
 
+def test_while_the_simulation_creeps_nothing_is_taken_over_and_then_it_is(
+    path: CommandPath,
+) -> None:
+    drivers, angle = RestingDrivers(ROBOT), (0.1, 0.0, 0.0)
+    assert path.state is not None
+    drivers.voltages(path, REST, (2.0, 0.0, 0.0), 1.0)
+    path.state[at.STATE_HEADER + at.SPEED] = 0.1
+    drivers.voltages(path, angle, REST, 1.0)
+    assert path.wheel(at.INTEGRAL)[0] == 0.0
+    path.state[at.STATE_HEADER + at.SPEED] = 0.0
+    drivers.voltages(path, angle, REST, 1.0)
+    assert path.wheel(at.INTEGRAL)[0] == pytest.approx(-0.05, abs=0.002)
+
+
 def test_an_angle_that_is_not_known_leaves_the_simulation_alone(path: CommandPath) -> None:
     assert _sum_after(path, math.nan, 0.0) == 0.0
+    unknown = RestingDrivers(ROBOT).voltages(path, (math.nan, 0.0, 0.0), REST, 1.0)
+    assert unknown == pytest.approx(REST)  # as the simulation has it
 
 
 def test_a_sum_that_would_turn_the_wheel_is_not_the_drivers(path: CommandPath) -> None:
@@ -113,8 +139,10 @@ def test_a_sum_that_would_turn_the_wheel_is_not_the_drivers(path: CommandPath) -
     assert path.state is not None
     path.state[at.STATE_HEADER + at.SPEED] = -0.02  # it gives way
     for _ in range(3):
-        drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0)
+        volts = drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0)
         path.state[at.STATE_HEADER + at.SPEED] = 0.0
+    assert volts[0] == pytest.approx(12.0 * taken)
+    drivers.voltages(path, (0.2, 0.0, 0.0), REST, 1.0)
     assert path.wheel(at.INTEGRAL)[0] == taken
 
 
@@ -131,3 +159,18 @@ def test_after_what_is_not_known_the_sums_are_taken_for_equal(path: CommandPath)
     drivers.voltages(path, REST, REST, 1.0)
     drivers.forget()
     assert drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0) == pytest.approx(REST)
+
+
+def test_after_a_leap_of_the_clock_nothing_is_remembered(path: CommandPath) -> None:
+    drivers = RestingDrivers(ROBOT)
+    assert path.state is not None
+    for angle in (0.0, 0.6):  # a difference that no push makes
+        drivers.voltages(path, (angle, 0.0, 0.0), REST, 1.0)
+    drivers.clear()
+    assert drivers.voltages(path, (0.6, 0.0, 0.0), REST, 0.25) == pytest.approx(REST)
+    drivers.clear()
+    path.state[at.STATE_HEADER + at.SPEED] = 0.1
+    drivers.voltages(path, REST, REST, 1.0)
+    path.state[at.STATE_HEADER + at.SPEED] = 0.0
+    drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0)
+    assert path.wheel(at.INTEGRAL)[0] < 0.0

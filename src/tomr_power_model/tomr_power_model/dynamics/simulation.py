@@ -78,6 +78,10 @@ class Simulation:
         """A field of all wheels."""
         return as_list(state[at.STATE_HEADER + field :: at.STATE_WHEEL])
 
+    def add_to_sum(self, state: State, wheel: int, angle: float) -> None:
+        """Add to what a wheel's driver has summed up of its errors [rad]."""
+        state[at.STATE_HEADER + wheel * at.STATE_WHEEL + at.INTEGRAL] += angle
+
 
 def as_list(values: State) -> list[float]:
     """Numbers of a state or of outputs as a list."""

@@ -148,8 +148,7 @@ class CommandPath:
     def add_to_sum(self, wheel: int, angle: float) -> None:
         """Add to what a wheel's driver has summed up of its errors [rad]."""
         assert self.state is not None
-        place = at.STATE_HEADER + wheel * at.STATE_WHEEL + at.INTEGRAL
-        self.state[place] += angle
+        self._simulation.add_to_sum(self.state, wheel, angle)
 
     def over(self, tick_ns: int, seen: Seen) -> Commanded | None:
         """Means over the window that ends at a tick, or None without a command.

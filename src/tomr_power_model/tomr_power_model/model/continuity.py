@@ -48,14 +48,7 @@ class Continuity:
 
     def __init__(self, tolerance: Tolerance) -> None:
         self._tolerance = tolerance
-        self._read, self._was_read = 0, False
         self.clear()
-
-    def leap(self) -> None:
-        """Forget the stream where its stamps leap, but for having been heard."""
-        was_read = self._was_read or self._read > 0
-        self.clear()
-        self._was_read = was_read
 
     def clear(self) -> None:
         """Forget the stream."""
@@ -76,6 +69,12 @@ class Continuity:
         self.gaps = 0
         self.resumed = 0  # first stamp after the last gap, 0: there was none
         self._until = 0
+
+    def leap(self) -> None:
+        """Forget the stream where its stamps leap, but for having been heard."""
+        was_read = self._was_read or self._read > 0
+        self.clear()
+        self._was_read = was_read
 
     def take(self, stamp_ns: int) -> None:
         """Take the stamp of a sample, newer than those before."""

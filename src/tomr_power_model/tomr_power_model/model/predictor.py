@@ -93,7 +93,7 @@ class PowerPredictor:
         self._gyro: tuple[int, float] | None = None
         self._given: tuple[int, Triple] | None = None  # the newest command
         self._intervals: deque[int] = deque(maxlen=_INTERVALS)  # of the commands [ns]
-        self._unsure_until = 0  # ns
+        self._losses: deque[int] = deque()  # stamps of commands before which one was lost
         self._heading = 0.0  # at the start of the next tick, against the first [rad]
         self._model.clear()
         self._stamps: list[deque[tuple[int]]] = [deque() for _ in range(WHEELS + 1)]
@@ -115,14 +115,18 @@ class PowerPredictor:
         """After a lost command robot and simulation were asked for different things a while."""
         if self._given is not None:
             before, same = self._given
-            interval = stamp_ns - before
-            is_late = len(self._intervals) == _INTERVALS and interval > _LOST * median(
-                self._intervals
-            )
+            interval, known = stamp_ns - before, self._intervals
+            is_late = len(known) == _INTERVALS and interval > _LOST * median(known)
             if is_late and twist != same:
-                self._unsure_until = stamp_ns + _UNSURE
-            self._intervals.append(interval)
+                self._losses.append(stamp_ns)
+            known.append(interval)
         self._given = stamp_ns, twist
+
+    def _has_lost(self, tick: int) -> bool:
+        """Whether a command was lost a moment before a tick."""
+        while self._losses and self._losses[0] < tick - _UNSURE:
+            self._losses.popleft()
+        return bool(self._losses) and self._losses[0] <= tick
 
     def encoders(self, stamp_ns: int, position: Triple, velocity: Triple) -> Arrival:
         """Take wheel angles [rad] and speeds [rad/s], NaN for what a message lacks."""
@@ -201,7 +205,7 @@ class PowerPredictor:
         measured = self._model.measured(motion)
         from_encoders = self._readings(self._where_known(measured, motion), self._measured)
         is_silent = commanded is None or self._is_silent(tick, commanded, speed)
-        if is_silent or tick <= self._unsure_until:
+        if self._has_lost(tick) or is_silent:
             self._resting.forget()
         if commanded is None or is_silent:
             return Prediction(tick, UNKNOWN, UNKNOWN, _UNKNOWN, UNKNOWN_READING, from_encoders)

@@ -25,13 +25,13 @@ from tomr_power_model.effects import EFFECTS
 from tomr_power_model.robot import WHEELS, Robot
 
 _UNKNOWN = float("nan")
-MOVING = 1.0  # rad/s
-FADES = 0.01  # share of the difference in a tick in motion
-STANDS = 0.05  # rad/s
-CREEPS = 0.01  # rad/s: faster than it is asked to
-SLOW = 0.5  # rad/s
-FOLLOWS = 0.5  # share of the difference in a tick
-PUSHED = 0.25  # most that a push leaves, as a share of the supply's voltage
+_MOVING = 1.0  # rad/s
+_FADES = 0.01  # share of the difference in a tick in motion
+_STANDS = 0.05  # rad/s
+_CREEPS = 0.01  # rad/s: faster than it is asked to
+_SLOW = 0.5  # rad/s
+_FOLLOWS = 0.5  # share of the difference in a tick
+_PUSHED = 0.25  # most that a push leaves, as a share of the supply's voltage
 
 
 class SimulatedDrivers(Protocol):
@@ -58,7 +58,7 @@ class RestingDrivers:
         """Of a robot; only dry friction holds a wheel that its driver turns."""
         self._proportional = robot.controller.proportional
         self._integral = robot.controller.integral
-        unlike = PUSHED * robot.supply.nominal_voltage
+        unlike = _PUSHED * robot.supply.nominal_voltage
         self._most = unlike / self._integral if self._integral else 0.0  # rad
         self._sticks = any(EFFECTS[name].dry_torque is not None for name in robot.physics)
         self.clear()
@@ -87,47 +87,55 @@ class RestingDrivers:
         """
         if path.state is None:
             return [_UNKNOWN] * WHEELS
-        found = []
-        asked, sums = path.wheel(at.ASKED), path.wheel(at.INTEGRAL)
-        for wheel, apart in enumerate(self._differences(path, angle, speed)):
+        turned, sums, asked = (path.wheel(part) for part in (at.TURNED, at.INTEGRAL, at.ASKED))
+        ahead = [turned[wheel] - angle[wheel] for wheel in range(WHEELS)]
+        found, apart = [], []
+        for wheel in range(WHEELS):
+            apart.append(self._difference(wheel, ahead[wheel], abs(speed[wheel]) > _MOVING))
+            known = apart[wheel] if apart[wheel] == apart[wheel] else 0.0
             error = asked[wheel] - speed[wheel]
-            known = apart if apart == apart else 0.0
             found.append(self._proportional * error + self._integral * (sums[wheel] + known))
+        self._follow(path, apart, ahead, speed)
         before, self._before = self._before, found
         return [
             first + share * (last - first) if first == first else last
             for first, last in zip(before, found, strict=True)
         ]
 
-    def _differences(
-        self, path: SimulatedDrivers, angle: Sequence[float], speed: Sequence[float]
-    ) -> list[float]:
-        """What each driver's sum is over the simulation's [rad], NaN where not known."""
-        turned, simulated = path.wheel(at.TURNED), path.wheel(at.SPEED)
-        asked = path.wheel(at.ASKED)
-        found = []
+    def _difference(self, wheel: int, ahead: float, is_moving: bool) -> float:
+        """What a driver's sum is over the simulation's [rad], NaN where not known.
+
+        `ahead`: by how much the simulated wheel has turned further [rad].
+        """
+        if self._offset[wheel] != self._offset[wheel]:
+            self._offset[wheel] = -ahead
+        if is_moving:
+            self._offset[wheel] -= _FADES * (ahead + self._offset[wheel])
+        apart = ahead + self._offset[wheel]
+        if abs(apart) > self._most:
+            self._strange[wheel] = True
+        elif is_moving:
+            self._strange[wheel] = False
+        return apart
+
+    def _follow(
+        self,
+        path: SimulatedDrivers,
+        apart: Sequence[float],
+        ahead: Sequence[float],
+        speed: Sequence[float],
+    ) -> None:
+        """Take the differences over into the simulation, where a push may have left them."""
+        simulated, asked = path.wheel(at.SPEED), path.wheel(at.ASKED)
         for wheel in range(WHEELS):
-            ahead = turned[wheel] - angle[wheel]
-            if ahead == ahead and self._offset[wheel] != self._offset[wheel]:
-                self._offset[wheel] = -ahead
-            if abs(speed[wheel]) > MOVING:
-                self._offset[wheel] -= FADES * (ahead + self._offset[wheel])
-            apart = ahead + self._offset[wheel]
-            found.append(apart)
-            if abs(apart) > self._most:
-                self._strange[wheel] = True
-            elif abs(speed[wheel]) > MOVING:
-                self._strange[wheel] = False
-            stands = abs(speed[wheel]) < STANDS
             excess = abs(simulated[wheel]) - abs(asked[wheel])
-            if self._followed[wheel] and excess > CREEPS:
+            if self._followed[wheel] and excess > _CREEPS:
                 # With such a sum it would turn, and it does not: the difference is another's.
-                self._strange[wheel], self._offset[wheel] = True, -ahead
-            is_slow = excess < CREEPS and abs(simulated[wheel]) < SLOW
-            self._followed[wheel] = (
-                self._sticks and stands and is_slow and apart == apart and not self._strange[wheel]
-            )
+                self._strange[wheel], self._offset[wheel] = True, -ahead[wheel]
+            is_slow = excess < _CREEPS and abs(simulated[wheel]) < _SLOW
+            rests = self._sticks and is_slow and abs(speed[wheel]) < _STANDS
+            is_known = apart[wheel] == apart[wheel] and not self._strange[wheel]
+            self._followed[wheel] = rests and is_known
             if self._followed[wheel]:
-                path.add_to_sum(wheel, FOLLOWS * apart)
-                self._offset[wheel] -= FOLLOWS * apart
-        return found
+                path.add_to_sum(wheel, _FOLLOWS * apart[wheel])
+                self._offset[wheel] -= _FOLLOWS * apart[wheel]

@@ -12,15 +12,14 @@ from numpy.typing import NDArray
 
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.binding import compiled
-from tomr_power_model.dynamics.numbers import laid_out, timing_of
-from tomr_power_model.dynamics.simulation import Excitation, Steps, Variant
+from tomr_power_model.dynamics.simulation import Simulation, Steps, Variant
 from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.model.encoders import LONG_S
 from tomr_power_model.model.resting import RestingDrivers
 from tomr_power_model.robot import WHEELS
 from tomr_training.drives import Drive
 from tomr_training.planar.fits import Fits
-from tomr_training.planar.plant import Motion, at_times
+from tomr_training.planar.plant import Motion, at_times, from_rest
 from tomr_training.planar.schedule import TICK, commanded, tick_count
 from tomr_training.planar.sensors import Signals
 
@@ -32,33 +31,34 @@ class Expected:
     """What is expected of a drive."""
 
     motion: Motion
-    held: Array = field(repr=False)  # voltages of the drivers, as the power sensors see them [V]
+    # Of each tick, (ticks, 3): speeds and accelerations in its middle as `EncoderWindow.beside`
+    # tells them [rad/s, rad/s^2], voltages of the drivers as the power sensors see them [V].
+    speed: Array = field(repr=False)
+    acceleration: Array = field(repr=False)
+    held: Array = field(repr=False)
 
 
 class _Path:
     """A simulation in progress, as `RestingDrivers` looks at it."""
 
-    def __init__(self, variant: Variant, wheels: int) -> None:
-        self.state = np.zeros(at.state_size(wheels))
-        self._numbers, self._wheels = variant.numbers, wheels
-        most = max(at.input_size(wheels), at.MOTION_HEADER + wheels * at.MOTION_WHEEL)
-        self._scratch = np.zeros((3, most))
-        self._nothing = np.zeros((0, wheels))
-        compiled().begin(variant.numbers, self.state, *self._scratch[1:], wheels)
+    def __init__(self, simulation: Simulation) -> None:
+        self.state = simulation.start()
+        self._simulation = simulation
+        self._scratch = simulation.inputs()
+        self._nothing = np.zeros((0, WHEELS))
 
     def wheel(self, part: int) -> list[float]:
         """A field of the wheels' state."""
-        found: list[float] = self.state[at.STATE_HEADER + part :: at.STATE_WHEEL].tolist()
-        return found
+        return self._simulation.of_wheels(self.state, part)
 
     def add_to_sum(self, wheel: int, angle: float) -> None:
         """Add to what a wheel's driver has summed up of its errors [rad]."""
-        self.state[at.STATE_HEADER + wheel * at.STATE_WHEEL + at.INTEGRAL] += angle
+        self._simulation.add_to_sum(self.state, wheel, angle)
 
     def run(self, inputs: Array, out: Array) -> None:
         """Drive through some periods."""
-        numbers, scratch = self._numbers, self._scratch[0]
-        compiled().run(numbers, self.state, inputs, self._nothing, 0, out, scratch, self._wheels)
+        numbers, scratch = self._simulation.numbers, self._scratch
+        compiled().run(numbers, self.state, inputs, self._nothing, 0, out, scratch, WHEELS)
 
 
 def run_believed(drive: Drive, signals: Signals, share: Array) -> Expected:
@@ -67,41 +67,48 @@ def run_believed(drive: Drive, signals: Signals, share: Array) -> Expected:
     `share`: of each tick that has passed in the middle of what its power samples average, (ticks,).
     """
     robot, ticks = drive.believed, tick_count(drive)
-    inputs, nothing = commanded(drive, robot), np.zeros(3)
-    excitation = Excitation(0.0, inputs, nothing, nothing, 0.0, np.zeros(WHEELS))
-    variant, step = Variant(laid_out(vehicle_of(robot))), timing_of(robot.controller.rate).step
-    path = _Path(variant, WHEELS)
-    drivers = RestingDrivers(robot)
-    steps = int(variant.numbers[at.SUBSTEPS])
-    out = np.empty((len(inputs), steps * at.output_size(WHEELS)))
-    ends, held = np.zeros((len(inputs) * steps + 1, WHEELS)), np.empty((ticks, WHEELS))
+    inputs = commanded(drive, robot)
+    simulation = Simulation(vehicle_of(robot), is_compiled=True)
+    path, drivers = _Path(simulation), RestingDrivers(robot)
+    steps = simulation.steps
+    step = simulation.period_s / steps
+    out = np.empty((len(inputs), steps * simulation.row))
+    ends = np.zeros((len(inputs) * steps + 1, WHEELS))
+    shown = np.empty((3, ticks, WHEELS))  # speeds, accelerations, voltages
     fits = Fits.over(signals.encoder_time, ticks, LONG_S)
-    borders = np.round(TICK * np.arange(ticks + 1) / (steps * step)).astype(np.int64)
+    borders = np.round(TICK * np.arange(ticks + 1) / simulation.period_s).astype(np.int64)
     borders[-1] = len(inputs)
     before = np.array(path.wheel(at.SPEED))
     for k, (first, last) in enumerate(pairwise(borders)):
         path.run(inputs[first:last], out[first:last])
-        speed = Steps.of(out[first:last], WHEELS).speed
+        means = Steps.of(out[first:last], WHEELS).speed
         ends[first * steps + 1 : last * steps + 1] = ends[first * steps] + step * np.cumsum(
-            speed, axis=0
+            means, axis=0
         )
         after = np.array(path.wheel(at.SPEED))
-        angle, seen = _seen(fits, k, ends[: last * steps + 1], step, (before, after), signals)
-        held[k] = drivers.voltages(path, angle.tolist(), seen.tolist(), float(share[k]))
+        change = (after - before) / TICK
+        angle, speed, acceleration = _seen(fits, k, ends[: last * steps + 1], step, change, signals)
+        held = drivers.voltages(path, angle.tolist(), speed.tolist(), float(share[k]))
+        shown[:, k] = speed, acceleration, held
         before = after
-    return Expected(Motion(variant, excitation, Steps.of(out, WHEELS), step, ticks), held)
+    variant = Variant(np.asarray(simulation.numbers))
+    motion = Motion(variant, from_rest(inputs), Steps.of(out, WHEELS), step, ticks)
+    return Expected(motion, *shown)
 
 
 def _seen(
-    fits: Fits, tick: int, ends: Array, step: float, speeds: tuple[Array, Array], signals: Signals
-) -> tuple[Array, Array]:
-    """Angle at the end of a tick and mean speed in it, as `EncoderWindow.beside`, (3,) each."""
+    fits: Fits, tick: int, ends: Array, step: float, change: Array, signals: Signals
+) -> tuple[Array, Array, Array]:
+    """Angle at the end of a tick, and speed and acceleration in its middle, (3,) each.
+
+    As `EncoderWindow.beside` tells them beside a simulated motion, whose speed changes by `change`
+    [rad/s^2].
+    """
     edges = TICK * np.array([tick, tick + 0.5, tick + 1.0])
     start, middle, end = at_times(ends, step, edges)
     index = fits.index[tick]
     ahead = signals.position[index] - at_times(ends, step, signals.encoder_time[index])
     offset, slope, curve = fits.of(tick, ahead)
-    speed = (end - start) / TICK + slope
-    acceleration = (speeds[1] - speeds[0]) / TICK + curve
+    speed, acceleration = (end - start) / TICK + slope, change + curve
     half = 0.5 * TICK
-    return middle + offset + half * (speed + 0.5 * half * acceleration), speed
+    return middle + offset + half * (speed + 0.5 * half * acceleration), speed, acceleration

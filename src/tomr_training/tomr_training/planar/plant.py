@@ -140,12 +140,15 @@ def _run(
     chosen: Drive,
     changes: Sequence[tuple[int, Array]] = (),
 ) -> Motion:
-    nothing = np.zeros(3)
-    excitation = Excitation(0.0, inputs, nothing, nothing, 0.0, np.zeros(WHEELS))
-    variant = Variant(laid_out(vehicle))
+    excitation, variant = from_rest(inputs), Variant(laid_out(vehicle))
     steps = drive(variant, excitation, changes=changes)
     step = timing_of(robot.controller.rate).step
     return Motion(variant, excitation, steps, step, tick_count(chosen))
+
+
+def from_rest(inputs: Array) -> Excitation:
+    """A drive that begins at rest, by the inputs of its periods."""
+    return Excitation(0.0, inputs, np.zeros(3), np.zeros(3), 0.0, np.zeros(WHEELS))
 
 
 def integral(means: Array, step: float) -> Array:

@@ -13,14 +13,12 @@ from numpy.typing import NDArray
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.binding import compiled
-from tomr_power_model.model.encoders import LONG_S
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.robot import WHEELS
 from tomr_training.drives import Drive
 from tomr_training.labels import spread
 from tomr_training.planar.believed import Expected, run_believed
 from tomr_training.planar.fits import Fits
-from tomr_training.planar.plant import Motion, at_times
 from tomr_training.planar.schedule import TICK, tick_count
 from tomr_training.planar.sensors import Signals
 
@@ -65,17 +63,16 @@ def compare(drive: Drive, signals: Signals) -> Compared:
     total = commanded.sum(axis=1, keepdims=True) + auxiliary
     _, speed, _ = Fits.over(signals.encoder_time, ticks, _WINDOW).all(signals.position)
     drawn = _tick_means(signals.power_time, signals.voltage * signals.drawn, ticks)
-    derived = _derived(believed, signals, offset)
+    derived = _derived(believed, offset)
     return Compared(
         np.hstack([total, commanded, expected.tick_means(expected.steps.speed), derived]),
         np.hstack([drawn[:, 3:], drawn[:, :3], speed, drawn[:, :3]]),
     )
 
 
-def _derived(believed: Expected, signals: Signals, offset: Array) -> Array:
+def _derived(believed: Expected, offset: Array) -> Array:
     """Power of each driver by the encoders [W], (ticks, 3): `PowerPredictor`'s encoder path."""
-    expected = believed.motion
-    speed, acceleration = _beside(expected, signals)
+    speed, acceleration = believed.speed, believed.acceleration
     motion = np.zeros((len(speed), at.MOTION_HEADER + WHEELS * at.MOTION_WHEEL))
     motion[:, [at.MOTION_YAW, at.MOTION_HEADING]] = math.nan
     first = at.MOTION_HEADER + at.MOTION_WHEEL * np.arange(WHEELS)
@@ -84,24 +81,8 @@ def _derived(believed: Expected, signals: Signals, offset: Array) -> Array:
     motion[:, first + at.MOTION_ANGLE] = math.nan
     motion[:, first + at.MOTION_VOLTAGE] = believed.held
     found = np.empty((len(speed), WHEELS * at.POWER_WHEEL))
-    compiled().drive_powers(expected.variant.numbers, motion, found, WHEELS)
+    compiled().drive_powers(believed.motion.variant.numbers, motion, found, WHEELS)
     return found[:, at.POWER_DRAWN :: at.POWER_WHEEL]
-
-
-def _beside(expected: Motion, signals: Signals) -> tuple[Array, Array]:
-    """Speed and acceleration at the ticks' middles, (ticks, 3): `EncoderWindow.beside`."""
-    simulated = expected.reported
-    edges = TICK * np.arange(expected.ticks + 1, dtype=np.float64)
-    angles = at_times(simulated, expected.step, edges)
-    ends = np.round(edges / expected.step).astype(np.int64)
-    # Speeds at the steps' ends from the means between them: it starts at rest.
-    speeds = np.zeros_like(simulated)
-    turns = np.where(np.arange(len(simulated) - 1) % 2 == 0, 1.0, -1.0)[:, None]
-    speeds[1:] = 2.0 * turns * np.cumsum(turns * expected.steps.speed, axis=0)
-    ahead = signals.position - at_times(simulated, expected.step, signals.encoder_time)
-    _, slope, curve = Fits.over(signals.encoder_time, expected.ticks, LONG_S).all(ahead)
-    change = np.diff(speeds[ends], axis=0) / TICK
-    return np.diff(angles, axis=0) / TICK + slope, change + curve
 
 
 def _tick_means(time: Array, values: Array, ticks: int) -> Array:

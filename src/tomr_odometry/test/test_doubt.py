@@ -1,0 +1,86 @@
+"""How far the odometry trusts itself: ahead of its data, without an IMU, after leaps and starts."""
+
+import numpy as np
+import pytest
+from odometry_drives import ROBOT, START
+
+from tomr_odometry.estimator import SlipOdometry
+from tomr_odometry.kernel import GYRO, RIM, VX
+
+SECOND = 1_000_000_000
+
+
+def standing(has_imu: bool, seconds: float = 1.0) -> SlipOdometry:
+    core = SlipOdometry(ROBOT)
+    for sample in range(round(100 * seconds)):
+        stamp = START + 10_000_000 * sample
+        core.encoders(stamp, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        if has_imu:
+            core.imu(stamp, (0.0, 0.0, 0.0, 0.0, 0.0, 9.81))
+        list(core.due())
+    return core
+
+
+def test_motion_goes_on_for_a_moment_and_then_anything_may_happen() -> None:
+    core = standing(has_imu=True)
+    core._x[VX], core._x[:3] = 0.4, 0.0
+    soon, late = (core._estimate(core._time + round(SECOND * t)) for t in (0.1, 2.25))
+    assert soon.pose[0] == pytest.approx(0.04, abs=1e-3)
+    assert late.pose[0] == pytest.approx(0.1, abs=1e-3)
+    for after, before in (
+        (late.pose_covariance, soon.pose_covariance),
+        (late.twist_covariance, soon.twist_covariance),
+    ):
+        assert np.diag(after - before) == pytest.approx(2.0**2, rel=0.01)
+
+
+def test_a_change_of_speed_goes_on_for_less() -> None:
+    core = standing(has_imu=True)
+    core._x[VX : VX + 6] = 0.4, 0.0, 0.0, 1.0, 0.0, 0.0
+    for ahead, speed in ((0.02, 0.42), (0.2, 0.45)):
+        item = core._estimate(core._time + round(SECOND * ahead))
+        assert item.twist[0] == pytest.approx(speed, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("has_imu", "seconds", "is_sure"), [(True, 1.0, True), (True, 0.1, False), (False, 1.0, False)]
+)
+def test_an_imu_tells_its_biases_where_the_robot_stands(
+    has_imu: bool, seconds: float, is_sure: bool
+) -> None:
+    core = standing(has_imu, seconds)
+    assert core._has_stood == is_sure
+    core._travel = np.array([1.0, 0.0])
+    item = core._estimate(core._time)
+    # Else wheels may slide unseen.
+    assert (item.twist_covariance[0, 0] > 0.3) != is_sure
+
+
+@pytest.mark.parametrize(("seconds", "spread"), [(3.0, 3.0), (-4.0, 4.0), (100.0, 10.0)])
+def test_how_far_a_robot_came_in_a_leap_of_the_clock(seconds: float, spread: float) -> None:
+    core = standing(has_imu=True)
+    core._x[0] = 2.0
+    core._start_afresh(core._time + round(SECOND * seconds))
+    assert core._x[0] == 2.0
+    assert np.sqrt(core._P[0, 0]) == pytest.approx(spread, rel=0.01)
+    fresh = SlipOdometry(ROBOT)
+    fresh._start_afresh(START)
+    assert fresh._P[0, 0] < 1e-6
+
+
+@pytest.mark.parametrize("has_stood", [False, True])
+def test_biases_that_no_imu_has_are_a_start_that_misled(has_stood: bool) -> None:
+    core = standing(has_imu=True, seconds=0.1)
+    core._has_stood, core._is_aided, core._trusted = has_stood, True, 2.0
+    core._x[0], core._x[VX], core._x[GYRO] = 3.0, 0.5, 0.1
+    core._x[RIM : RIM + 3], core._P[1, 1] = 7.0, 100.0
+    ways = np.stack([np.full(3, 7.0), np.full(3, 1e-6)])
+    core._advance(START, 0.001, ways, np.full(6, np.nan), np.zeros((0, 4)))
+    assert (core._x[GYRO] == 0.0) != has_stood
+    assert (core._mode[:3] == 1.0).all() != has_stood
+    assert core._x[0] == pytest.approx(3.0, abs=0.01)  # what is known of the way is kept
+    assert core._x[RIM] == pytest.approx(7.0, abs=0.01)
+    assert (np.sqrt(core._P[0, 0]) > 0.9) != has_stood  # 2 s at 0.5 m/s
+    assert core._P[1, 1] > 99.0
+    assert (np.sqrt(core._P[VX, VX]) > 0.4) != has_stood
+    assert core._trusted == pytest.approx(2.001 if has_stood else 0.0)

@@ -1,0 +1,66 @@
+"""What the odometry makes of its wheels' forces: creep, and evidence of what the body does."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from attrs import evolve
+from odometry_drives import ROBOT, START, Recorded, drive, play
+
+from tomr_odometry.creep import Creep
+from tomr_odometry.estimator import SlipOdometry
+from tomr_odometry.kernel import CREEP
+from tomr_odometry.settings import OdometrySettings
+from tomr_odometry.traction import Traction
+
+SETTINGS = OdometrySettings(creep=Creep((0.5, 1.0, 1.5), 0.0, 0.05))
+
+
+@cache
+def recorded() -> Recorded:
+    return drive(length=3.0)
+
+
+def without_the_first(time: float, topic: str, message: Any) -> Any:
+    return None if topic == "wheel_1/power" and time > 2.0 else message
+
+
+def test_wheels_creep_as_their_traction_and_the_travel_ask() -> None:
+    core, rims = SlipOdometry(ROBOT, SETTINGS), np.array([0.5, 0.5, -0.03])  # m/s
+    for sample in range(6):
+        first, second, third = (0.01 * sample * rims / ROBOT.wheel_radius).tolist()
+        core.encoders(START + 10_000_000 * sample, (first, second, third), (0.0, 0.0, 0.0))
+    list(core.due())
+    core._used, core._travel = np.array([0.1, 0.2, -0.02]), np.array([0.3, 0.4])
+    core._x[CREEP] = 2.0
+    item = core._estimate(core._time)
+    creep = np.array([0.05, 0.2, -0.03])
+    assert item.creeping == pytest.approx(creep)
+    assert item.sliding == pytest.approx(creep)
+    # A ratio to next to nothing says nothing.
+    assert item.slip == pytest.approx([0.1, 0.4, 0.0])
+
+
+def test_a_robot_that_creeps_comes_less_far() -> None:
+    plain, creeping = (list(play(recorded(), settings=given))[-1] for given in (None, SETTINGS))
+    assert creeping.pose[0] < plain.pose[0] - 0.001
+
+
+def test_a_force_is_forgotten_when_its_power_is_silent() -> None:
+    last = list(play(recorded(), without_the_first))[-1]
+    assert np.isnan(last.traction).tolist() == [True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("signed", "aided", "rows"), [(True, True, 1), (False, True, 0), (True, False, 0)]
+)
+def test_forces_are_evidence_with_signs_and_an_imu(signed: bool, aided: bool, rows: int) -> None:
+    measurement = evolve(ROBOT.measurement, signed=signed)
+    core = SlipOdometry(evolve(ROBOT, measurement=measurement))
+    core._heard = {"encoders": START, "power 1": START}
+    core._tractive, core._is_aided = [Traction(START, 1, 3.0, 2.0, 5.0)], aided
+    found = core._evidence(0.01)
+    assert found.tolist() == [[1.0, 3.0, core.settings.noise.force**2 + 4.0, 5.0]] * rows
+    assert core._forces[1] == 3.0
+    assert np.isnan(core._forces[[0, 2]]).all()
