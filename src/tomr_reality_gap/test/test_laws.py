@@ -129,16 +129,17 @@ def test_intervals_are_as_wide_as_the_data_are_inexact() -> None:
     knots = np.linspace(0.0, 8.0, 24)
     table, values = _table("torque.speed", knots), 0.01 * knots[None] ** 2
     term = LearntTerm(table.family, (), table.knots, values)
-    widths = []
+    # Each value is known to 0.1: what is known of the parameters by their own derivatives.
+    slopes = np.stack([knots**2, 0.01 * knots**2 * np.log(np.maximum(knots, 1e-9))], axis=1)
+    known = 0.01 * np.linalg.inv(slopes.T @ slopes)
+    never = 0.02 * np.array([0.01, 2.0])
+    tied = never[::-1] * known[0, 1] / np.diag(known)[::-1]  # by the other, as the data tie them
     for inflation in (1.0, 16.0):
         evidence = evolve(_evidence(values, exact=100.0), inflation=inflation)
-        told = laws_of(table, term, evidence)[0].fitted.parameters["exponent"]
-        widths.append(told.high - told.low)
-    # Each value is known to 0.1: the exponent's standard deviation by its own derivative.
-    slopes = np.stack([knots**2, 0.01 * knots**2 * np.log(np.maximum(knots, 1e-9))], axis=1)
-    sigma = 0.1 * np.sqrt(np.linalg.inv(slopes.T @ slopes)[1, 1])
-    expected = [3.92 * np.hypot(part * sigma, 0.02 * 2.0) for part in (1.0, 4.0)]
-    assert widths == pytest.approx(expected, rel=0.02)
+        told = laws_of(table, term, evidence)[0].fitted.parameters
+        widths = [told[name].high - told[name].low for name in ("size", "exponent")]
+        expected = 3.92 * np.sqrt(inflation * np.diag(known) + never**2 + tied**2)
+        assert widths == pytest.approx(expected, rel=0.02)
 
 
 def test_a_curve_that_is_no_law_stays_a_table() -> None:

@@ -80,7 +80,7 @@ def polished(
         jacobian = beside(((rows[1:] - rows[0]).T) / steps)
         information = jacobian.T @ jacobian
         covariance = np.linalg.pinv(information)
-        sigma = np.sqrt(np.maximum(np.diag(covariance) * inflation, 0.0))
-        best, change, cost = evolve(law, sigma=sigma), rows[0] / weight, now
+        best = evolve(law, covariance=covariance * inflation)
+        change, cost = rows[0] / weight, now
         law = evolve(law, parameters=law.parameters + covariance @ (jacobian.T @ left))
     return best, change
