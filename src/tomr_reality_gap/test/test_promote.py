@@ -1,4 +1,4 @@
-"""From a learnt term's law to an effect: its file, its test, and how it joins the vocabulary."""
+"""From a learnt term's law to an effect: its file, its test, how it joins, and is found again."""
 
 import argparse
 import json
@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from attrs import evolve
 
 from tomr_power_model.effects import EFFECTS, Wheel
 from tomr_power_model.effects.user import load_effects, load_named_effects
@@ -18,10 +19,20 @@ from tomr_power_model.errors import InputError
 from tomr_power_model.robot import read_description, robot_from_parameters
 from tomr_power_model.unmodelled import FAMILIES, LearntTerm
 from tomr_power_model.unmodelled.described import parameters_of
+from tomr_reality_gap.alignment.motion import motion_in
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.arguments import add_inputs, inputs_of
 from tomr_reality_gap.cli import main
+from tomr_reality_gap.explanation import FittedLaw
+from tomr_reality_gap.fit.jacobian import linearise
 from tomr_reality_gap.fit.laws import LAWS, SMOOTH
+from tomr_reality_gap.fit.learnt import Table
+from tomr_reality_gap.fit.unmodelled import Remainder, Tried, fitted
+from tomr_reality_gap.hypotheses.scales import scales_of
 from tomr_reality_gap.promote.learnt_law import learnt_law
+
+from .test_alignment import simulation  # noqa: F401 -- the fixture
+from .test_forward_selection import searched
 
 WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
 CUBE = {
@@ -254,3 +265,47 @@ def test_an_option_names_the_folder(tmp_path: Path) -> None:
     assert "own.x" not in EFFECTS
     inputs_of(parser.parse_args([*given, "--effects", str(tmp_path)]))
     assert "own.x" in EFFECTS
+
+
+def _learnt(made: RecordingSimulation, value: np.ndarray) -> FittedLaw:
+    """The first law of what depends on speed, from a drive with the description beside it."""
+    dataset, found = searched(made, value, ())
+    jacobian = linearise(dataset, found.best.model, ())
+    rest = Remainder.of(dataset, jacobian.value, np.asarray(jacobian.matrix))
+    motions, run = [motion_in(made, made.robot)], made.run(made.robot)
+    scales = scales_of(made.robot, run.speed, run.power, run.copper, duration=30.0)
+    table = Table.over(FAMILIES["torque.speed"], motions, scales)
+    assert table is not None
+    return fitted(rest, Tried(table, 1.0), made.robot, motions).laws[0]
+
+
+def test_a_promoted_law_is_found_on_another_drive_within_what_is_known_of_both(
+    tmp_path: Path,
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    """3e-4 N m at 1 rad/s that grows with the cube of the speed, up to 10 rad/s."""
+    true, effect_id = {"size": 3e-4, "exponent": 3.0}, "learnt.power_law_by_speed"
+
+    def promoted(told: dict[str, object]) -> None:
+        explained = _explained(tmp_path, "torque.speed", {"power law": told})
+        assert main(["promote", str(explained), "--out", str(tmp_path / "e")]) == 0
+        load_effects(tmp_path / "e")
+
+    promoted(_told(**true))
+    robot = simulation.robot
+    theirs = evolve(robot, physics={**robot.physics, effect_id: (true,) * 3})
+    law = _learnt(simulation, simulation.predict([theirs])[0])
+    learnt = law.parameters
+    assert law.name == "power law"
+    promoted({k: {"value": v.value, "ci95": [v.low, v.high]} for k, v in learnt.items()})
+    turned = evolve(simulation.recorded, command=-simulation.recorded.command[:, [1, 0, 2]])
+    another = evolve(simulation, recorded=turned)
+    _, found = searched(another, another.predict([theirs])[0], ("learnt",))
+    (named,), (offsets,) = found.best.model.hypotheses, found.best.model.offsets
+    assert (named.effect, named.where) == (effect_id, ("all_wheels",))
+    fresh = {"size": offsets[0], "exponent": learnt["exponent"].value + offsets[1]}
+    for name, value in true.items():
+        half = 0.5 * (learnt[name].high - learnt[name].low)
+        assert abs(learnt[name].value - value) < half < 0.4 * value
+        assert abs(learnt[name].value - fresh[name]) < half
+        assert fresh[name] == pytest.approx(value, rel=0.05)

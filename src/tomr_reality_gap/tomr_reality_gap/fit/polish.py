@@ -79,7 +79,7 @@ def polished(
             break
         jacobian = beside(((rows[1:] - rows[0]).T) / steps)
         information = jacobian.T @ jacobian
-        covariance = np.linalg.pinv(information)
+        covariance = np.asarray(np.linalg.pinv(information), dtype=np.float64)
         best = evolve(law, covariance=covariance * inflation)
         change, cost = rows[0] / weight, now
         law = evolve(law, parameters=law.parameters + covariance @ (jacobian.T @ left))
