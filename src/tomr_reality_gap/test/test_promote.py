@@ -3,8 +3,11 @@
 import argparse
 import json
 import math
+import os
 import re
 import runpy
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,7 +17,7 @@ import yaml
 from attrs import evolve
 
 from tomr_power_model.effects import EFFECTS, Wheel
-from tomr_power_model.effects.user import load_effects, load_named_effects
+from tomr_power_model.effects.user import load_effects, load_named_effects, named_files
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import read_description, robot_from_parameters
 from tomr_power_model.unmodelled import FAMILIES, LearntTerm
@@ -240,6 +243,23 @@ def test_files_that_are_no_effects_are_refused(tmp_path: Path, text: str, messag
     assert dict(EFFECTS) == before
 
 
+def test_an_effect_that_only_configures_may_have_more_parameters(tmp_path: Path) -> None:
+    text = OWN.format(effect_id="own.x", names=["a", "b", "c", "d"])
+    (tmp_path / "own.py").write_text(text.replace("driver_power", "configure"), encoding="utf-8")
+    assert load_effects(tmp_path) == ["own.x"]
+
+
+def test_the_vocabulary_of_a_process_has_the_effects_of_the_folder_named_for_all(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "own.py").write_text(OWN.format(effect_id="own.x", names=["a"]), encoding="utf-8")
+    asked = "from tomr_power_model.effects import EFFECTS; print('own.x' in EFFECTS)"
+    for named, expected in (({"TOMR_EFFECTS": str(tmp_path)}, "True\n"), ({}, "False\n")):
+        environment = {k: v for k, v in os.environ.items() if k != "TOMR_EFFECTS"} | named
+        command = [sys.executable, "-c", asked]
+        assert subprocess.check_output(command, env=environment, text=True) == expected
+
+
 def test_effects_of_a_user_join_only_where_their_folder_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -251,6 +271,7 @@ def test_effects_of_a_user_join_only_where_their_folder_is_named(
     monkeypatch.setenv("TOMR_EFFECTS", str(tmp_path))
     load_named_effects()
     assert "own.x" in EFFECTS
+    assert named_files() == [tmp_path / "own.py"]
     assert load_effects(tmp_path) == ["own.x"]  # the same file again is no clash
     with pytest.raises(InputError, match="holds no effects"):
         load_effects(tmp_path / "nowhere")
