@@ -17,6 +17,8 @@ import yaml
 from attrs import evolve
 
 from tomr_power_model.effects import EFFECTS, Wheel
+from tomr_power_model.effects.missions import SPEEDS, VARIED
+from tomr_power_model.effects.scales import Scales
 from tomr_power_model.effects.user import load_effects, load_named_effects, named_files
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import read_description, robot_from_parameters
@@ -42,6 +44,9 @@ CUBE = {
     "size": {"value": 1e-4, "ci95": [9e-5, 1.1e-4], "unit": "N m"},
     "exponent": {"value": 3.0, "ci95": [2.9, 3.1], "unit": ""},
 }
+
+
+SCALES = Scales(*(1.0,) * 13)
 
 
 @pytest.fixture(autouse=True)
@@ -124,6 +129,52 @@ def test_a_promoted_law_is_an_effect_that_passes_its_own_test(
     size = made.parameters["size"]
     assert made.prior.sign == (1 if size.start > 0.0 else -1)
     assert (size.minimum < 0.0, size.maximum > 0.0) == (size.start < 0.0, size.start > 0.0)
+    assert made.prior.sizes["size"](SCALES) == pytest.approx(abs(size.start))
+    shape = {name: item.start for name, item in made.parameters.items() if name != "size"}
+    assert [dict(tried) for tried in made.prior.shapes(SCALES)] == [shape]
+    # What a driver loses is in its power alone, and shows where motors work.
+    assert made.in_currents is (family != "driver.current")
+    assert made.mission == (SPEEDS if made.in_currents else VARIED)
+    if "phase" in shape:
+        assert (made.parameters["phase"].minimum, made.parameters["phase"].maximum) == (-1e2, 1e2)
+        unknown = Wheel(1.0, 50.0, 0.0, math.nan, 0.05, 20.0)
+        assert made.moving_torque(0.05, 3.0, 0.5, unknown) == pytest.approx(0.05 * math.sin(0.5))
+
+
+def test_ranges_stay_within_what_an_effect_can_be(tmp_path: Path) -> None:
+    """Intervals from below nothing to far above the rest, and one of no width."""
+    wide = {"size": {"value": 1e-4, "ci95": [1e-4, 1e-4]},
+            "exponent": {"value": 3.0, "ci95": [-1.0, 7.0]}}  # fmt: skip
+    explained = _explained(tmp_path, "torque.speed", {"power law": wide})
+    assert main(["promote", str(explained), "--out", str(tmp_path / "e")]) == 0
+    load_effects(tmp_path / "e")
+    size, exponent = EFFECTS["learnt.power_law_by_speed"].parameters.values()
+    assert (exponent.minimum, exponent.maximum) == pytest.approx((0.3, 6.0))
+    assert size.prior_std == pytest.approx(2e-6)  # nothing is known better than by 2 %
+    slow = Wheel(0.05, 50.0, 0.0, 0.0, 0.05, 20.0)
+    torque = EFFECTS["learnt.power_law_by_speed"].moving_torque(0.1, 1.0, slow)
+    assert torque == pytest.approx(0.1 * 0.05 * math.tanh(0.5))
+
+
+def test_of_several_terms_the_named_one_is_taken(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    explained = _explained(tmp_path)
+    values = dict(read_description(explained))
+    knots = (np.linspace(0.0, 6.0, 7),)
+    term = LearntTerm(FAMILIES["driver.current"], (0,), knots, np.zeros((1, 7)))
+    values.update(parameters_of("term_2", term, WHEELS, values))
+    explained.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}), encoding="utf-8")
+    report = json.loads(explained.with_name("report.json").read_text(encoding="utf-8"))
+    law = {"law": "power law", "parameters": _told(size=0.5, exponent=2.0)}
+    report["findings"].append({"learnt": {"family": "driver.current", "laws": [law]}})
+    explained.with_name("report.json").write_text(json.dumps(report), encoding="utf-8")
+    assert main(["promote", str(explained), "--out", str(tmp_path / "e")]) == 2
+    assert "several learnt terms: give --term" in capsys.readouterr().err
+    found = learnt_law(explained, "term_2")
+    assert (found.family, found.parameters["size"].unit) == (FAMILIES["driver.current"], "W")
+    assert (found.parameters["size"].value, found.spacing) == (0.5, 1.0)
+    assert learnt_law(explained, "term_1").family is FAMILIES["torque.speed"]
 
 
 def test_units_ranges_and_priors_are_those_of_the_intervals(tmp_path: Path) -> None:
