@@ -134,6 +134,11 @@ class AlarmLevel:
         """Whether the caution that there is reaches what was asked for."""
         return self.needed <= MOST_CAUTION
 
+    @property
+    def is_rate_known(self) -> bool:
+        """Whether every source was watched: what is expected counts no other."""
+        return all(tail.events for tail in self.tails)
+
 
 def alarm_level(
     tails: Sequence[Tail], wanted: float, shipped: float, choice: AlarmChoice
