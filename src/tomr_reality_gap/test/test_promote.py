@@ -161,7 +161,7 @@ def test_of_several_terms_the_named_one_is_taken(
 ) -> None:
     explained = _explained(tmp_path)
     values = dict(read_description(explained))
-    knots = (np.linspace(0.0, 6.0, 7),)
+    knots = (np.linspace(0.0, 3.0, 7),)
     term = LearntTerm(FAMILIES["driver.current"], (0,), knots, np.zeros((1, 7)))
     values.update(parameters_of("term_2", term, WHEELS, values))
     explained.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}), encoding="utf-8")
@@ -173,7 +173,7 @@ def test_of_several_terms_the_named_one_is_taken(
     assert "several learnt terms: give --term" in capsys.readouterr().err
     found = learnt_law(explained, "term_2")
     assert (found.family, found.parameters["size"].unit) == (FAMILIES["driver.current"], "W")
-    assert (found.parameters["size"].value, found.spacing) == (0.5, 1.0)
+    assert (found.parameters["size"].value, found.spacing) == (0.5, 0.5)
     assert learnt_law(explained, "term_1").family is FAMILIES["torque.speed"]
 
 
