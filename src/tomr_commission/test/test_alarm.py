@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from attrs import evolve
 from scipy.signal import lfilter
 from scipy.stats import norm
 
-from tomr_commission.alarm import Tail, alarm_level, block_peaks
+from tomr_commission.alarm import Tail, _is_heavier, alarm_level, block_peaks
 from tomr_commission.evidence import MOST_CAUTION, SURE
 from tomr_commission.request import AlarmChoice
 
@@ -105,7 +106,47 @@ def test_peaks_at_the_cap_are_longer_than_is_known() -> None:
     assert level.expected > 0.05
 
 
+@pytest.mark.parametrize("rare", [1, 3, 5, 10, 20])
+def test_a_few_peaks_beyond_the_cap_are_not_hidden_by_many_small_ones(rare: int) -> None:
+    """Shoves that alarm whatever the caution, among hundreds of harmless ones."""
+    peaks = [*exponential(1.0, 390 - rare), *[40.0] * rare]
+    level = alarm_level([Tail.of("shoves", peaks, 30.0, CHOICE)], 0.05, 11.0, CHOICE)
+    assert level.is_enough is (rare < 3)
+
+
+def test_a_tail_begins_higher_by_halves_while_it_is_heavy_and_has_peaks_enough() -> None:
+    """A quarter, or its half, of peaks that grow by the same factor, or by the same sum."""
+    steep, few = (np.geomspace(1e-9, 30.0, count).tolist() for count in (400, 52))
+    even = np.linspace(0.1, 30.0, 400).tolist()
+    made = [Tail.of("", peaks, 30.0, CHOICE) for peaks in (steep, few, even)]
+    assert [tail.above for tail in made] == [50, 13, 100]
+
+
+def test_peaks_at_the_cap_count_for_the_scale_by_their_length_alone() -> None:
+    """Of 2, 4 and one of 32 decades at least: the usual scale of 4 counts as four more peaks."""
+    choice = evolve(CHOICE, kept=1.0, least_peaks=2)
+    tail = Tail.of("", [0.0, 2.0, 4.0, 40.0], 30.0, choice)
+    assert (tail.threshold, tail.above, tail.certain) == (0.0, 3, 6)
+    assert tail.scale == pytest.approx((4 * 4.0 + 2.0 + 4.0 + MOST_CAUTION + SURE) / 6)
+
+
+def test_exponential_excesses_are_taken_for_heavier_once_in_twenty() -> None:
+    random = np.random.default_rng(0)
+    told = np.mean([_is_heavier(random.exponential(2.0, 100)) for _ in range(1000)])
+    assert told == pytest.approx(0.05, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    "peaks", [[], [0.0], [3.0], [3.0] * 50, [40.0] * 50, [0.0] * 49 + [5.0]], ids=str
+)
+def test_peaks_that_tell_nothing_of_a_tail_are_no_error(peaks: list[float]) -> None:
+    tail = Tail.of("shoves", peaks, 30.0, CHOICE)
+    assert tail.above == sum(peak > 0.0 for peak in peaks)
+    assert np.isfinite([tail.scale, tail.rate(15.0), *tail.draws(15.0)]).all()
+
+
 def test_block_peaks() -> None:
     """Two ticks to a second, and half a minute that was left out."""
-    seconds = np.array([0.0, 0.5, 1.0, 1.5, 32.0])
-    assert block_peaks(np.array([1.0, 3.0, 2.0, 0.0, 5.0]), seconds, 1.0) == [3.0, 2.0, 5.0]
+    seconds = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 32.0])
+    evidence = np.array([1.0, 3.0, 2.0, 0.0, 4.0, 5.0])
+    assert block_peaks(evidence, seconds, 1.0) == [3.0, 2.0, 4.0, 5.0]

@@ -186,6 +186,13 @@ def test_rerun_does_nothing_twice(tmp_path: Path, steps: dict[str, Mock]) -> Non
     assert (tmp_path / "commissioned.yaml").read_text() == texts
     run(tmp_path, "--tolerance", "0.02")
     assert steps["explain"].call_count == before[0] + 2
+    effects = tmp_path / "effects"
+    effects.mkdir()
+    for text in ("x = 1", "x = 2"):  # other effects may explain more
+        (effects / "own.py").write_text(text)
+        with patch.dict(os.environ, TOMR_EFFECTS=str(effects)):
+            run(tmp_path)
+    assert steps["explain"].call_count == before[0] + 4
 
 
 def test_what_is_left_far_above_the_noise_is_a_no_go(

@@ -8,6 +8,7 @@ from tomr_commission.evidence import MOST_CAUTION, SURE, decisions, evidence_in
 from tomr_commission.injected import KINDS, InjectedKind, injected
 from tomr_commission.observed import Observed, frames_of
 from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.residuals.frame import GAP
 from tomr_fault_diag.residuals.settings import BandSettings
 
 SETTINGS = ClassifierSettings()
@@ -61,6 +62,16 @@ def test_diagnosis_restarted_in_a_fault_names_it(faulty: Observed) -> None:
     alarms = decisions(frames_of(rest, BandSettings()), COMMISSIONED).alarms
     assert [alarm.state for alarm in alarms] == ["motor system fault 3"]
     assert alarms[0].begin < 2.0
+
+
+def test_ticks_without_data_in_a_fault_are_no_evidence(faulty: Observed) -> None:
+    lost = (faulty.seconds > 11.0) & (faulty.seconds < 12.0)
+    residual, missing = faulty.residual.copy(), faulty.missing.astype("<U32")
+    residual[lost], missing[lost] = np.nan, GAP
+    gappy = evolve(faulty, residual=residual, missing=missing)
+    evidence = evidence_in(frames_of(gappy, BandSettings()), SETTINGS)
+    assert evidence[lost].max() == 0.0
+    assert evidence[faulty.seconds < 11.0].max() > 0.0
 
 
 def test_evidence_before_the_fault_is_none(faulty: Observed) -> None:

@@ -5,6 +5,7 @@ import json
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from unittest.mock import Mock, patch
 
@@ -13,10 +14,13 @@ import pytest
 import yaml
 from attrs import evolve
 
+from tomr_commission.alarm import Tail, alarm_level
 from tomr_commission.cli import main
 from tomr_commission.injected import kinds_for
 from tomr_commission.observed import Observed
 from tomr_commission.rehearsal import Shoved
+from tomr_commission.report.plain import lines
+from tomr_commission.request import AlarmChoice
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS
 from tomr_power_model.recordings import RecordingWriter, open_recording
@@ -26,6 +30,7 @@ BAGS = Path(__file__).resolve().parents[3] / "bags"
 HERE = "tomr_commission.commission"
 REPORT = {"sentence": "", "findings": [], "unexplained_share": 0.0, "holdout": None}
 SILENT = (*MOTORS, *ENCODERS)
+TAILS = {"driving": 50, "simulated shoves": 0}  # peaks of each
 
 
 @pytest.fixture
@@ -69,6 +74,8 @@ def test_currents_leave_the_alarm_level_where_it_is(tmp_path: Path, rehearse: Mo
     found = commissioned(derived(tmp_path / "bag", without_voltage), "reference", tmp_path / "out")
     assert not rehearse.called
     assert found["alarm"]["caution"] >= ClassifierSettings().caution
+    assert found["alarm"]["expected_per_hour"] is found["alarm"]["ci95_per_hour"] is None
+    assert "expected_false_alarms" not in (tmp_path / "out" / "commissioned.yaml").read_text()
     assert any("the robot tells currents, not powers" in note for note in found["notes"])
     assert 0.0 < found["bands"]["current"] < 0.15  # A, the default
     floors = {floor["kind"]: floor for floor in found["floors"]}
@@ -95,6 +102,27 @@ def test_total_alone_is_all_that_is_rehearsed(tmp_path: Path, rehearse: Mock) ->
     assert found["trials"] == []  # no motor's sensor to fail
     kinds = {line["kind"] for line in found["regimes"]}
     assert kinds == {"total power", "wheel speed"}
+
+
+@pytest.mark.parametrize("is_known", [True, False])
+def test_a_rate_that_is_not_known_is_not_told(is_known: bool) -> None:
+    tails = [Tail.of(name, [0.0] * count, 30.0, AlarmChoice()) for name, count in TAILS.items()]
+    level = alarm_level(tails[: 1 + (not is_known)], 0.05, 11.0, AlarmChoice())
+    said = SimpleNamespace(alarms=(), undecided=0, ticks=1)
+    outcome = SimpleNamespace(
+        level=level,
+        explained={"report": REPORT},
+        held=SimpleNamespace(name="tour", hours=0.1),
+        held_said=said,
+    )
+    request = SimpleNamespace(false_alarms_per_hour=0.05)
+    found = SimpleNamespace(
+        outcome=outcome, is_go=True, verdict="go", reasons=(), floors=(), request=request
+    )
+    said_first, *_, alarms, _, _ = lines(found)  # type: ignore[arg-type]
+    assert said_first.startswith(f"go: commissioned{' for 0.05 false' if is_known else ';'}")
+    assert ("expected 0 false alarms per hour" in alarms) is is_known
+    assert ("not known" in alarms, "not known" in said_first) == (not is_known, not is_known)
 
 
 def test_silenced_residuals_are_unknown(healthy: Observed) -> None:

@@ -98,16 +98,17 @@ def _tail_of(values: Array, choice: AlarmChoice) -> tuple[float, Array]:
     """The threshold of a tail that is exponential, or as high as there are peaks for, and these."""
     threshold, over = 0.0, values[values > 0.0]
     share = choice.kept
-    while True:
-        higher = float(np.quantile(values, 1.0 - share)) if len(values) else 0.0
-        peaks = values[values > max(higher, 0.0)]
+    while len(values):
+        higher = float(np.quantile(values, 1.0 - share))
+        peaks = values[values > higher]
         if len(peaks) < choice.least_peaks:
-            return threshold, over
-        threshold, over = max(higher, 0.0), peaks
-        known = over[over < _CAP] - threshold
-        if len(known) < choice.least_peaks or not _is_heavier(known):
-            return threshold, over
+            break
+        threshold, over = higher, peaks
+        # Peaks at the cap count as what they are at least: they are what a rare cause looks like.
+        if not _is_heavier(over - threshold):
+            break
         share /= 2.0
+    return threshold, over
 
 
 def _is_heavier(excesses: Array) -> bool:
@@ -132,6 +133,11 @@ class AlarmLevel:
     def is_enough(self) -> bool:
         """Whether the caution that there is reaches what was asked for."""
         return self.needed <= MOST_CAUTION
+
+    @property
+    def is_rate_known(self) -> bool:
+        """Whether every source was watched: what is expected counts no other."""
+        return all(tail.events for tail in self.tails)
 
 
 def alarm_level(

@@ -37,6 +37,7 @@ from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.drive.cut import names_of
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.drive.record import Drive
+from tomr_power_model.effects.user import named_files
 from tomr_power_model.errors import InputError
 from tomr_power_model.files.write import make_folder, write_together
 from tomr_power_model.robot import (
@@ -158,7 +159,7 @@ class _Work:
         progress("checking", 0.0)
         values = read_description(request.robot)
         robot = load_robot(request.robot)
-        prints = [fingerprint(bag) for bag in request.bags]
+        prints = [fingerprint(path) for path in (*request.bags, *named_files())]
         skips = repr(sorted(request.skips.items()))
         key = digest([suite_version(), repr(sorted(values.items())), skips, *prints])
         drives = tuple(read_drive(bag, robot) for bag in request.bags)

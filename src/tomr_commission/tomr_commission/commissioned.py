@@ -70,10 +70,16 @@ def commissioned_text(
         "held_out": record.held_out,
         "method": record.method,
         "false_alarms_per_hour": record.level.wanted,
-        "expected_false_alarms_per_hour": float(f"{record.level.expected:.3g}"),
+        **_expected(record.level),
         **{f"floors.{_key(name)}": size for name, size in record.floors.items()},
     }
     return sections_text(merged, _header(record, source))
+
+
+def _expected(level: AlarmLevel) -> dict[str, object]:
+    if not level.is_rate_known:
+        return {}
+    return {"expected_false_alarms_per_hour": float(f"{level.expected:.3g}")}
 
 
 def _key(name: str) -> str:

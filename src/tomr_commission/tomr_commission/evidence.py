@@ -35,10 +35,6 @@ class _Witness(WindowJudge):
         )
         self.newest = 0.0
 
-    def clear(self) -> None:
-        super().clear()
-        self.newest = 0.0
-
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         opinion = super().judge(frame, elapsed_ns, unseen)
         self.newest = self.evidence()

@@ -15,7 +15,13 @@ from tomr_power_model.messages.plain import Level
 from tomr_power_model.model.commanded import CommandPath, CommandTiming, Seen
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.predictor import PowerPredictor
-from tomr_power_model.robot import read_description, robot_from_parameters, shipped_robot
+from tomr_power_model.robot import (
+    digest_of,
+    read_description,
+    robot_from_parameters,
+    shipped_robot,
+)
+from tomr_power_model.robot.held import too_steep
 from tomr_power_model.unmodelled import FAMILIES, LearntTerm, Motion, motion_of
 from tomr_power_model.unmodelled.described import parameters_of, terms_of
 from tomr_power_model.unmodelled.online import OnlineTerms
@@ -251,6 +257,25 @@ def test_a_robot_that_was_measured_anew_keeps_its_tables() -> None:
         terms_of(values | {"robot.mass": 1.15 * mass}, NAMES, "made")
 
 
+def test_a_table_belongs_to_the_robot_that_it_was_learnt_on() -> None:
+    term = _term("torque.speed", [[0.0, 1.0, 2.0]], [0.0, 0.1, 0.2], 1)
+    another = VALUES | {"robot.mass": 20.0}
+    assert terms_of(another | parameters_of("term_1", term, NAMES, another), NAMES, "made")
+    with pytest.raises(InputError, match="is not this one"):
+        terms_of(VALUES | parameters_of("term_1", term, NAMES, another), NAMES, "made")
+
+
+def test_a_commissioning_hangs_on_every_value_of_a_table() -> None:
+    line = np.linspace(-3.0, 3.0, 60).tolist()
+    values = np.zeros((2, 3600))
+    digests = {digest_of(ROBOT)}
+    for changed in (0.0, 1e-3):
+        values[1, 1800] = changed
+        term = _term("force.place", [line, line], values.tolist())
+        digests.add(digest_of(evolve(ROBOT, unmodelled=(term,))))
+    assert len(digests) == 3
+
+
 # Curves whose steepest part is 1 N m s/rad, 0.6 N m/A or 671 N s/m, scaled to what drivers hold.
 @pytest.mark.parametrize("stable", [True, False])
 @pytest.mark.parametrize(
@@ -262,6 +287,8 @@ def test_a_robot_that_was_measured_anew_keeps_its_tables() -> None:
         ("torque.current", [[0.0, 1.0, 2.0]], [0.2, 0.8, 0.6], (0,)),
         ("force.velocity", [[-0.5, 0.5], [-0.5, 0.5]],
          [[300.0, 0.0, -300.0, -600.0], [0.0] * 4], ()),
+        ("force.velocity", [[-0.5, 0.5], [-0.5, 0.5]],  # either way alike
+         [[335.4, 335.4, -335.4, -335.4], [335.4, -335.4, 335.4, -335.4]], ()),
     ],
 )  # fmt: skip
 def test_a_curve_steeper_than_the_drivers_hold_is_refused(
@@ -282,6 +309,14 @@ def test_a_curve_steeper_than_the_drivers_hold_is_refused(
         return
     with pytest.raises(InputError, match=r"learnt term 1 .* steep .* the loop would not be stable"):
         robot_from_parameters(described, "made")
+
+
+def test_the_weakest_of_a_terms_wheels_has_to_hold_it() -> None:
+    given = {"constants": (1.0, 3.0, 2.0), "resistances": (1.0,) * 3, "proportional": 1.0}
+    for wheels, holds in (((0, 1, 2), 1.0), ((1, 2), 2.0), ((1,), 3.0)):
+        for slope in (0.9 * holds, 1.1 * holds):
+            term = _term("torque.current", [[0.0, 1.0]], [[0.0, slope]] * len(wheels), *wheels)
+            assert bool(too_steep(term, **given, wheel_radius=0.05)) is (slope > holds)  # type: ignore[arg-type]
 
 
 def _held(family: str) -> float:

@@ -124,21 +124,34 @@ def test_the_law_that_fits_best_for_its_length_comes_first_and_three_are_listed(
     assert len(_laws(_table("torque.speed", knots), 0.01 * knots)) == 3
 
 
-def test_intervals_are_as_wide_as_the_data_are_inexact() -> None:
+@pytest.mark.parametrize("sigma", [0.1, 1e-3])
+def test_intervals_are_as_wide_as_the_data_are_inexact(sigma: float) -> None:
     """Four times the noise, correlation included; 2 % of a value is never known."""
     knots = np.linspace(0.0, 8.0, 24)
     table, values = _table("torque.speed", knots), 0.01 * knots[None] ** 2
     term = LearntTerm(table.family, (), table.knots, values)
-    widths = []
-    for inflation in (1.0, 16.0):
-        evidence = evolve(_evidence(values, exact=100.0), inflation=inflation)
-        told = laws_of(table, term, evidence)[0].fitted.parameters["exponent"]
-        widths.append(told.high - told.low)
-    # Each value is known to 0.1: the exponent's standard deviation by its own derivative.
+    # Each value is known to sigma: what is known of the parameters by their own derivatives.
     slopes = np.stack([knots**2, 0.01 * knots**2 * np.log(np.maximum(knots, 1e-9))], axis=1)
-    sigma = 0.1 * np.sqrt(np.linalg.inv(slopes.T @ slopes)[1, 1])
-    expected = [3.92 * np.hypot(part * sigma, 0.02 * 2.0) for part in (1.0, 4.0)]
-    assert widths == pytest.approx(expected, rel=0.02)
+    known = sigma**2 * np.linalg.inv(slopes.T @ slopes)
+    never = 0.02 * np.array([0.01, 2.0])
+    tied = never[::-1] * known[0, 1] / np.diag(known)[::-1]  # by the other, as the data tie them
+    for inflation in (1.0, 16.0):
+        evidence = evolve(_evidence(values, exact=sigma**-2), inflation=inflation)
+        laws_told = {item.law.name: item.fitted for item in laws_of(table, term, evidence)}
+        told = laws_told["power law"].parameters
+        widths = [told[name].high - told[name].low for name in ("size", "exponent")]
+        expected = 3.92 * np.sqrt(inflation * np.diag(known) + never**2 + tied**2)
+        assert widths == pytest.approx(expected, rel=0.02)
+
+
+def test_what_cannot_be_negative_has_no_interval_below_nothing() -> None:
+    knots = np.linspace(0.0, 8.0, 24)
+    table, values = _table("torque.since_stand", knots), 0.3 * np.exp(-knots[None] / 0.9)
+    term = LearntTerm(table.family, (), table.knots, values)
+    (law, *_) = laws_of(table, term, _evidence(values, exact=10.0))
+    told = law.fitted.parameters
+    assert told["decay"].low == 0.0 < told["decay"].value
+    assert told["size"].low < 0.0
 
 
 def test_a_curve_that_is_no_law_stays_a_table() -> None:
@@ -174,15 +187,19 @@ def test_a_law_is_brought_to_its_best_however_small_its_size_is(
     monkeypatch.setattr(polish, "changes_of", shown)
     (residual,) = shown(None, None, None, [law.term])
     off = evolve(law, parameters=law.parameters * [1.2, 0.95])
-    best, change = polish.polished(
-        off,
-        None,  # type: ignore[arg-type]
-        None,  # type: ignore[arg-type]
-        (),
-        residual=1e3 * residual,
-        base=np.empty((len(speed), 0)),
-        weight=np.full(len(speed), 1e3),
-        inflation=1.0,
+    (best, change), (wide, _) = (
+        polish.polished(
+            off,
+            None,  # type: ignore[arg-type]
+            None,  # type: ignore[arg-type]
+            (),
+            residual=1e3 * residual,
+            base=np.empty((len(speed), 0)),
+            weight=np.full(len(speed), 1e3),
+            inflation=inflation,
+        )
+        for inflation in (1.0, 4.0)
     )
+    np.testing.assert_allclose(wide.covariance, 4.0 * best.covariance)
     assert best.parameters == pytest.approx(law.parameters, rel=0.01)
     np.testing.assert_allclose(change, residual, atol=1e-3)

@@ -1,33 +1,52 @@
-"""From a learnt term's law to an effect: its file, its test, and how it joins the vocabulary."""
+"""From a learnt term's law to an effect: its file, its test, how it joins, and is found again."""
 
 import argparse
 import json
 import math
+import os
 import re
 import runpy
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from attrs import evolve
 
 from tomr_power_model.effects import EFFECTS, Wheel
-from tomr_power_model.effects.user import load_effects, load_named_effects
+from tomr_power_model.effects.missions import SPEEDS, VARIED
+from tomr_power_model.effects.scales import Scales
+from tomr_power_model.effects.user import load_effects, load_named_effects, named_files
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import read_description, robot_from_parameters
 from tomr_power_model.unmodelled import FAMILIES, LearntTerm
 from tomr_power_model.unmodelled.described import parameters_of
+from tomr_reality_gap.alignment.motion import motion_in
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.arguments import add_inputs, inputs_of
 from tomr_reality_gap.cli import main
+from tomr_reality_gap.explanation import FittedLaw
+from tomr_reality_gap.fit.jacobian import linearise
 from tomr_reality_gap.fit.laws import LAWS, SMOOTH
+from tomr_reality_gap.fit.learnt import Table
+from tomr_reality_gap.fit.unmodelled import Remainder, Tried, fitted
+from tomr_reality_gap.hypotheses.scales import scales_of
 from tomr_reality_gap.promote.learnt_law import learnt_law
+
+from .test_alignment import simulation  # noqa: F401 -- the fixture
+from .test_forward_selection import searched
 
 WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
 CUBE = {
     "size": {"value": 1e-4, "ci95": [9e-5, 1.1e-4], "unit": "N m"},
     "exponent": {"value": 3.0, "ci95": [2.9, 3.1], "unit": ""},
 }
+
+
+SCALES = Scales(*(1.0,) * 13)
 
 
 @pytest.fixture(autouse=True)
@@ -110,6 +129,52 @@ def test_a_promoted_law_is_an_effect_that_passes_its_own_test(
     size = made.parameters["size"]
     assert made.prior.sign == (1 if size.start > 0.0 else -1)
     assert (size.minimum < 0.0, size.maximum > 0.0) == (size.start < 0.0, size.start > 0.0)
+    assert made.prior.sizes["size"](SCALES) == pytest.approx(abs(size.start))
+    shape = {name: item.start for name, item in made.parameters.items() if name != "size"}
+    assert [dict(tried) for tried in made.prior.shapes(SCALES)] == [shape]
+    # What a driver loses is in its power alone, and shows where motors work.
+    assert made.in_currents is (family != "driver.current")
+    assert made.mission == (SPEEDS if made.in_currents else VARIED)
+    if "phase" in shape:
+        assert (made.parameters["phase"].minimum, made.parameters["phase"].maximum) == (-1e2, 1e2)
+        unknown = Wheel(1.0, 50.0, 0.0, math.nan, 0.05, 20.0)
+        assert made.moving_torque(0.05, 3.0, 0.5, unknown) == pytest.approx(0.05 * math.sin(0.5))
+
+
+def test_ranges_stay_within_what_an_effect_can_be(tmp_path: Path) -> None:
+    """Intervals from below nothing to far above the rest, and one of no width."""
+    wide = {"size": {"value": 1e-4, "ci95": [1e-4, 1e-4]},
+            "exponent": {"value": 3.0, "ci95": [-1.0, 7.0]}}  # fmt: skip
+    explained = _explained(tmp_path, "torque.speed", {"power law": wide})
+    assert main(["promote", str(explained), "--out", str(tmp_path / "e")]) == 0
+    load_effects(tmp_path / "e")
+    size, exponent = EFFECTS["learnt.power_law_by_speed"].parameters.values()
+    assert (exponent.minimum, exponent.maximum) == pytest.approx((0.3, 6.0))
+    assert size.prior_std == pytest.approx(2e-6)  # nothing is known better than by 2 %
+    slow = Wheel(0.05, 50.0, 0.0, 0.0, 0.05, 20.0)
+    torque = EFFECTS["learnt.power_law_by_speed"].moving_torque(0.1, 1.0, slow)
+    assert torque == pytest.approx(0.1 * 0.05 * math.tanh(0.5))
+
+
+def test_of_several_terms_the_named_one_is_taken(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    explained = _explained(tmp_path)
+    values = dict(read_description(explained))
+    knots = (np.linspace(0.0, 3.0, 7),)
+    term = LearntTerm(FAMILIES["driver.current"], (0,), knots, np.zeros((1, 7)))
+    values.update(parameters_of("term_2", term, WHEELS, values))
+    explained.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}), encoding="utf-8")
+    report = json.loads(explained.with_name("report.json").read_text(encoding="utf-8"))
+    law = {"law": "power law", "parameters": _told(size=0.5, exponent=2.0)}
+    report["findings"].append({"learnt": {"family": "driver.current", "laws": [law]}})
+    explained.with_name("report.json").write_text(json.dumps(report), encoding="utf-8")
+    assert main(["promote", str(explained), "--out", str(tmp_path / "e")]) == 2
+    assert "several learnt terms: give --term" in capsys.readouterr().err
+    found = learnt_law(explained, "term_2")
+    assert (found.family, found.parameters["size"].unit) == (FAMILIES["driver.current"], "W")
+    assert (found.parameters["size"].value, found.spacing) == (0.5, 0.5)
+    assert learnt_law(explained, "term_1").family is FAMILIES["torque.speed"]
 
 
 def test_units_ranges_and_priors_are_those_of_the_intervals(tmp_path: Path) -> None:
@@ -229,6 +294,23 @@ def test_files_that_are_no_effects_are_refused(tmp_path: Path, text: str, messag
     assert dict(EFFECTS) == before
 
 
+def test_an_effect_that_only_configures_may_have_more_parameters(tmp_path: Path) -> None:
+    text = OWN.format(effect_id="own.x", names=["a", "b", "c", "d"])
+    (tmp_path / "own.py").write_text(text.replace("driver_power", "configure"), encoding="utf-8")
+    assert load_effects(tmp_path) == ["own.x"]
+
+
+def test_the_vocabulary_of_a_process_has_the_effects_of_the_folder_named_for_all(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "own.py").write_text(OWN.format(effect_id="own.x", names=["a"]), encoding="utf-8")
+    asked = "from tomr_power_model.effects import EFFECTS; print('own.x' in EFFECTS)"
+    for named, expected in (({"TOMR_EFFECTS": str(tmp_path)}, "True\n"), ({}, "False\n")):
+        environment = {k: v for k, v in os.environ.items() if k != "TOMR_EFFECTS"} | named
+        command = [sys.executable, "-c", asked]
+        assert subprocess.check_output(command, env=environment, text=True) == expected
+
+
 def test_effects_of_a_user_join_only_where_their_folder_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -240,6 +322,7 @@ def test_effects_of_a_user_join_only_where_their_folder_is_named(
     monkeypatch.setenv("TOMR_EFFECTS", str(tmp_path))
     load_named_effects()
     assert "own.x" in EFFECTS
+    assert named_files() == [tmp_path / "own.py"]
     assert load_effects(tmp_path) == ["own.x"]  # the same file again is no clash
     with pytest.raises(InputError, match="holds no effects"):
         load_effects(tmp_path / "nowhere")
@@ -254,3 +337,47 @@ def test_an_option_names_the_folder(tmp_path: Path) -> None:
     assert "own.x" not in EFFECTS
     inputs_of(parser.parse_args([*given, "--effects", str(tmp_path)]))
     assert "own.x" in EFFECTS
+
+
+def _learnt(made: RecordingSimulation, value: np.ndarray) -> FittedLaw:
+    """The first law of what depends on speed, from a drive with the description beside it."""
+    dataset, found = searched(made, value, ())
+    jacobian = linearise(dataset, found.best.model, ())
+    rest = Remainder.of(dataset, jacobian.value, np.asarray(jacobian.matrix))
+    motions, run = [motion_in(made, made.robot)], made.run(made.robot)
+    scales = scales_of(made.robot, run.speed, run.power, run.copper, duration=30.0)
+    table = Table.over(FAMILIES["torque.speed"], motions, scales)
+    assert table is not None
+    return fitted(rest, Tried(table, 1.0), made.robot, motions).laws[0]
+
+
+def test_a_promoted_law_is_found_on_another_drive_within_what_is_known_of_both(
+    tmp_path: Path,
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    """3e-4 N m at 1 rad/s that grows with the cube of the speed, up to 10 rad/s."""
+    true, effect_id = {"size": 3e-4, "exponent": 3.0}, "learnt.power_law_by_speed"
+
+    def promoted(told: dict[str, object]) -> None:
+        explained = _explained(tmp_path, "torque.speed", {"power law": told})
+        assert main(["promote", str(explained), "--out", str(tmp_path / "e")]) == 0
+        load_effects(tmp_path / "e")
+
+    promoted(_told(**true))
+    robot = simulation.robot
+    theirs = evolve(robot, physics={**robot.physics, effect_id: (true,) * 3})
+    law = _learnt(simulation, simulation.predict([theirs])[0])
+    learnt = law.parameters
+    assert law.name == "power law"
+    promoted({k: {"value": v.value, "ci95": [v.low, v.high]} for k, v in learnt.items()})
+    turned = evolve(simulation.recorded, command=-simulation.recorded.command[:, [1, 0, 2]])
+    another = evolve(simulation, recorded=turned)
+    _, found = searched(another, another.predict([theirs])[0], ("learnt",))
+    (named,), (offsets,) = found.best.model.hypotheses, found.best.model.offsets
+    assert (named.effect, named.where) == (effect_id, ("all_wheels",))
+    fresh = {"size": offsets[0], "exponent": learnt["exponent"].value + offsets[1]}
+    for name, value in true.items():
+        half = 0.5 * (learnt[name].high - learnt[name].low)
+        assert abs(learnt[name].value - value) < half < 0.4 * value
+        assert abs(learnt[name].value - fresh[name]) < half
+        assert fresh[name] == pytest.approx(value, rel=0.05)

@@ -6,6 +6,7 @@ from typing import Any
 
 from attrs import asdict
 
+from tomr_commission.alarm import AlarmLevel
 from tomr_commission.bands import outside
 from tomr_commission.commission import Commissioned
 from tomr_commission.evidence import Decided
@@ -19,8 +20,7 @@ def lines(found: Commissioned) -> list[str]:
         said += [f"  {reason.what}", f"    -> {reason.remedy}"]
     said += [
         f"robot: {outcome.explained['report']['sentence']}",
-        f"alarm level: {level.caution:g} decades; expected {level.expected:.2g} false alarms per "
-        f"hour (95 %: {level.low:.2g} to {level.high:.2g})",
+        f"alarm level: {level.caution:g} decades; {_expected(level)}",
         f"held out ({outcome.held.name}, {60 * outcome.held.hours:.1f} min): "
         f"{len(outcome.held_said.alarms)} false alarms, "
         f"{100 * decided_share(outcome.held_said):.0f} % of the time decided",
@@ -35,7 +35,7 @@ def lines(found: Commissioned) -> list[str]:
 
 def headline(found: Commissioned) -> str:
     """The verdict in one sentence."""
-    if found.is_go and not found.shoved.peaks:
+    if found.is_go and not found.outcome.level.is_rate_known:
         return "commissioned; nothing speaks against it, but how often shoves alarm is not known"
     if found.is_go:
         return (
@@ -44,6 +44,15 @@ def headline(found: Commissioned) -> str:
         )
     count = len(found.reasons)
     return f"{count} thing{'s' if count > 1 else ''} to mend first"
+
+
+def _expected(level: AlarmLevel) -> str:
+    if not level.is_rate_known:
+        return "how many false alarms are to be expected is not known"
+    return (
+        f"expected {level.expected:.2g} false alarms per hour "
+        f"(95 %: {level.low:.2g} to {level.high:.2g})"
+    )
 
 
 def decided_share(said: Decided) -> float:
@@ -71,8 +80,8 @@ def fields(found: Commissioned) -> dict[str, Any]:
             "caution": level.caution,
             "wanted_per_hour": level.wanted,
             "needed": level.needed,
-            "expected_per_hour": level.expected,
-            "ci95_per_hour": [level.low, level.high],
+            "expected_per_hour": level.expected if level.is_rate_known else None,
+            "ci95_per_hour": [level.low, level.high] if level.is_rate_known else None,
             "tails": [asdict(tail) for tail in level.tails],
             "simulated_hours": found.shoved.hours,
         },

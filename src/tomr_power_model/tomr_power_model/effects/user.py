@@ -24,7 +24,7 @@ def load_effects(folder: Path) -> list[str]:
 
     Raises InputError where there are none, or one is not usable.
     """
-    files = [item for item in sorted(folder.glob("*.py")) if not item.name.startswith("test_")]
+    files = _files(folder)
     if not files:
         raise InputError(f"{folder}: holds no effects: give a folder of Python files")
     found = [effect_id for file in files for effect_id in _load(file.resolve())]
@@ -35,9 +35,22 @@ def load_effects(folder: Path) -> list[str]:
 
 def load_named_effects() -> None:
     """Those of the folder that TOMR_EFFECTS names, if it does."""
+    for folder in _named():
+        load_effects(folder)
+
+
+def named_files() -> list[Path]:
+    """The files that these are in."""
+    return [file for folder in _named() for file in _files(folder)]
+
+
+def _named() -> list[Path]:
     named = os.environ.get(VARIABLE)
-    if named:
-        load_effects(Path(named))
+    return [Path(named)] if named else []
+
+
+def _files(folder: Path) -> list[Path]:
+    return [item for item in sorted(folder.glob("*.py")) if not item.name.startswith("test_")]
 
 
 def _load(file: Path) -> list[str]:

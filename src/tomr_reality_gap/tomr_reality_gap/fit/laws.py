@@ -14,6 +14,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from tomr_power_model.estimation.discrepancy import SIMULATOR
 from tomr_power_model.unmodelled import LearntTerm
 from tomr_reality_gap.explanation import FittedLaw
 from tomr_reality_gap.fit.learnt import Table
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 _AS_WELL = 0.9  # of what the table explains
 _LISTED = 3
 _TINY = 1e-9
+_NOTHING = 1e-300  # variance of a parameter that the data do not tell
 _NEGLIGIBLE = 1e-6  # of the largest eigenvalue
 _POSITIVE = ("slack", "radius", "decay")
 _BEYOND = 1.0  # of the range, on either side, that a law is trusted beyond the table
@@ -214,7 +216,7 @@ class LawAt:
 
     law: Law
     parameters: Array
-    sigma: Array  # their standard deviations
+    covariance: Array  # of the parameters, (p, p)
     share: float  # of what the table explains
     table: Table
     learnt: LearntTerm
@@ -235,13 +237,26 @@ class LawAt:
         """As a report has it."""
         estimates = {}
         for (name, unit), value, sigma in zip(
-            self.law.units.items(), self.parameters.tolist(), self.sigma.tolist(), strict=True
+            self.law.units.items(), self.parameters.tolist(), self._sigma.tolist(), strict=True
         ):
             value, least = (abs(value), 0.0) if name in _POSITIVE else (value, -math.inf)
             unit = unit_of(unit, self.learnt)
             bounds = (least, math.inf)
             estimates[name] = estimate_of(value, sigma, offset=value, unit=unit, bounds=bounds)
         return FittedLaw(self.law.name, self.law.words, estimates, self.share)
+
+    @property
+    def _sigma(self) -> Array:
+        """Standard deviations of the parameters but for what is never known of each itself.
+
+        What is never known of one moves the others as the data tie them to it: the size of a power
+        law, its value at 1, is far from where it was driven.
+        """
+        variance = np.diag(self.covariance)
+        never = SIMULATOR.parameter * self.parameters
+        moved = self.covariance * (never / np.maximum(variance, _NOTHING))
+        np.fill_diagonal(moved, 0.0)
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0) + (moved**2).sum(axis=1)))
 
 
 def unit_of(unit: str, term: LearntTerm) -> str:
@@ -288,8 +303,7 @@ def _fitted(law: Law, table: Table, learnt: LearntTerm, evidence: Evidence) -> L
     whole = _explained((learnt.values @ inverse.T).ravel(), evidence)
     share = _explained(units_at(p), evidence) / max(whole, _TINY)
     covariance = np.linalg.pinv(best.jac.T @ best.jac) * evidence.inflation
-    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return LawAt(law, p, sigma, share, table, learnt)
+    return LawAt(law, p, covariance, share, table, learnt)
 
 
 def _places(knots: Sequence[Array]) -> Array:

@@ -79,8 +79,8 @@ def polished(
             break
         jacobian = beside(((rows[1:] - rows[0]).T) / steps)
         information = jacobian.T @ jacobian
-        covariance = np.linalg.pinv(information)
-        sigma = np.sqrt(np.maximum(np.diag(covariance) * inflation, 0.0))
-        best, change, cost = evolve(law, sigma=sigma), rows[0] / weight, now
+        covariance = np.asarray(np.linalg.pinv(information), dtype=np.float64)
+        best = evolve(law, covariance=covariance * inflation)
+        change, cost = rows[0] / weight, now
         law = evolve(law, parameters=law.parameters + covariance @ (jacobian.T @ left))
     return best, change
