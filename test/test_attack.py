@@ -12,8 +12,13 @@ import pytest
 ROOT = Path(__file__).parents[1]
 sys.path.append(str(ROOT / "bench"))
 
-from attack.case import Attack
+from attack.case import HEALTHY, Attack, Raw
 from attack.judge import problem_of
+from attack.recordings import SECOND, restamped
+
+from tomr_power_model.messages.bag import jazzy_typestore
+from tomr_power_model.messages.intake import header_stamp_ns
+from tomr_power_model.recordings import open_recording
 
 STATES = ("power sensor fault 1", "dragging wheel 2", "external load", "slip")
 
@@ -30,6 +35,18 @@ def test_hostile_input_is_answered_as_promised(tmp_path: Path) -> None:
     )
     assert run.returncode == 0, run.stdout + run.stderr
     assert "| all |" in run.stdout
+
+
+@pytest.mark.parametrize("stamp_ns", [0, 5 * SECOND - 1, -7 * SECOND, 2**31 * SECOND - 1])
+def test_a_message_with_another_stamp_can_be_read(stamp_ns: int) -> None:
+    decode = jazzy_typestore().deserialize_cdr
+    with open_recording(HEALTHY) as recording:
+        raws = {item[0]: Raw(*item) for item in recording.raw_messages()}
+    assert len(raws) > 5
+    for raw in raws.values():
+        message = decode(restamped(raw, stamp_ns).data, raw.type_name)
+        assert header_stamp_ns(message) == stamp_ns
+        assert message.header.frame_id == decode(raw.data, raw.type_name).header.frame_id
 
 
 @pytest.mark.parametrize("state", [*STATES, "does not follow its commands"])

@@ -16,7 +16,7 @@ from tomr_power_model.messages.bag import jazzy_typestore
 from tomr_power_model.recordings import RecordingWriter
 
 Raws = Iterable[Raw]
-_STAMP = struct.Struct("<4xiI")  # after what tells the encoding
+_STAMP, _HEAD = struct.Struct("<iI"), 4  # the stamp comes after what tells the encoding
 SECOND = 1_000_000_000
 EXTREMES = (math.nan, math.inf, -math.inf, 1e308, -1e308, 1e30, -1e30, 1e6, 0.0, 5e-324)
 _SENSORS = ("/joint_states", "/wheel_1/power", "/wheel_2/power", "/wheel_3/power")
@@ -45,7 +45,7 @@ def restamped(raw: Raw, stamp_ns: int) -> Raw:
     """A message with another stamp in its header, with which each of the base begins."""
     seconds, rest = divmod(max(-(2**31) * SECOND, stamp_ns), SECOND)
     data = bytearray(raw.data)
-    _STAMP.pack_into(data, 0, min(seconds, 2**31 - 1), rest)
+    _STAMP.pack_into(data, _HEAD, min(seconds, 2**31 - 1), rest)
     return evolve(raw, data=bytes(data))
 
 
