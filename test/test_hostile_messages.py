@@ -25,6 +25,7 @@ from tomr_fault_diag.nodes.fault_classifier_node import FaultClassifierNode
 from tomr_fault_diag.nodes.power_residuals_node import PowerResidualsNode
 from tomr_odometry.nodes.slip_odometry_node import SlipOdometryNode
 from tomr_power_model.nodes.power_model_node import PowerModelNode
+from tomr_power_model.nodes.stage_node import StageNode
 from tomr_power_model.robot import shipped_robot
 from tomr_sim_bridge.nodes.sim_bridge_node import SimBridge
 from tomr_view.nodes.view_node import ViewNode
@@ -113,3 +114,20 @@ def test_a_node_survives_whatever_it_hears(node: Node) -> None:
                 subscription.callback(serialize_message(message) if subscription.raw else message)
         for timer in node.timers:
             timer.callback()
+
+
+@pytest.mark.parametrize("node", ["fault_classifier"], indirect=True)
+def test_a_node_takes_neither_a_flood_nor_what_is_too_large(
+    node: StageNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(node, "complain", lambda _, problem: said.append(problem))
+    (heard,) = (subscription for subscription in node.subscriptions if subscription.raw)
+    message = heard.msg_type()
+    message.header.stamp.sec = 1
+    data = serialize_message(message)
+    for _ in range(1210):
+        heard.callback(data)
+    heard.callback(data + bytes(2_000_000))
+    assert sum("more than 1200 messages a second" in problem for problem in said) == 10
+    assert "bytes: left out" in said[-1]
