@@ -9,6 +9,7 @@ from importlib.resources import files
 from itertools import product
 from math import inf, nan
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -17,13 +18,14 @@ from attrs import frozen
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.node import Node
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 
 from tomr_fault_diag.classifier.messages import NAME
 from tomr_fault_diag.nodes.diagnosis_node import DiagnosisNode
 from tomr_fault_diag.nodes.fault_classifier_node import FaultClassifierNode
 from tomr_fault_diag.nodes.power_residuals_node import PowerResidualsNode
 from tomr_odometry.nodes.slip_odometry_node import SlipOdometryNode
+from tomr_power_model.nodes import stage_node
 from tomr_power_model.nodes.power_model_node import PowerModelNode
 from tomr_power_model.nodes.stage_node import StageNode
 from tomr_power_model.robot import shipped_robot
@@ -131,3 +133,18 @@ def test_a_node_takes_neither_a_flood_nor_what_is_too_large(
     heard.callback(data + bytes(2_000_000))
     assert sum("more than 1200 messages a second" in problem for problem in said) == 10
     assert "bytes: left out" in said[-1]
+
+
+@pytest.mark.parametrize("node", ["power_model"], indirect=True)
+def test_a_flood_of_encoders_is_thinned_before_it_is_read(
+    node: StageNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read = MagicMock(side_effect=deserialize_message)
+    monkeypatch.setattr(stage_node, "deserialize_message", read)
+    monkeypatch.setattr(node, "complain", lambda *_: None)
+    (heard,) = (item for item in node.subscriptions if item.topic_name == "/joint_states")
+    message = heard.msg_type()
+    for nanosec in range(0, SECOND // 10, 200_000):  # 5 kHz
+        message.header.stamp = Time(sec=1, nanosec=nanosec)
+        heard.callback(serialize_message(message))
+    assert read.call_count == 100
