@@ -204,7 +204,7 @@ def odd_stamps(dice: random.Random, folder: Path, base: Base) -> Attack:
     tool, arguments = reading(dice, bag)
     where = next(iter(chosen)) if len(chosen) == 1 else "all topics"
     what = f"{kind} by {by / SECOND:g} s on {where}, {clock}"
-    return Attack(tool, arguments, what, names | _true_of_stamps(kind, clock, chosen))
+    return Attack(tool, arguments, what, _known_of_stamps(kind, clock, chosen, names))
 
 
 def _moved(kind: str, stamp: int, told: tuple[int, int, int], dice: random.Random) -> int:
@@ -224,16 +224,19 @@ def _moved(kind: str, stamp: int, told: tuple[int, int, int], dice: random.Rando
     return moved.get(kind, stamp)
 
 
-def _true_of_stamps(kind: str, clock: str, chosen: set[str]) -> set[str]:
-    """What else may be said of recordings of which a part comes at another time than it was."""
-    said: set[str] = set()
+def _known_of_stamps(
+    kind: str, clock: str, chosen: set[str], names: frozenset[str]
+) -> frozenset[str] | None:
+    """Faults that may be named where a part of a recording comes at another time than it was."""
     alone = len(chosen) == 1
+    if clock == "both" and kind == "reverse" and "/joint_states" in chosen:
+        return None  # a well-formed recording of a motion that no robot makes
     if clock != "stamped" and alone and kind in ("jump", "reverse", "shuffle"):
-        said |= {POWER[topic] for topic in chosen if topic in POWER}  # no power of this motion
+        names |= {POWER[topic] for topic in chosen if topic in POWER}  # no power of this motion
     # It moves before or long after it is told to.
-    if clock == "both" and (kind == "reverse" or (kind == "jump" and alone)) and chosen & _MOTION:
-        said.add(DISOBEYS.name)
-    return said
+    if clock == "both" and alone and kind in ("jump", "reverse") and chosen & _MOTION:
+        names |= {DISOBEYS.name}
+    return names
 
 
 @attack("gaps and losses")
