@@ -57,3 +57,6 @@ def test_every_accusation_that_is_not_true_is_a_false_word(state: str) -> None:
 
     assert judged() == judged("another") == f"false word: {state}"
     assert judged(state) == ""
+    allowed = json.dumps({"ticks": 9, "shares": {"unknown": 0.1, "pushed": 0.1, "normal": 0.8}})
+    given = Attack("tomr_diagnose", ("bag", "--json"), "", frozenset())
+    assert problem_of(given, 1, "", allowed) == ""

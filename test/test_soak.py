@@ -61,7 +61,8 @@ def test_memory_that_changes_after_warm_up_is_a_miss(growth: float, passed: bool
     ages = range(0, 1000, 10)
     samples = [(age, 50.0 if age < 100 else 100.0 * (1.0 + growth * age / 990)) for age in ages]
     steady = [(float(age), 80.0) for age in ages]
-    lives = [Process("a", samples), Process("a", steady), Process("a", steady[:3])]
+    short = [(200.0 + age, 10.0 * age) for age in range(1, 10)]  # killed before it was warm
+    lives = [Process("a", samples), Process("a", steady), Process("a", short)]
     (item,) = memory_items(lives, 100.0)
     assert item.passed == passed
     assert "in 2 lives" in item.found
