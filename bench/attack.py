@@ -121,7 +121,7 @@ def _main(arguments: Sequence[str] | None) -> int:
     base = read_base()
     load_tools(HEALTHY)
     if options.again is not None:
-        folder = options.out / f"try_{options.again}"
+        folder = options.out.resolve() / f"try_{options.again}"  # tries run elsewhere
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir()
         print(json.dumps(_once(options.again, options.seed, options.only, base, folder), indent=1))

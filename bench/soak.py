@@ -16,9 +16,8 @@ from collections.abc import Sequence
 from importlib.resources import as_file, files
 from pathlib import Path
 
-import rclpy
-from rclpy.signals import SignalHandlerOptions
 from soak.judge import table
+from soak.relay_node import connected
 from soak.stage import Soak
 
 from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK, run_main
@@ -42,13 +41,9 @@ def _soak(arguments: Sequence[str] | None) -> int:
     options = _parser().parse_args(arguments)
     make_folder(options.out)
     described = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        with as_file(described) as robot:
-            soak = Soak(robot, options.out, options.speed, 60.0 * options.minutes)
-            items = soak.run(options.seed, options.flood)
-    finally:
-        rclpy.try_shutdown()
+    with connected(), as_file(described) as robot:
+        soak = Soak(robot, options.out, options.speed, 60.0 * options.minutes)
+        items = soak.run(options.seed, options.flood)
     text = table(items)
     write_text(options.out / "table.md", text + "\n")
     print(text)

@@ -12,8 +12,13 @@ import pytest
 ROOT = Path(__file__).parents[1]
 sys.path.append(str(ROOT / "bench"))
 
-from attack.case import Attack
+from attack.case import HEALTHY, Attack, Raw
 from attack.judge import problem_of
+from attack.recordings import SECOND, restamped
+
+from tomr_power_model.messages.bag import jazzy_typestore
+from tomr_power_model.messages.intake import header_stamp_ns
+from tomr_power_model.recordings import open_recording
 
 STATES = ("power sensor fault 1", "dragging wheel 2", "external load", "slip")
 
@@ -32,6 +37,18 @@ def test_hostile_input_is_answered_as_promised(tmp_path: Path) -> None:
     assert "| all |" in run.stdout
 
 
+@pytest.mark.parametrize("stamp_ns", [0, 5 * SECOND - 1, -7 * SECOND, 2**31 * SECOND - 1])
+def test_a_message_with_another_stamp_can_be_read(stamp_ns: int) -> None:
+    decode = jazzy_typestore().deserialize_cdr
+    with open_recording(HEALTHY) as recording:
+        raws = {item[0]: Raw(*item) for item in recording.raw_messages()}
+    assert len(raws) > 5
+    for raw in raws.values():
+        message = decode(restamped(raw, stamp_ns).data, raw.type_name)
+        assert header_stamp_ns(message) == stamp_ns
+        assert message.header.frame_id == decode(raw.data, raw.type_name).header.frame_id
+
+
 @pytest.mark.parametrize("state", [*STATES, "does not follow its commands"])
 def test_every_accusation_that_is_not_true_is_a_false_word(state: str) -> None:
     def judged(*names: str) -> str:
@@ -40,3 +57,6 @@ def test_every_accusation_that_is_not_true_is_a_false_word(state: str) -> None:
 
     assert judged() == judged("another") == f"false word: {state}"
     assert judged(state) == ""
+    allowed = json.dumps({"ticks": 9, "shares": {"unknown": 0.1, "pushed": 0.1, "normal": 0.8}})
+    given = Attack("tomr_diagnose", ("bag", "--json"), "", frozenset())
+    assert problem_of(given, 1, "", allowed) == ""

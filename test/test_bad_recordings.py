@@ -12,6 +12,7 @@ import pytest
 from attrs import evolve, frozen
 
 from tomr_fault_diag.cli.diagnose import main
+from tomr_power_model.errors import InputError
 from tomr_power_model.messages.bag import bag_header, bag_message, jazzy_typestore
 from tomr_power_model.recordings import RecordingWriter, open_recording
 
@@ -187,6 +188,12 @@ def test_a_bad_recording_gets_one_line(
     assert str(bag) in line
     for word in words:
         assert word in line
+
+
+def test_what_is_no_message_is_not_passed_on_as_bytes(drive: list[Raw], tmp_path: Path) -> None:
+    bag = _sqlite_with("UPDATE messages SET data = 5")(drive, tmp_path)
+    with open_recording(bag) as recording, pytest.raises(InputError, match="damaged"):
+        list(recording.raw_messages())
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,18 @@ import signal
 import subprocess
 import sys
 import sysconfig
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+from unittest.mock import MagicMock
 
 import pytest
+import rclpy
+from rclpy._rclpy_pybind11 import RCLError
 
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_DEFECT, run_main
+from tomr_power_model.errors import InputError
+from tomr_power_model.nodes.stage_node import run_node
 
 ROOT = Path(__file__).parents[1]
 SQUARE = ROOT / "bags" / "square"
@@ -137,3 +144,17 @@ def test_a_second_signal_does_not_spoil_the_end_of_a_node(number: int) -> None:
 
 def _environment(**more: str) -> dict[str, str]:
     return {**os.environ, **more}
+
+
+def test_a_node_refuses_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refusing(error: Exception) -> Callable[..., Any]:
+        return MagicMock(side_effect=error)
+
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    assert run_node(refusing(InputError("no\nnumber")), []) == EXIT_BAD_INPUT
+    assert capsys.readouterr().err == "error: no number\n"
+    monkeypatch.setattr(rclpy, "init", refusing(RCLError("odd\nfile, at ./rcl.c:1")))
+    assert run_node(refusing(ValueError()), []) == EXIT_BAD_INPUT
+    assert capsys.readouterr().err == "error: odd file: mend the file\n"

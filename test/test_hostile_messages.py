@@ -9,6 +9,7 @@ from importlib.resources import files
 from itertools import product
 from math import inf, nan
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -17,14 +18,16 @@ from attrs import frozen
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.node import Node
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 
 from tomr_fault_diag.classifier.messages import NAME
 from tomr_fault_diag.nodes.diagnosis_node import DiagnosisNode
 from tomr_fault_diag.nodes.fault_classifier_node import FaultClassifierNode
 from tomr_fault_diag.nodes.power_residuals_node import PowerResidualsNode
 from tomr_odometry.nodes.slip_odometry_node import SlipOdometryNode
+from tomr_power_model.nodes import stage_node
 from tomr_power_model.nodes.power_model_node import PowerModelNode
+from tomr_power_model.nodes.stage_node import StageNode
 from tomr_power_model.robot import shipped_robot
 from tomr_sim_bridge.nodes.sim_bridge_node import SimBridge
 from tomr_view.nodes.view_node import ViewNode
@@ -113,3 +116,35 @@ def test_a_node_survives_whatever_it_hears(node: Node) -> None:
                 subscription.callback(serialize_message(message) if subscription.raw else message)
         for timer in node.timers:
             timer.callback()
+
+
+@pytest.mark.parametrize("node", ["fault_classifier"], indirect=True)
+def test_a_node_takes_neither_a_flood_nor_what_is_too_large(
+    node: StageNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(node, "complain", lambda _, problem: said.append(problem))
+    (heard,) = (subscription for subscription in node.subscriptions if subscription.raw)
+    message = heard.msg_type()
+    message.header.stamp.sec = 1
+    data = serialize_message(message)
+    for _ in range(1210):
+        heard.callback(data)
+    heard.callback(data + bytes(2_000_000))
+    assert sum("more than 1200 messages a second" in problem for problem in said) == 10
+    assert "bytes: left out" in said[-1]
+
+
+@pytest.mark.parametrize("node", ["power_model"], indirect=True)
+def test_a_flood_of_encoders_is_thinned_before_it_is_read(
+    node: StageNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read = MagicMock(side_effect=deserialize_message)
+    monkeypatch.setattr(stage_node, "deserialize_message", read)
+    monkeypatch.setattr(node, "complain", lambda *_: None)
+    (heard,) = (item for item in node.subscriptions if item.topic_name == "/joint_states")
+    message = heard.msg_type()
+    for nanosec in range(0, SECOND // 10, 200_000):  # 5 kHz
+        message.header.stamp = Time(sec=1, nanosec=nanosec)
+        heard.callback(serialize_message(message))
+    assert read.call_count == 100

@@ -4,6 +4,8 @@
 import sys
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,6 +30,7 @@ from interrupted import (
     states,
 )
 
+from tomr_fault_diag.classifier.states import POWER_SENSOR
 from tomr_power_model.messages.intake import stamp_of
 from tomr_power_model.recordings import open_recording
 
@@ -94,3 +97,8 @@ def test_a_fault_is_neither_cleared_nor_missed(
     assert 8.0 < 1e-9 * (named.stamp_ns - start) < 8.3 + 2.0
     during = {d.state.name for d in found if named.stamp_ns <= d.stamp_ns < start + 14 * 10**9}
     assert during == {FAULT}
+
+
+def test_a_dead_sensor_excuses_no_other() -> None:
+    found: Any = [SimpleNamespace(state=state, changed=True) for state in POWER_SENSOR]
+    assert accused(found, 1) == [POWER_SENSOR[0].name, POWER_SENSOR[2].name]

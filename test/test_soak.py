@@ -2,8 +2,9 @@
 
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,6 +12,7 @@ BENCH = Path(__file__).parents[1] / "bench"
 sys.path.insert(0, str(BENCH))
 
 from soak.acts import FAULTS, Flood, Jump, Kill, Pause, Rest, acts  # noqa: E402
+from soak.crew import Crew  # noqa: E402
 from soak.judge import Delays, Process, memory_items, table  # noqa: E402
 
 
@@ -59,7 +61,47 @@ def test_memory_that_changes_after_warm_up_is_a_miss(growth: float, passed: bool
     ages = range(0, 1000, 10)
     samples = [(age, 50.0 if age < 100 else 100.0 * (1.0 + growth * age / 990)) for age in ages]
     steady = [(float(age), 80.0) for age in ages]
-    lives = [Process("a", samples), Process("a", steady), Process("a", steady[:3])]
+    short = [(200.0 + age, 10.0 * age) for age in range(1, 10)]  # killed before it was warm
+    lives = [Process("a", samples), Process("a", steady), Process("a", short)]
     (item,) = memory_items(lives, 100.0)
     assert item.passed == passed
     assert "in 2 lives" in item.found
+
+
+NODE = """
+import signal, subprocess, sys, time
+signal.signal(signal.SIGTERM, lambda *_: sys.exit(CODE))
+MORE
+print("publishes something", flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.mark.parametrize(
+    ("code", "more", "found"),
+    [
+        ("0", "", {}),
+        ("1", "", {"nodes end when told to, and only then": "node: code 1"}),
+        (
+            "0",
+            "print('Traceback'); sys.exit(0)",
+            {
+                "nodes end when told to, and only then": "node ended by itself",
+                "tracebacks in logs": "node",
+            },
+        ),
+        (
+            "0",
+            "subprocess.Popen(['sleep', '60'], start_new_session=True)",
+            {"processes left behind": "1"},
+        ),
+    ],
+)
+def test_nodes_that_end_badly_or_leave_something_are_misses(
+    code: str, more: str, found: dict[str, str], tmp_path: Path, wait_until: Callable[..., Any]
+) -> None:
+    text = NODE.replace("CODE", code).replace("MORE", more)
+    crew = Crew(lambda name: [sys.executable, "-c", text], tmp_path)
+    crew.start("node")
+    wait_until(lambda: crew.is_up("node") or crew.ended(), "the node")
+    assert {item.what: item.found for item in crew.end() if not item.passed} == found

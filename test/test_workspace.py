@@ -305,3 +305,11 @@ def test_shipped_robots_and_missions_are_read_alike_from_source_and_share() -> N
         for file in package.glob(f"{package.name}/[rm]*/*.yaml"):
             share = ROOT / "install" / package.name / "share" / package.name
             assert (share / file.parent.name / file.name).read_bytes() == file.read_bytes()
+
+
+def test_results_are_written_whole_or_not_at_all() -> None:
+    """By `files.write`, which leaves no half of a file, whatever ends the process."""
+    straight = re.compile(r"\.write_(text|bytes)\(|savefig\((?!buffer|drawn)")
+    sources = [path for path in ROOT.glob("src/*/tomr_*/**/*.py") if path.is_file()]
+    assert len(sources) > 100
+    assert [path.name for path in sources if straight.search(path.read_text("utf-8"))] == []

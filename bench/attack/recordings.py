@@ -12,11 +12,12 @@ import numpy as np
 from attrs import evolve
 
 from attack.case import POWER, Attack, Base, Raw, attack, reading
+from tomr_fault_diag.classifier.states import DISOBEYS
 from tomr_power_model.messages.bag import jazzy_typestore
 from tomr_power_model.recordings import RecordingWriter
 
 Raws = Iterable[Raw]
-_STAMP = struct.Struct("<4xiI")  # after what tells the encoding
+_STAMP, _HEAD = struct.Struct("<iI"), 4  # the stamp comes after what tells the encoding
 SECOND = 1_000_000_000
 EXTREMES = (math.nan, math.inf, -math.inf, 1e308, -1e308, 1e30, -1e30, 1e6, 0.0, 5e-324)
 _SENSORS = ("/joint_states", "/wheel_1/power", "/wheel_2/power", "/wheel_3/power")
@@ -45,7 +46,7 @@ def restamped(raw: Raw, stamp_ns: int) -> Raw:
     """A message with another stamp in its header, with which each of the base begins."""
     seconds, rest = divmod(max(-(2**31) * SECOND, stamp_ns), SECOND)
     data = bytearray(raw.data)
-    _STAMP.pack_into(data, 0, min(seconds, 2**31 - 1), rest)
+    _STAMP.pack_into(data, _HEAD, min(seconds, 2**31 - 1), rest)
     return evolve(raw, data=bytes(data))
 
 
@@ -146,7 +147,7 @@ def odd_messages(dice: random.Random, folder: Path, base: Base) -> Attack:
 
 @attack("encoded messages")
 def odd_encodings(dice: random.Random, folder: Path, base: Base) -> Attack:
-    raws, _ = base.some(dice)
+    raws, names = base.some(dice)
     topic, kind = dice.choice(_SENSORS), dice.choice(("flip", "cut", "claim", "type", "append"))
     share = dice.choice((0.01, 0.3))
 
@@ -172,7 +173,13 @@ def odd_encodings(dice: random.Random, folder: Path, base: Base) -> Attack:
 
     bag = write(folder / "bag", [made(raw) for raw in raws], dice.choice(("mcap", "sqlite3")))
     tool, arguments = reading(dice, bag)
-    return Attack(tool, arguments, f"{kind} on {topic} in {share:.0%}")
+    # A flipped bit and what is claimed may stand where a plausible value does.
+    known = None if kind in ("flip", "claim") else names
+    return Attack(tool, arguments, f"{kind} on {topic} in {share:.0%}", known)
+
+
+_CLOCKS = ("stamped", "received", "both")  # times of a message that are not true
+_MOTION = {"/joint_states", "/cmd_vel"}
 
 
 @attack("stamps")
@@ -182,44 +189,53 @@ def odd_stamps(dice: random.Random, folder: Path, base: Base) -> Attack:
     chosen = topics if dice.random() < 0.5 else {dice.choice(sorted(topics))}
     middle = raws[dice.randrange(len(raws))].stamp_ns
     kind = dice.choice(("jump", "stray", "reverse", "zero", "epoch", "repeat", "shuffle", "far"))
-    by = dice.choice((-1, 1)) * dice.choice((0.3, 1.5, 20.0, 3600.0, 3.2e7)) * SECOND
-    also_received = dice.random() < 0.5
+    by = round(dice.choice((-1, 1)) * dice.choice((0.3, 1.5, 20.0, 3600.0, 3.2e7)) * SECOND)
+    clock = dice.choice(_CLOCKS)
 
     def made(raw: Raw) -> Raw:
         if raw.topic not in chosen:
             return raw
-        stamp = raw.stamp_ns
-        if (kind == "jump" and stamp > middle) or (kind == "stray" and dice.random() < 0.01):
-            stamp += round(by)
-        elif kind == "reverse":
-            stamp = 2 * middle - stamp
-        elif kind == "zero" and dice.random() < 0.5:
-            return restamped(raw, 0)
-        elif kind == "epoch":
-            stamp -= raws[0].stamp_ns
-        elif kind == "repeat" and dice.random() < 0.5:
-            stamp = middle
-        elif kind == "shuffle":
-            stamp += round(dice.gauss(0.0, 0.2) * SECOND)
-        elif kind == "far" and dice.random() < 0.02:
-            stamp = dice.choice((2**31 * SECOND - 1, 1, -5 * SECOND))
-        received = evolve(raw, stamp_ns=stamp) if also_received else raw
-        return restamped(received, stamp)
+        stamp = _moved(kind, raw.stamp_ns, (raws[0].stamp_ns, middle, by), dice)
+        if clock == "received":  # which is never before it was sent
+            return evolve(raw, stamp_ns=max(raw.stamp_ns, stamp))
+        return restamped(raw if clock == "stamped" else evolve(raw, stamp_ns=stamp), stamp)
 
     bag = write(folder / "bag", [made(raw) for raw in raws])
     tool, arguments = reading(dice, bag)
     where = next(iter(chosen)) if len(chosen) == 1 else "all topics"
-    what = f"{kind} by {by / SECOND:g} s on {where}{', received so' * also_received}"
-    known = _known_of_stamps(kind, chosen, names) if also_received else names
-    return Attack(tool, arguments, what, known)
+    what = f"{kind} by {by / SECOND:g} s on {where}, {clock}"
+    return Attack(tool, arguments, what, _known_of_stamps(kind, clock, chosen, names))
 
 
-def _known_of_stamps(kind: str, chosen: set[str], names: frozenset[str]) -> frozenset[str] | None:
-    """Faults that may be named where messages are received as they are stamped."""
-    if kind in ("reverse", "shuffle"):
-        return None  # a well-formed recording of another motion
-    if kind == "jump" and len(chosen) == 1:  # nothing comes of that topic while the others go on
-        return names | {POWER[topic] for topic in chosen if topic in POWER}
+def _moved(kind: str, stamp: int, told: tuple[int, int, int], dice: random.Random) -> int:
+    """A stamp that is not true [ns]; `told`: the first, one in the middle, by how much."""
+    first, middle, by = told
+    if (kind == "jump" and stamp > middle) or (kind == "stray" and dice.random() < 0.01):
+        return stamp + by
+    if kind == "far" and dice.random() < 0.02:
+        return dice.choice((2**31 * SECOND - 1, 1, -5 * SECOND))
+    moved = {
+        "reverse": 2 * middle - stamp,
+        "epoch": stamp - first,
+        "shuffle": stamp + round(dice.gauss(0.0, 0.2) * SECOND),
+        "zero": dice.choice((0, stamp)),
+        "repeat": dice.choice((middle, stamp)),
+    }
+    return moved.get(kind, stamp)
+
+
+def _known_of_stamps(
+    kind: str, clock: str, chosen: set[str], names: frozenset[str]
+) -> frozenset[str] | None:
+    """Faults that may be named where a part of a recording comes at another time than it was."""
+    alone = len(chosen) == 1
+    if clock == "both" and kind == "reverse" and "/joint_states" in chosen:
+        return None  # a well-formed recording of a motion that no robot makes
+    if clock != "stamped" and alone and kind in ("jump", "reverse", "shuffle"):
+        names |= {POWER[topic] for topic in chosen if topic in POWER}  # no power of this motion
+    # It moves before or long after it is told to.
+    if clock == "both" and alone and kind in ("jump", "reverse") and chosen & _MOTION:
+        names |= {DISOBEYS.name}
     return names
 
 
@@ -254,7 +270,7 @@ def missing(dice: random.Random, folder: Path, base: Base) -> Attack:
 
 @attack("several recordings")
 def folders(dice: random.Random, folder: Path, base: Base) -> Attack:
-    raws, _ = base.some(dice)
+    raws, names = base.some(dice)
     kind = dice.choice(("name", "link loop", "device", "empty", "mixed", "twice", "nested"))
     bag = write(folder / "bag", raws)
     if kind == "name":
@@ -279,7 +295,7 @@ def folders(dice: random.Random, folder: Path, base: Base) -> Attack:
     else:
         shutil.copytree(bag, bag / "bag.db3")
     tool, arguments = reading(dice, bag)
-    return Attack(tool, arguments, kind)
+    return Attack(tool, arguments, kind, names)
 
 
 @attack("a recorder that is killed")

@@ -1,15 +1,18 @@
 """Between the simulator and the diagnosis: what passes, when, with which stamps, what is said."""
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
+import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import BatteryState, JointState
 
 from soak.acts import BATTERY, COMMANDS, ENCODERS, POWER, SIMULATOR, SUITES
@@ -29,6 +32,16 @@ _TYPES = {COMMANDS: TwistStamped, ENCODERS: JointState, BATTERY: BatteryState} |
 _STAMP = struct.Struct("<iI")
 _HEAD = 4  # of CDR, before the first field
 _HELD = "no data at present"
+
+
+@contextmanager
+def connected() -> Iterator[None]:
+    """ROS for this process, which handles its signals itself."""
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        yield
+    finally:
+        rclpy.try_shutdown()
 
 
 def _stamp_of(data: bytes) -> int:

@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 import rclpy
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
@@ -24,13 +27,16 @@ KINDS = {
     "residuals": PowerResidualsNode,
     "classifier": FaultClassifierNode,
     "diagnosis": DiagnosisNode,
+    "managed": DiagnosisNode,
 }
+DONE = TransitionCallbackReturn.SUCCESS
 
 
 @pytest.fixture
 def node(request: pytest.FixtureRequest) -> Iterator[StageNode]:
     robot = str(files("tomr_power_model").joinpath("robots").joinpath("reference.yaml"))
-    rclpy.init(args=["--ros-args", "--params-file", robot])
+    managed = "true" if request.param == "managed" else "false"
+    rclpy.init(args=["--ros-args", "--params-file", robot, "-p", f"managed:={managed}"])
     made = KINDS[request.param]()
     yield made
     made.destroy_node()
@@ -76,6 +82,57 @@ def test_what_was_heard_before_a_pause_counts_for_nothing(node: DiagnosisNode) -
     assert not list(node.subscriptions)
     node.on_activate()
     assert "/joint_states" in {subscription.topic_name for subscription in node.subscriptions}
+
+
+@pytest.mark.parametrize("node", ["diagnosis"], indirect=True)
+def test_after_a_pause_what_is_retuned_and_cleared_is_the_new(
+    node: DiagnosisNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node.on_deactivate()
+    node.on_activate()
+    new = node.pipeline._classifier
+    monkeypatch.setattr(FaultClassifier, "release", lambda self: "slip" if self is new else "")
+    (result,) = node.set_parameters([Parameter("recovery_time", value=2.5)])
+    assert result.successful
+    assert new.settings.recovery_time == to_ns(2.5)
+    answer = node._clearing.callback(Trigger.Request(), Trigger.Response())
+    assert answer.message == "slip is cleared"
+
+
+def held(node: DiagnosisNode) -> list[int]:
+    """How much a node has, and how much it says that it has."""
+    entities = (node.services, node.publishers, node.subscriptions, node.timers)
+    return [len(list(items)) for items in (*entities, *node._topics.values())]
+
+
+@pytest.mark.parametrize("node", ["managed"], indirect=True)
+def test_a_managed_node_takes_back_all_that_it_had(
+    node: DiagnosisNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    introduced: list[list[int]] = []
+    monkeypatch.setattr(node, "introduce", lambda: introduced.append(held(node)))
+    unconfigured = held(node)
+    for _ in range(2):
+        assert node.trigger_configure() == node.trigger_activate() == DONE
+        active = held(node)
+        assert node.trigger_deactivate() == DONE
+        inactive = held(node)
+        assert node.trigger_cleanup() == DONE
+        assert held(node) == unconfigured
+    assert introduced == [active, active]
+    assert active > inactive > unconfigured
+    assert node.trigger_configure() == node.trigger_activate() == node.trigger_shutdown() == DONE
+    assert held(node)[:4] == unconfigured[:4]
+
+
+@pytest.mark.parametrize("node", ["managed"], indirect=True)
+def test_a_managed_node_that_never_began_is_not_activated_but_shut_down(
+    node: DiagnosisNode,
+) -> None:
+    request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_ACTIVATE))
+    answer = node._service_change_state.callback(request, ChangeState.Response(success=True))
+    assert not answer.success
+    assert node.trigger_shutdown() == DONE
 
 
 @pytest.fixture

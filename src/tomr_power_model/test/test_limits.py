@@ -16,6 +16,8 @@ from tomr_power_model.files import load_yaml, read_arrays, read_text
 from tomr_power_model.limits import Limits, limits
 from tomr_power_model.messages.bag import jazzy_typestore
 from tomr_power_model.recordings import open_recording
+from tomr_power_model.topics.flow import Flow
+from tomr_power_model.topics.inputs import Thinning
 
 JOINTS = "sensor_msgs/msg/JointState"
 HEAD = header() + channel("/joint_states", JOINTS)
@@ -280,3 +282,14 @@ def test_limits_are_set_by_the_environment() -> None:
 def test_an_error_is_one_line_that_can_be_printed() -> None:
     assert one_line("a\nb\x1b[31m\ud800") == "a b\\x1b[31m\\ud800"
     assert len(one_line("x" * 100_000)) < 2_000
+
+
+def test_the_rate_of_a_topic_limits_what_nodes_take_and_what_encoders_are_thinned_to(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("TOMR_LIMIT_TOPIC_RATE", "100")
+    flow, thinning = Flow(has_header=False), Thinning()
+    stamps = range(10**9, 3 * 10**9, 10**6)  # 1 kHz for 2 s
+    taken = [stamp for stamp in stamps if flow.refuses(b"", stamp) is None]
+    assert len(taken) == pytest.approx(300, abs=2)  # with one burst
+    assert sum(not thinning.is_too_close(stamp) for stamp in stamps) == 200

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from tomr_power_model.messages import motion
 from tomr_power_model.messages.bag import jazzy_typestore, to_bag
 from tomr_power_model.messages.motion import transform_of
 from tomr_power_model.messages.types import TF
@@ -15,6 +16,8 @@ def test_odometry_and_its_transform_say_the_same() -> None:
     message = odometry(
         1_500_000_000, "odom", (1.0, -2.0, 0.5 * math.pi), [0.1, 0.0, 0.2], variances
     )
+    moving = to_bag(message).twist
+    assert (moving.twist.linear.x, moving.twist.linear.y, moving.twist.angular.z) == (0.1, 0.0, 0.2)
     covariance = to_bag(message).pose.covariance.reshape(6, 6)
     assert covariance.diagonal() == pytest.approx(variances)
     assert covariance.sum() == pytest.approx(sum(variances))
@@ -26,3 +29,10 @@ def test_odometry_and_its_transform_say_the_same() -> None:
     place = transform.transform
     assert (place.translation.x, place.translation.y, place.translation.z) == (1.0, -2.0, 0.0)
     assert 2.0 * math.atan2(place.rotation.z, place.rotation.w) == pytest.approx(0.5 * math.pi)
+
+
+def test_pose_and_twist_have_a_doubt_each() -> None:
+    doubts = ([1.0] * 36, [2.0] * 36)
+    still = (0.0, 0.0, 0.0)
+    message = to_bag(motion.odometry(1, ("odom", "base_link"), still, still, doubts))
+    assert (message.pose.covariance[0], message.twist.covariance[0]) == (1.0, 2.0)

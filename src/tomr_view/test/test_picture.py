@@ -85,6 +85,26 @@ def test_the_words_of_the_diagnosis(gatherer: Gatherer) -> None:
     assert [item["topic"] for item in picture["inputs"]] == ["joint_states"]
 
 
+def test_what_anybody_may_publish_on_diagnostics_leaves_the_page_whole(gatherer: Gatherer) -> None:
+    gatherer.residuals(frame(1.0, (0.0, 0.0, 0.0)))
+    values = {"topic": "x", "level": "9", "message": "x"}
+    inputs = [Status(f"inputs: {number:03}", 0, "fine", values) for number in range(1000)]
+    gatherer.diagnosis([*inputs, Status("inputs: 000", 2, "late")])
+    name = "fault_classifier: drive"
+    gatherer.diagnosis([Status(name, 1, "slip", {"state": "slip", "p slip": "nan"})])
+    with pytest.raises(ValueError, match="high"):
+        gatherer.diagnosis([Status(name, 2, "bad", {"p slip": "high"})])
+    picture = gatherer.picture()
+    assert picture is not None
+    assert len(picture["inputs"]) == 64
+    assert picture["inputs"][:2] == [
+        {"topic": "000", "level": 2, "message": "late"},
+        {"topic": "001", "level": 0, "message": "fine"},
+    ]
+    assert (picture["message"], picture["shares"]) == ("slip", {"slip": None})
+    assert "NaN" not in json.dumps(picture, allow_nan=False)
+
+
 def test_faults_of_a_simulator_are_forgotten_when_it_is_silent(gatherer: Gatherer) -> None:
     gatherer.residuals(frame(1.0, (0.0, 0.0, 0.0)))
     assert gatherer.picture()["faults"] is None

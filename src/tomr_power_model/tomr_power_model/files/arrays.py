@@ -12,15 +12,14 @@ from tomr_power_model.errors import InputError
 from tomr_power_model.files.text import require_regular
 from tomr_power_model.limits import limits, too_large
 
-# What zip, zlib and numpy raise for a damaged file. Where a flipped bit asks for a compression that
-# zipfile does not have, that is NotImplementedError; for a password, RuntimeError.
+# What zip, zlib and numpy raise for a damaged file. Where a flipped bit asks for a password or a
+# compression that zipfile does not have, that is a RuntimeError.
 _DAMAGED = (
     OSError,
     ValueError,
     KeyError,
     EOFError,
     MemoryError,
-    NotImplementedError,
     RuntimeError,
     SyntaxError,
     TypeError,

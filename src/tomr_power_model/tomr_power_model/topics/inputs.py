@@ -15,6 +15,7 @@ from tomr_power_model.drive.sources import (
     total_topics,
 )
 from tomr_power_model.errors import one_line
+from tomr_power_model.limits import limits
 from tomr_power_model.messages.intake import (
     MALFORMED,
     Triple,
@@ -31,8 +32,6 @@ from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.robot import Robot
 
-# Samples closer than this to the one before tell nothing more: a flood costs little so.
-CLOSEST = NANOSECONDS // 1200  # the nodes take so many of a topic
 _MOST_KINDS = 200  # of complaints that are told apart: their words may be a message's
 Take = Callable[[Any, int], Arrival | str | None]
 
@@ -51,14 +50,16 @@ class Input:
 
 
 class Thinning:
-    """Leaves out samples that follow one another too closely."""
+    """Leaves out samples that come more closely than nodes take those of a topic: they tell nothing
+    more. What `Flow` lets through of a flood is uneven, and recordings know nothing of it."""
 
     def __init__(self) -> None:
+        self._closest = NANOSECONDS // limits().topic_rate
         self._last = 0
 
     def is_too_close(self, stamp_ns: int) -> bool:
         """Whether to leave out a sample; what goes back or repeats is for others to judge."""
-        if 0 < stamp_ns - self._last < CLOSEST:
+        if 0 < stamp_ns - self._last < self._closest:
             return True
         self._last = stamp_ns
         return False
