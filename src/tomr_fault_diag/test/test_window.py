@@ -248,7 +248,8 @@ def test_a_slippery_place_is_left_sooner_than_a_fault_ends() -> None:
     for state in (SLIP, ENCODERS.start):
         belief = Belief(0.5, 9.0)
         belief.shares = np.eye(len(STATE_OF))[state]
-        ends.append(belief.update(np.zeros(len(STATE_OF)))[NORMAL])
+        shares = belief.update(np.zeros(len(STATE_OF)))
+        ends.append(named_of(shares)[NORMAL])
     assert ends == pytest.approx([5e-3, 1e-4], rel=0.01)
 
 

@@ -123,7 +123,7 @@ def test_a_recording_as_pictures() -> None:
     faulty = [p["t"] for p in pictures if p["state"] == "motor system fault 3"]
     true = [p["t"] for p in pictures if p["faults"]]
     assert (true[0], true[-1]) == pytest.approx((8.0, 14.0), abs=0.3)
-    assert (faulty[0], faulty[-1]) == pytest.approx((8.3, 15.9), abs=0.3)
+    assert (faulty[0], faulty[-1]) == pytest.approx((8.3, 15.5), abs=0.3)
     states = [state for _, _, state, _ in spells(pictures)]
     assert "motor system fault 3" in states
     assert spells(pictures)[-1][1] == len(pictures) - 1

@@ -11,7 +11,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from tomr_fault_diag.classifier.belief import EXTERNAL, OTHER, STATE_OF
+from tomr_fault_diag.classifier.belief import ENDED, EXTERNAL, OTHER, STATE_OF
 from tomr_fault_diag.classifier.states import STATES
 from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.robot import Robot, shipped_robot
@@ -27,7 +27,8 @@ from tomr_training.planar.sensors import Signals
 # Which of the paper's six each hypothesis belongs to, BEYOND them if to none.
 BEYOND = len(STATES)
 PAPER_OF = np.array(
-    [BEYOND if state.paper is None else state.paper for state in STATE_OF], dtype=np.int8
+    [BEYOND if state.paper is None else state.paper for state in STATE_OF[: ENDED.start]],
+    dtype=np.int8,
 )
 IGNORED = -1  # aftermath of a fault, a healthy robot that slips
 
