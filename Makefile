@@ -28,6 +28,10 @@ PROGRESS := while read -r first name _; do case $$first in \
     Collecting) printf '\r\033[K  %s' "$${name%%[=<>~!]*}";; \
     Installing) printf '\r\033[K  unpacking';; esac; done && printf '\r\033[K'
 
+# Versions stay as they are where they may; `make lock ARGS=--upgrade` takes the newest.
+LOCK := .venv/lock/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+    --no-annotate --no-emit-index-url --custom-compile-command 'make lock'
+
 # Small recordings that come with the repository, by the mission that they record.
 BAGS := square circle_encoder_lost
 PACKAGES := $(patsubst %/package.xml,%,$(wildcard src/*/package.xml))
@@ -37,7 +41,7 @@ MANIFESTS := $(wildcard $(addprefix src/*/,package.xml setup.py setup.cfg resour
 LINKED := $(sort $(MANIFESTS) $(wildcard src/*/launch/*.launch.py \
     $(addprefix src/*/tomr_*/,robots/*.yaml missions/*.yaml weights/*)))
 
-.PHONY: help setup demo test attack soak audit lint format bench docs figures train bags clean FORCE
+.PHONY: help setup demo test attack soak audit lock lint format bench docs figures train bags clean FORCE
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -68,6 +72,12 @@ audit: setup ## look for known vulnerabilities in the installed packages (needs 
 	@[ -x .venv/audit/bin/pip-audit ] || { $(BIN)/python -m venv .venv/audit && \
 	    .venv/audit/bin/pip install --disable-pip-version-check --quiet pip-audit==2.10.1; }
 	.venv/audit/bin/pip-audit --path "$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" $(ARGS)
+
+lock: .venv/origin ## pin what the requirements bring along anew, with the hashes of all their files
+	@[ -x .venv/lock/bin/uv ] || { $(BIN)/python -m venv .venv/lock && \
+	    .venv/lock/bin/pip install --disable-pip-version-check --quiet uv==0.13.9; }
+	$(LOCK) -o requirements-dev.lock requirements-dev.txt $(ARGS)
+	$(LOCK) -o requirements-fleet.lock -c requirements-dev.lock requirements-fleet.txt $(ARGS)
 
 lint: setup ## ruff, mypy and import-linter only
 	$(BIN)/ruff check
@@ -116,9 +126,10 @@ clean: ## remove all that was made: .venv, build, install, log, caches
 	    echo "$$origin" > $@; \
 	fi
 
-.venv/dependencies: .venv/origin requirements.txt requirements-dev.txt constraints.txt
+.venv/dependencies: .venv/origin requirements-dev.lock
 	@echo "Installing the pinned dependencies (about 250 MB to download, a minute or so)"
-	@$(BIN)/python -m pip install --disable-pip-version-check -r requirements-dev.txt | $(PROGRESS)
+	@$(BIN)/python -m pip install --disable-pip-version-check --require-hashes \
+	    -r requirements-dev.lock | $(PROGRESS)
 	@touch $@
 
 .venv/training: .venv/workspace requirements-train.txt

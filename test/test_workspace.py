@@ -178,6 +178,22 @@ def test_every_file_of_the_package_is_installed(package: Path) -> None:
     assert not forgotten, "no __init__.py beside it, or not in package_data of setup.py"
 
 
+def _pins(file: str) -> set[str]:
+    """Names and exact versions that a file of requirements asks for, as `pip` compares names."""
+    found = re.findall(r"^([\w.-]+)(?:\[\w+\])?==([\w.]+)", (ROOT / file).read_text(), re.MULTILINE)
+    return {f"{re.sub('[-_.]+', '-', name).lower()}=={version}" for name, version in found}
+
+
+@pytest.mark.parametrize("kind", ["dev", "fleet"])
+def test_what_is_installed_is_locked_with_hashes(kind: str) -> None:
+    locked = _pins(f"requirements-{kind}.lock")
+    asked = _pins("requirements.txt") | _pins(f"requirements-{kind}.txt")
+    assert asked
+    assert asked <= locked, "run `make lock`"
+    entries = re.split(r"^(?=\w)", (ROOT / f"requirements-{kind}.lock").read_text(), flags=re.M)
+    assert all("--hash=sha256:" in entry for entry in entries[1:])
+
+
 @each_package()
 def test_imports_are_declared(package: Path) -> None:
     declared = {
