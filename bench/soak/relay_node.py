@@ -1,8 +1,10 @@
 """Between the simulator and the diagnosis: what passes, when, with which stamps, what is said."""
 
 import struct
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import rclpy
@@ -20,6 +22,7 @@ from tomr_demo.acts import twist_at
 from tomr_fault_diag.classifier.messages import NAME
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.nodes.stage_node import SENSOR_QOS, STAGE_QOS, make_executor
+from tomr_power_model.recordings import RecordingWriter
 
 PLANT = "plant"  # namespace of the simulator
 COMMAND_PERIOD_NS = NANOSECONDS // 20
@@ -29,6 +32,7 @@ LEAD_NS = NANOSECONDS // 10
 _TYPES = {COMMANDS: TwistStamped, ENCODERS: JointState, BATTERY: BatteryState} | dict.fromkeys(
     POWER, BatteryState
 )
+_KEPT_NS = 30 * NANOSECONDS  # of what was passed on
 _STAMP = struct.Struct("<iI")
 _HEAD = 4  # of CDR, before the first field
 _HELD = "no data at present"
@@ -72,6 +76,7 @@ class Relay(Node):
         self._said = said
         self._commanded_ns = 0
         self._outlets: dict[tuple[str, str], Any] = {}
+        self._passed: deque[tuple[int, str, bytes]] = deque()  # at [ns], topic, message
         self._drive = self.create_publisher(TwistStamped, f"{PLANT}/{COMMANDS}", SENSOR_QOS)
         for topic, kind in _TYPES.items():
             for suite in SUITES:
@@ -105,6 +110,14 @@ class Relay(Node):
         wanted = [Parameter(name, value=value) for name, value in settings.items()]
         return self._client.set_parameters_atomically(wanted)
 
+    def write_last(self, path: Path) -> None:
+        """Record what was passed on lately, encoders of a flood excepted: to be diagnosed again."""
+        with RecordingWriter(path) as writer:
+            for now_ns, topic, data in self._passed:
+                kind = _TYPES[topic]
+                name = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
+                writer.write_raw(topic, name, data, now_ns)
+
     def _hear(self, topic: str, kind: Any) -> None:
         def take(data: bytes) -> None:
             stamp = _stamp_of(data)
@@ -135,6 +148,9 @@ class Relay(Node):
             return
         if self.shift_ns:
             data = _stamped(data, stamp + self.shift_ns)
+        self._passed.append((self.now_ns, topic, data))
+        while self.now_ns - self._passed[0][0] > _KEPT_NS:
+            self._passed.popleft()
         for suite in SUITES:
             if topic != ENCODERS or suite != self.flooded:
                 self._outlets[suite, topic].publish(data)

@@ -145,7 +145,10 @@ class Soak:
         if usable:
             self._verdicts[suite] = state, self._relay.now_ns
         if state not in FAULTLESS and state not in self._allowed:
-            self._false[f"{state!r} ({suite}, {self._condition.words}, {self._doing})"] += 1
+            words = f"{state!r} ({suite}, {self._condition.words}, {self._doing})"
+            self._false[words] += 1
+            if self._false[words] == 1:  # to be looked into
+                self._relay.write_last(self._crew.logs / f"false_word_{len(self._false)}")
 
     def _note(self, words: str) -> None:
         passed = self._relay.now_ns / NANOSECONDS - _START

@@ -85,6 +85,19 @@ def ticks(start: int, end: int, off: dict[int, float] | None = None) -> list[Res
     return [frame(t, off) for t in range(start, end, 50)]
 
 
+def at_rest(start: int, end: int) -> list[ResidualFrame]:
+    """Nothing is asked of the wheels, and they stand."""
+
+    def still(given: ResidualFrame) -> ResidualFrame:
+        stopped = [
+            evolve(item, modelled=0.0) if index in SPEEDS else item
+            for index, item in enumerate(given.residuals)
+        ]
+        return evolve(given, residuals=tuple(stopped))
+
+    return [still(item) for item in ticks(start, end)]
+
+
 def classified(frames: Sequence[ResidualFrame], **settings: Any) -> list[Diagnosis]:
     classifier = FaultClassifier(make_judge(ClassifierSettings(**settings)))
     found = [classifier.classify(item) for item in frames]
@@ -346,6 +359,19 @@ def test_every_state_is_held_raised_and_cleared_alike(state: State) -> None:
     # The states of a sensor are left at once: they accuse nobody who would have to recover.
     cleared = 2000 if state in POWER_SENSOR else 2600
     assert found == [(50, "normal"), (1550, state.name), (cleared, "normal")]
+
+
+def test_a_robot_that_stands_shows_no_other_fault_than_it_had() -> None:
+    """A slip leaves something in the integrals of drivers whose wheels friction holds."""
+    judge = Leading(STATES[SLIP], sure=True)
+    classifier, found = FaultClassifier(judge), []
+    for item in [*ticks(50, 1000), *at_rest(1000, 3000), *ticks(3000, 4000)]:
+        at = (item.stamp_ns - BASE) // MS
+        judge.state = STATES[SLIP] if at < 1500 else STATES[CONTROL]
+        diagnosis = classifier.classify(item)
+        if diagnosis is not None and diagnosis.changed:
+            found.append((at, diagnosis.state.name))
+    assert found == [(50, "slip"), (3000, "control system fault")]
 
 
 def test_slip_shows_now_and_then_and_is_let_go_later_than_a_fault() -> None:

@@ -203,6 +203,18 @@ class TestEncoderWindow:
         samples = [EncoderSample(BASE + at * MS, (1e-3 * at,) * 3, NAN3) for at in (0, 33, 66, 99)]
         np.testing.assert_allclose(self._fit(samples)[0], 1.0, atol=1e-9)
 
+    @pytest.mark.parametrize("period", [50, 100, 200])
+    def test_the_mean_speed_of_a_long_window_is_that_of_all_of_it(self, period: int) -> None:
+        """A wheel that begins to turn in the last moments has hardly moved on the whole."""
+        window = EncoderWindow(to_ns(0.07), period * MS, to_ns(0.5))
+        for at in range(0, 401, 10):
+            angle = 4.0 * max(at - 360, 0) * 1e-3
+            window.add(EncoderSample(BASE + at * MS, (angle, 0.02 * at, 0.0), NAN3))
+        speed, angle = 4.0 * 40 / period, 0.02 * (400 - period / 2)
+        found = window.at(BASE + 400 * MS)
+        np.testing.assert_allclose(found.speed, [speed, 20.0, 0.0], atol=0.2 * speed)
+        assert found.angle[1] == pytest.approx(angle)
+
     def test_stale_samples_say_nothing(self) -> None:
         samples = [EncoderSample(BASE - at * MS, (1.0,) * 3, NAN3) for at in (450, 440, 430)]
         assert np.isnan(self._fit(samples)[0]).all()

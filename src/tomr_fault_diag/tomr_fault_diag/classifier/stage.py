@@ -48,9 +48,10 @@ class FaultClassifier:
     """Streaming core of the classifier; driven by stamps, the same online and offline.
 
     A fault is named when the judge is sure of it, normal again when it leads for `recovery_time`.
-    A named fault stays named while nothing speaks against it, as when its wheel is idle. Whatever
-    the judge says: a robot that does not follow its commands is called so, and what a healthy one
-    could not show is unknown, not normal. Where data are missing nothing is concluded.
+    A named fault stays named while nothing speaks against it, as when its wheel is idle, and while
+    the robot stands, whose windows all say the same. Whatever the judge says: a robot that does not
+    follow its commands is called so, and what a healthy one could not show is unknown, not normal.
+    Where data are missing nothing is concluded.
     """
 
     def __init__(self, judge: Judge) -> None:
@@ -171,10 +172,16 @@ class FaultClassifier:
                 self._enter(UNKNOWN, stamp, None)
         elif leading in _WELL or ((misfit.ignores_commands or is_blind) and self._state in _QUIET):
             self._settle(stamp, leading)
-        elif held and not is_blind and (leading != self._state or opinion.wheel != self._wheel):
+        elif held and not is_blind and self._may_name(leading, opinion.wheel):
             self._enter(leading, self._candidate_since, opinion.wheel)
         elif self._state is None:
             self._enter(STALE, stamp, None)
+
+    def _may_name(self, leading: State, wheel: int | None) -> bool:
+        """Whether it is something new; a robot that stands shows no other fault than it had."""
+        if self._unseen.everything and self._state not in _QUIET:
+            return False
+        return leading != self._state or wheel != self._wheel
 
     def _is_held(self, sure: bool, stamp: int) -> bool:
         """Whether the judge has been sure of what leads for `raise_time`."""

@@ -21,6 +21,7 @@ _LEAST = 50
 _EVERY = 25  # samples: how often
 LONG_S = 0.2  # of the fit beside a simulation
 _FIT = 5  # samples that it takes
+_PART = 50_000_000  # ns of a window for which a fit stands
 _FREE = 2  # more samples than unknowns, to tell how they scatter
 _MOVING = 1.0  # rad/s of the fastest wheel, likewise
 _LEEWAY = 0.05  # s that a stamp may be late: angles that no motor reaches till then are bad
@@ -168,11 +169,20 @@ class EncoderWindow:
         return _exceeds(sample.position, last.position, furthest)
 
     def at(self, tick_ns: int) -> WheelEstimate:
-        """Estimate for the window that ends at a tick; NaN if its samples are missing or stale."""
+        """Estimate for the window that ends at a tick; NaN if its samples are missing or stale.
+
+        The mean over a window that is longer than a fit spans comes of fits to its parts.
+        """
+        parts = max(round(self._period / _PART), 1)
+        length = self._period // parts
+        return _mean([self._over(tick_ns - k * length, length) for k in reversed(range(parts))])
+
+    def _over(self, tick_ns: int, length: int) -> WheelEstimate:
+        """Estimate for the last moments [ns] before a tick."""
         samples = self._until(tick_ns)
         if len(samples) < 2:
-            return WheelEstimate(np.full(3, np.nan), np.full(3, np.nan))
-        times = self._times(samples, tick_ns - self._period // 2)
+            return UNKNOWN_MOTION
+        times = self._times(samples, tick_ns - length // 2)
         positions = np.array([sample.position for sample in samples])
         if len(samples) > 2 and not np.isnan(positions).any():
             return _from_positions(times, positions)
@@ -241,6 +251,19 @@ class EncoderWindow:
                 line = _weights(_chosen(times, timed), 1) @ velocities[timed][:, [wheel]]
                 speed[wheel], acceleration[wheel] = line[0, 0], line[1, 0]
         return WheelEstimate(speed, acceleration, angle)
+
+
+def _mean(parts: Sequence[WheelEstimate]) -> WheelEstimate:
+    """Of a window, from those of its parts."""
+    if len(parts) == 1:
+        return parts[0]
+    return WheelEstimate(
+        np.mean([part.speed for part in parts], axis=0),
+        np.mean([part.acceleration for part in parts], axis=0),
+        np.mean([part.angle for part in parts], axis=0),
+        parts[-1].scatter,
+        max(part.gain for part in parts),
+    )
 
 
 def _exceeds(values: Triple, others: Triple, most: float) -> bool:
