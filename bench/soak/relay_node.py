@@ -28,7 +28,7 @@ PLANT = "plant"  # namespace of the simulator
 COMMAND_PERIOD_NS = NANOSECONDS // 20
 # Commands are given for a moment that is still to come: however long they are on their way, the
 # robot and the model let them act at the same time.
-LEAD_NS = NANOSECONDS // 10
+LEAD_NS = NANOSECONDS // 5
 _TYPES = {COMMANDS: TwistStamped, ENCODERS: JointState, BATTERY: BatteryState} | dict.fromkeys(
     POWER, BatteryState
 )
