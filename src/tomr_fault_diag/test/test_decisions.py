@@ -349,7 +349,7 @@ def test_a_robot_that_ignores_its_commands_is_not_pushed() -> None:
 def test_every_state_is_held_raised_and_cleared_alike(state: State) -> None:
     judge = Leading(state, sure=True, raise_time=to_ns(0.3), recovery_time=to_ns(0.6))
     classifier, found = FaultClassifier(judge), []
-    for item in ticks(50, 3000):
+    for item in ticks(50, 3050):
         at = (item.stamp_ns - BASE) // MS
         judge.state = state if 1000 <= at < 2000 else STATES[NORMAL]
         judge.sure = at != 1200  # a moment of doubt: the time counts anew
@@ -357,7 +357,7 @@ def test_every_state_is_held_raised_and_cleared_alike(state: State) -> None:
         if diagnosis is not None and diagnosis.changed:
             found.append((at, diagnosis.state.name))
     # The states of a sensor are left at once: they accuse nobody who would have to recover.
-    cleared = 2000 if state in POWER_SENSOR else 2600
+    cleared = 2000 if state in POWER_SENSOR else 3000 if state in (UNKNOWN, BURDENED) else 2600
     assert found == [(50, "normal"), (1550, state.name), (cleared, "normal")]
 
 
@@ -376,7 +376,7 @@ def test_a_robot_that_stands_shows_no_other_fault_than_it_had() -> None:
 
 def test_slip_shows_now_and_then_and_is_let_go_later_than_a_fault() -> None:
     gone = {}
-    for state in (STATES[SLIP], STATES[CONTROL]):
+    for state in (STATES[SLIP], BURDENED, UNKNOWN, STATES[CONTROL], DRAGGING[0]):
         judge, named = Leading(state, sure=True), ""
         classifier = FaultClassifier(judge)
         for item in ticks(50, 3000):
@@ -386,7 +386,8 @@ def test_slip_shows_now_and_then_and_is_let_go_later_than_a_fault() -> None:
             if diagnosis is not None and diagnosis.changed:
                 named, gone[state.name] = diagnosis.state.name, at
         assert named == "normal"
-    assert gone == {"slip": 2000, "control system fault": 1600}
+    late = dict.fromkeys(("slip", BURDENED.name, UNKNOWN.name), 2000)
+    assert gone == {**late, "control system fault": 1600, DRAGGING[0].name: 1600}
 
 
 def test_which_fault_of_a_motor_it_is_may_be_settled_while_its_time_passes() -> None:

@@ -109,7 +109,7 @@ def test_what_a_healthy_robot_could_not_show_is_unknown() -> None:
     far = [frame(t, TURNING, TURNING, power=-4.0) for t in range(1000, 3000, 50)]
     near = [frame(t, TURNING, TURNING, power=2.0) for t in range(3000, 5000, 50)]
     changes = named(normal + far + near)
-    assert changes == [(50, "normal"), (2000, "unknown"), (3600, "normal")]
+    assert changes == [(50, "normal"), (2000, "unknown"), (4000, "normal")]
 
 
 def test_more_that_the_computer_draws_is_not_unknown() -> None:

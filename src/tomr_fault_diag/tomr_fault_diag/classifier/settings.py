@@ -74,7 +74,7 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
     ),
     _live(
         "slip_recovery_time",
-        "the same after slip, which shows only while a wheel has to push",
+        "the same after slip, external load or unknown, which show only while wheels push",
         1.0,
         "s",
         0.0,

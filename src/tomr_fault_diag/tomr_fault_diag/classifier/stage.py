@@ -7,6 +7,7 @@ from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
 from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.states import (
+    BURDENED,
     DISOBEYS,
     NORMAL,
     NOT_ENOUGH,
@@ -41,6 +42,8 @@ class Diagnosis:
 
 # Whatever comes next may follow at once.
 _WELL = (STATES[NORMAL], PUSHED)
+# What shows only now and then, as when a wheel has to push.
+_ELUSIVE = (STATES[SLIP], BURDENED, UNKNOWN)
 _QUIET = (None, WAITING, STALE, NOT_ENOUGH, NOT_OBSERVABLE, *_WELL, *POWER_SENSOR)
 
 
@@ -222,8 +225,9 @@ class FaultClassifier:
     @property
     def _recovery(self) -> int:
         """How long normal must lead before what is named is let go [ns]."""
-        slips = self._state is STATES[SLIP]
-        return self.settings.slip_recovery_time if slips else self.settings.recovery_time
+        settings = self.settings
+        elusive = self._state in _ELUSIVE
+        return settings.slip_recovery_time if elusive else settings.recovery_time
 
     def _enter(self, state: State, since: int, wheel: int | None) -> None:
         self._wheel = wheel
