@@ -14,7 +14,7 @@ sys.path.append(str(ROOT / "bench"))
 
 from attack.case import HEALTHY, Attack, Raw
 from attack.judge import problem_of
-from attack.recordings import SECOND, restamped
+from attack.recordings import SECOND, _is_dead, restamped
 
 from tomr_power_model.messages.bag import jazzy_typestore
 from tomr_power_model.messages.intake import header_stamp_ns
@@ -60,3 +60,11 @@ def test_every_accusation_that_is_not_true_is_a_false_word(state: str) -> None:
     allowed = json.dumps({"ticks": 9, "shares": {"unknown": 0.1, "pushed": 0.1, "normal": 0.8}})
     given = Attack("tomr_diagnose", ("bag", "--json"), "", frozenset())
     assert problem_of(given, 1, "", allowed) == ""
+
+
+@pytest.mark.parametrize(("silent_s", "dead"), [(0.0, False), (2.0, False), (2.6, True)])
+def test_a_sensor_is_dead_that_is_silent_for_seconds(silent_s: float, dead: bool) -> None:
+    stamps = [0.1 * k for k in range(1, 30) if not 0.2 < 0.1 * k < 0.2 + silent_s]
+    kept = [Raw("power", "", b"", round(stamp * SECOND)) for stamp in stamps]
+    assert _is_dead("power", kept, (0, 3 * SECOND)) is dead
+    assert not _is_dead("power", [*kept, Raw("power", "", b"", SECOND)], (0, 3 * SECOND))

@@ -5,6 +5,7 @@ import random
 import shutil
 import struct
 from collections.abc import Callable, Iterable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from tomr_power_model.recordings import RecordingWriter
 Raws = Iterable[Raw]
 _STAMP, _HEAD = struct.Struct("<iI"), 4  # the stamp comes after what tells the encoding
 SECOND = 1_000_000_000
+_DEAD_S = 2.5
 EXTREMES = (math.nan, math.inf, -math.inf, 1e308, -1e308, 1e30, -1e30, 1e6, 0.0, 5e-324)
 _SENSORS = ("/joint_states", "/wheel_1/power", "/wheel_2/power", "/wheel_3/power")
 
@@ -260,12 +262,21 @@ def missing(dice: random.Random, folder: Path, base: Base) -> Attack:
             return (raw.stamp_ns // 200_000_000) % 3 == 0
         return kind == "all" or raw.stamp_ns < begin
 
-    bag = write(folder / "bag", [raw for raw in raws if not lost(raw)])
+    kept = [raw for raw in raws if not lost(raw)]
+    bag = write(folder / "bag", kept)
     tool, arguments = reading(dice, bag)
     what = f"{kind} of {length / SECOND:g} s, {share:.0%} on {len(chosen)} topics"
     if kind in ("late", "all"):
         names |= {POWER[topic] for topic in chosen if topic in POWER}
+    edges = raws[0].stamp_ns, raws[-1].stamp_ns
+    names |= {POWER[topic] for topic in chosen if topic in POWER and _is_dead(topic, kept, edges)}
     return Attack(tool, arguments, what, names)
+
+
+def _is_dead(topic: str, kept: Raws, edges: tuple[int, int]) -> bool:
+    """Whether a sensor is silent for so long that it may be called faulty."""
+    stamps = sorted((*edges, *(raw.stamp_ns for raw in kept if raw.topic == topic)))
+    return any(after - before > _DEAD_S * SECOND for before, after in pairwise(stamps))
 
 
 @attack("several recordings")
