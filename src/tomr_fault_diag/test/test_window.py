@@ -376,6 +376,20 @@ def test_a_wheel_that_stands_while_it_drags_is_stuck() -> None:
     assert opinion.leading is DRAGGING[0]
 
 
+def test_what_ails_a_motor_is_said_when_the_window_holds_nothing_older() -> None:
+    """At first a lost encoder looks like a wheel that stands."""
+    network = Saying()
+    judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]
+    first: dict[str, int] = {}
+    for tick in range(40):
+        standing = frame(tick, ALL, speed=(-3.0, 0.0, 0.0))
+        opinion = _said(network, judge, DRAGS.start, standing)
+        if opinion.sure:
+            first.setdefault(opinion.leading.name, tick)
+    assert list(first) == ["motor system fault 1", STUCK[0].name]
+    assert 0 < first[STUCK[0].name] - first["motor system fault 1"] < WINDOW
+
+
 def test_a_fault_that_is_surely_of_one_motor_is_named_though_its_cause_is_not() -> None:
     network = Saying()
     judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]
@@ -407,7 +421,13 @@ def test_evidence_says_how_much_caution_a_fault_overcomes(state: int) -> None:
         witness.judge(frame(tick), 50 * MS, Unseen())
         evidence.append(witness.evidence())
         said = [other.judge(frame(tick), 50 * MS, Unseen()) for other in others]
-        sure.append([one.sure and one.leading is STATE_OF[state] for one in said])
+        wanted = STATE_OF[state]
+        sure.append(
+            [
+                one.sure and (one.leading.paper or one.leading) == (wanted.paper or wanted)
+                for one in said
+            ]
+        )
     for k, caution in enumerate(cautions):
         named = first([row[k] for row in sure])
         assert abs(named - first([decades > caution + 2.0 for decades in evidence])) <= 1

@@ -35,6 +35,7 @@ from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.states import (
     CONTROL,
+    DEGRADED,
     DRAGGING,
     NAMED,
     NORMAL,
@@ -67,6 +68,7 @@ _GROUPS: tuple[list[int], ...] = (
     [LOADED],
     [OTHER],
 )
+_CAUSES = (*DRAGGING, *DEGRADED, *STUCK)  # of a fault of a motor system
 _SLIP_MARGIN = 4.0  # that slip need be less striking: a short one shows in few windows
 # A description that is off looks like these: what a window says only slightly is not counted, for
 # it would say it again and again.
@@ -119,7 +121,7 @@ class WindowJudge:
     A fault is named when the belief is sure of it and one window of the last half second was
     `striking` by itself: an error of the description says little, but says it for as long as the
     motion lasts. The network knows ticks of 50 ms: of faster ones it sees the last in each 50 ms,
-    slower ones it sees again.
+    slower ones it sees again. Until a motor has been accused for a window no cause is named.
     """
 
     def __init__(self, network: WindowNetwork, settings: ClassifierSettings) -> None:
@@ -136,6 +138,7 @@ class WindowJudge:
         self._opinion = Opinion(np.eye(len(NAMED))[NORMAL], sure=False)
         self._recent: deque[Array] = deque(maxlen=_STRIKING_TICKS)
         self._best = NORMAL
+        self._group, self._led = _GROUPS[0], 0  # what leads, and for how many ticks
         self._belief.clear()
 
     def interrupt(self) -> None:
@@ -182,10 +185,14 @@ class WindowJudge:
         self._recent.append(_ratios(likelihoods))
         group = max(_GROUPS, key=lambda group: float(shares[group].sum()))
         best = self._kept(shares, group)
+        self._led = self._led + 1 if group is self._group else 1
+        self._group = group
         state = STATE_OF[best]
         wheel = best - CONTROLS.start if state is STATES[CONTROL] else state.wheel
         if state in DRAGGING and _stands(self._window, best - DRAGS.start):
             state = STUCK[best - DRAGS.start]
+        if state in _CAUSES and self._led < WINDOW and state.paper is not None:
+            state = STATES[state.paper]  # its cause shows when the window holds nothing older
         sure = bool(shares[group].sum() > _SURE) and self._is_striking(best)
         return Opinion(named_of(shares), sure, wheel, state)
 
