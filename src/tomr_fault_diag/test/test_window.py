@@ -381,13 +381,21 @@ def test_what_ails_a_motor_is_said_when_the_window_holds_nothing_older() -> None
     network = Saying()
     judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]
     first: dict[str, int] = {}
+
+    def standing_at(tick: int) -> ResidualFrame:
+        return frame(tick, ALL, speed=(-3.0, 0.0, 0.0))
+
     for tick in range(40):
-        standing = frame(tick, ALL, speed=(-3.0, 0.0, 0.0))
-        opinion = _said(network, judge, DRAGS.start, standing)
+        opinion = _said(network, judge, DRAGS.start, standing_at(tick))
         if opinion.sure:
             first.setdefault(opinion.leading.name, tick)
     assert list(first) == ["motor system fault 1", STUCK[0].name]
     assert 0 < first[STUCK[0].name] - first["motor system fault 1"] < WINDOW
+    names = []
+    for tick in range(40, 60):  # a moment of normal makes no new fault of it
+        leading = NORMAL if 45 <= tick < 48 else DRAGS.start
+        names.append(_said(network, judge, leading, standing_at(tick)).leading.name)
+    assert "motor system fault 1" not in names
 
 
 def test_a_fault_that_is_surely_of_one_motor_is_named_though_its_cause_is_not() -> None:

@@ -138,7 +138,8 @@ class WindowJudge:
         self._opinion = Opinion(np.eye(len(NAMED))[NORMAL], sure=False)
         self._recent: deque[Array] = deque(maxlen=_STRIKING_TICKS)
         self._best = NORMAL
-        self._group, self._led = _GROUPS[0], 0  # what leads, and for how many ticks
+        self._accused, self._led = _GROUPS[0], 0  # what was last, and for how many ticks
+        self._calm = 0  # ticks since
         self._belief.clear()
 
     def interrupt(self) -> None:
@@ -185,8 +186,7 @@ class WindowJudge:
         self._recent.append(_ratios(likelihoods))
         group = max(_GROUPS, key=lambda group: float(shares[group].sum()))
         best = self._kept(shares, group)
-        self._led = self._led + 1 if group is self._group else 1
-        self._group = group
+        self._accuse(group)
         state = STATE_OF[best]
         wheel = best - CONTROLS.start if state is STATES[CONTROL] else state.wheel
         if state in DRAGGING and _stands(self._window, best - DRAGS.start):
@@ -195,6 +195,15 @@ class WindowJudge:
             state = STATES[state.paper]  # its cause shows when the window holds nothing older
         sure = bool(shares[group].sum() > _SURE) and self._is_striking(best)
         return Opinion(named_of(shares), sure, wheel, state)
+
+    def _accuse(self, group: list[int]) -> None:
+        """Note what leads; a moment of normal in between does not make a fault a new one."""
+        if group is _GROUPS[0]:
+            self._calm += 1
+            return
+        goes_on = group is self._accused and self._calm < WINDOW
+        self._led = self._led + 1 if goes_on else 1
+        self._accused, self._calm = group, 0
 
     def evidence(self) -> float:
         """Log odds of the likeliest fault against none, without the prior [decades].
