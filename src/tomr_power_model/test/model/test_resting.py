@@ -54,6 +54,20 @@ def test_what_a_start_left_different_fades_in_motion(path: CommandPath) -> None:
     assert found == pytest.approx(1.2 * (asked - 2.0), abs=0.02)
 
 
+@pytest.mark.parametrize(("simulated", "left"), [(2.0, 0.9**40), (1.4, 0.99**40)])
+def test_what_a_fault_left_different_fades_soon_where_a_wheel_turns_as_simulated(
+    path: CommandPath, simulated: float, left: float
+) -> None:
+    drivers = RestingDrivers(ROBOT)
+    assert path.state is not None
+    path.state[at.STATE_HEADER + at.SPEED] = simulated
+    drivers.voltages(path, REST, (2.0, 0.0, 0.0), 1.0)
+    for _ in range(40):
+        found = drivers.voltages(path, (0.1, 0.0, 0.0), (2.0, 0.0, 0.0), 1.0)[0]
+    error = 12.0 * 0.1 * left
+    assert found == pytest.approx(1.2 * (path.wheel(at.ASKED)[0] - 2.0) - error, abs=1e-6)
+
+
 def _sum_after(path: CommandPath, angle: float, speed: float) -> float:
     """Of the first wheel's simulated errors, 40 ticks after it was moved [rad]."""
     drivers = RestingDrivers(ROBOT)

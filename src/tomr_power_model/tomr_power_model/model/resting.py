@@ -5,8 +5,9 @@ law does, on the measured speeds:
 
     v = k_p (asked - omega) + k_i I,   I = integral of (asked - omega) = I_sim + theta_sim - theta
 
-for simulation and driver are asked for the same, and both sum up. What a start in motion or
-saturation left different fades while the wheel turns: there motion and simulation tell the sum.
+for simulation and driver are asked for the same, and both sum up. What a start in motion,
+saturation or a fault left different fades while the wheel turns, soon where it turns as simulated:
+what moves alike is driven alike.
 
 What a push leaves in a driver's sum stays while friction holds the wheel, seconds long, and what
 is expected of the wheel then would be wrong. So while a wheel stands that in the simulation stands
@@ -26,7 +27,8 @@ from tomr_power_model.robot import WHEELS, Robot
 
 _UNKNOWN = float("nan")
 _MOVING = 1.0  # rad/s
-_FADES = 0.01  # share of the difference in a tick in motion
+_FADES = 0.01  # share of the difference in a tick in motion, ...
+_AGREES, _FADES_SOON = 0.5, 0.1  # ... and where it differs by less [rad/s]
 _STANDS = 0.05  # rad/s
 _CREEPS = 0.01  # rad/s: faster than it is asked to
 _SLOW = 0.5  # rad/s
@@ -89,9 +91,12 @@ class RestingDrivers:
             return [_UNKNOWN] * WHEELS
         turned, sums, asked = (path.wheel(part) for part in (at.TURNED, at.INTEGRAL, at.ASKED))
         ahead = [turned[wheel] - angle[wheel] for wheel in range(WHEELS)]
+        simulated = path.wheel(at.SPEED)
         found, apart = [], []
         for wheel in range(WHEELS):
-            apart.append(self._difference(wheel, ahead[wheel], abs(speed[wheel]) > _MOVING))
+            fades = _FADES_SOON if abs(speed[wheel] - simulated[wheel]) < _AGREES else _FADES
+            share_lost = fades if abs(speed[wheel]) > _MOVING else 0.0
+            apart.append(self._difference(wheel, ahead[wheel], share_lost))
             known = apart[wheel] if apart[wheel] == apart[wheel] else 0.0
             error = asked[wheel] - speed[wheel]
             found.append(self._proportional * error + self._integral * (sums[wheel] + known))
@@ -102,19 +107,19 @@ class RestingDrivers:
             for first, last in zip(before, found, strict=True)
         ]
 
-    def _difference(self, wheel: int, ahead: float, is_moving: bool) -> float:
+    def _difference(self, wheel: int, ahead: float, fades: float) -> float:
         """What a driver's sum is over the simulation's [rad], NaN where not known.
 
-        `ahead`: by how much the simulated wheel has turned further [rad].
+        `ahead`: by how much the simulated wheel has turned further [rad]; `fades`: share of the
+        difference that motion takes off, 0 at rest.
         """
         if self._offset[wheel] != self._offset[wheel]:
             self._offset[wheel] = -ahead
-        if is_moving:
-            self._offset[wheel] -= _FADES * (ahead + self._offset[wheel])
+        self._offset[wheel] -= fades * (ahead + self._offset[wheel])
         apart = ahead + self._offset[wheel]
         if abs(apart) > self._most:
             self._strange[wheel] = True
-        elif is_moving:
+        elif fades:
             self._strange[wheel] = False
         return apart
 
