@@ -69,11 +69,11 @@ def test_memory_that_changes_after_warm_up_is_a_miss(growth: float, passed: bool
 
 
 NODE = """
-import signal, subprocess, sys, time
+import signal, subprocess, sys
 signal.signal(signal.SIGTERM, lambda *_: sys.exit(CODE))
 MORE
 print("publishes something", flush=True)
-time.sleep(60)
+signal.pause()
 """
 
 
@@ -92,7 +92,7 @@ time.sleep(60)
         ),
         (
             "0",
-            "subprocess.Popen(['sleep', '60'], start_new_session=True)",
+            "subprocess.Popen(['tail', '-f', '/dev/null'], start_new_session=True)",
             {"processes left behind": "1"},
         ),
     ],
