@@ -19,7 +19,7 @@ unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE RMW_IMPLEMENTATION ROS_DISCOVERY_SERVER
 # Nothing leaves this machine; ROS_DOMAIN_ID may be chosen, so that other tools can join in.
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export ROS_DOMAIN_ID ?= 30
-export FASTRTPS_DEFAULT_PROFILES_FILE := $(CURDIR)/config/fastdds_discovery.xml
+export FASTRTPS_DEFAULT_PROFILES_FILE := $(CURDIR)/config/fastdds.xml
 
 SHELL := /bin/bash
 .SHELLFLAGS := -o pipefail -c

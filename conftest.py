@@ -34,7 +34,7 @@ def pytest_configure(config: pytest.Config) -> None:
         ROS_DOMAIN_ID=str(domain),
         ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",
         ROS_PYTHON_CHECK_FIELDS="1",
-        FASTRTPS_DEFAULT_PROFILES_FILE=str(ROOT / "config" / "fastdds_discovery.xml"),
+        FASTRTPS_DEFAULT_PROFILES_FILE=str(ROOT / "config" / "fastdds.xml"),
     )
 
 

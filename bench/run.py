@@ -242,7 +242,7 @@ def _bench(arguments: Sequence[str] | None) -> int:
     if options.json and not options.json.parent.is_dir():
         raise InputError(f"--json {options.json}: no folder {options.json.parent}: make it first")
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    profile = ROOT / "config" / "fastdds_discovery.xml"
+    profile = ROOT / "config" / "fastdds.xml"
     os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(profile))
     console = Console(width=120)
     found: dict[str, Any] = {"source": SOURCE.name, "quick": options.quick, "machine": _machine()}
