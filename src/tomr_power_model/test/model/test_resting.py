@@ -8,18 +8,23 @@ from attrs import evolve
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.model.commanded import CommandPath, CommandTiming, Seen
 from tomr_power_model.model.resting import RestingDrivers
-from tomr_power_model.robot import shipped_robot
+from tomr_power_model.robot import Robot, shipped_robot
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
 ROBOT = shipped_robot("reference")
 REST = (0.0, 0.0, 0.0)
+PUSHED = 0.004  # rad; friction holds 5.7 mrad
 
 
 @pytest.fixture(name="path")
 def _path() -> CommandPath:
+    return _standing(ROBOT)
+
+
+def _standing(robot: Robot) -> CommandPath:
     """Of a robot that is told to stand and stands."""
-    path = CommandPath(ROBOT, CommandTiming(50 * MS))
+    path = CommandPath(robot, CommandTiming(50 * MS))
     path.command(BASE, REST)
     path.over(BASE + 50 * MS, Seen(REST, REST, 0.0))
     return path
@@ -81,53 +86,45 @@ def test_what_a_push_leaves_in_a_driver_is_expected_of_its_wheel(path: CommandPa
     drivers = RestingDrivers(ROBOT)
     drivers.voltages(path, REST, REST, 1.0)
     for _ in range(40):
-        volts = drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0)
-    assert path.wheel(at.INTEGRAL)[0] == pytest.approx(-0.1, abs=1e-3)
-    assert volts[0] == pytest.approx(-1.2)  # and none of it counts twice
+        volts = drivers.voltages(path, (PUSHED, 0.0, 0.0), REST, 1.0)
+    assert path.wheel(at.INTEGRAL)[0] == pytest.approx(-PUSHED, abs=1e-5)
+    assert volts[0] == pytest.approx(-12.0 * PUSHED)  # and none of it counts twice
     assert path.wheel(at.INTEGRAL)[1:] == [0.0, 0.0]
 
 
 def test_a_wheel_that_hardly_moves_stands(path: CommandPath) -> None:
-    assert _sum_after(path, 0.1, 0.03) < 0.0
+    assert _sum_after(path, PUSHED, 0.03) < 0.0
 
 
 def test_nothing_is_taken_over_from_a_wheel_that_is_to_turn(path: CommandPath) -> None:
     assert path.state is not None
     path.state[at.STATE_HEADER + at.SPEED] = path.state[at.STATE_HEADER + at.ASKED] = 0.6
-    assert _sum_after(path, 0.1, 0.0) == 0.0
+    assert _sum_after(path, PUSHED, 0.0) == 0.0
 
 
 def test_nothing_is_taken_over_from_a_wheel_in_motion(path: CommandPath) -> None:
-    assert _sum_after(path, 0.1, 2.0) == 0.0
+    assert _sum_after(path, PUSHED, 2.0) == 0.0
+
+
+def test_as_much_is_taken_over_as_friction_holds(path: CommandPath) -> None:
+    # 0.06 N m at 0.7 N m/A and 0.8 ohm are 68.6 mV, at 12 V/rad 5.71 mrad.
+    assert _sum_after(path, 0.0114, 0.0) == pytest.approx(-0.0057)
 
 
 def test_nothing_is_taken_over_from_an_encoder_that_no_push_explains(path: CommandPath) -> None:
-    # A quarter of 24 V at 12 V/rad are 0.5 rad.
-    assert _sum_after(path, 0.51, 0.0) == 0.0
-
-
-def test_sums_that_had_nothing_in_common_have_when_the_wheel_turns_as_expected(
-    path: CommandPath,
-) -> None:
-    drivers = RestingDrivers(ROBOT)
-    for angle, speed in ((0.0, 0.0), (0.6, 0.0), (0.1, 0.0)):
-        drivers.voltages(path, (angle, 0.0, 0.0), (speed, 0.0, 0.0), 1.0)
-    assert path.wheel(at.INTEGRAL)[0] == 0.0
-    drivers.voltages(path, (0.1, 0.0, 0.0), (1.5, 0.0, 0.0), 1.0)
-    drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0)
-    assert path.wheel(at.INTEGRAL)[0] < 0.0
+    assert _sum_after(path, 0.0115, 0.0) == 0.0
 
 
 def test_a_simulated_wheel_that_creeps_takes_over_nothing(path: CommandPath) -> None:
     assert path.state is not None
     path.state[at.STATE_HEADER + at.SPEED] = 0.1  # asked to stand
-    assert _sum_after(path, 0.1, 0.0) == 0.0
+    assert _sum_after(path, PUSHED, 0.0) == 0.0
 
 
 def test_while_the_simulation_creeps_nothing_is_taken_over_and_then_it_is(
     path: CommandPath,
 ) -> None:
-    drivers, angle = RestingDrivers(ROBOT), (0.1, 0.0, 0.0)
+    drivers, angle = RestingDrivers(ROBOT), (PUSHED, 0.0, 0.0)
     assert path.state is not None
     drivers.voltages(path, REST, (2.0, 0.0, 0.0), 1.0)
     path.state[at.STATE_HEADER + at.SPEED] = 0.1
@@ -135,7 +132,7 @@ def test_while_the_simulation_creeps_nothing_is_taken_over_and_then_it_is(
     assert path.wheel(at.INTEGRAL)[0] == 0.0
     path.state[at.STATE_HEADER + at.SPEED] = 0.0
     drivers.voltages(path, angle, REST, 1.0)
-    assert path.wheel(at.INTEGRAL)[0] == pytest.approx(-0.05, abs=0.002)
+    assert path.wheel(at.INTEGRAL)[0] == pytest.approx(-0.5 * PUSHED, rel=0.04)
 
 
 def test_an_angle_that_is_not_known_leaves_the_simulation_alone(path: CommandPath) -> None:
@@ -147,23 +144,27 @@ def test_an_angle_that_is_not_known_leaves_the_simulation_alone(path: CommandPat
 def test_a_sum_that_would_turn_the_wheel_is_not_the_drivers(path: CommandPath) -> None:
     drivers = RestingDrivers(ROBOT)
     drivers.voltages(path, REST, REST, 1.0)
-    drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0)
+    drivers.voltages(path, (PUSHED, 0.0, 0.0), REST, 1.0)
     taken = path.wheel(at.INTEGRAL)[0]
     assert taken < 0.0
     assert path.state is not None
     path.state[at.STATE_HEADER + at.SPEED] = -0.02  # it gives way
     for _ in range(3):
-        volts = drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0)
+        volts = drivers.voltages(path, (PUSHED, 0.0, 0.0), REST, 1.0)
         path.state[at.STATE_HEADER + at.SPEED] = 0.0
     assert volts[0] == pytest.approx(12.0 * taken)
-    drivers.voltages(path, (0.2, 0.0, 0.0), REST, 1.0)
+    drivers.voltages(path, (1.2 * PUSHED, 0.0, 0.0), REST, 1.0)
     assert path.wheel(at.INTEGRAL)[0] == taken
+    drivers.voltages(path, (1.2 * PUSHED, 0.0, 0.0), (1.5, 0.0, 0.0), 1.0)
+    drivers.voltages(path, (1.2 * PUSHED, 0.0, 0.0), REST, 1.0)
+    assert path.wheel(at.INTEGRAL)[0] < taken
 
 
-def test_a_wheel_without_dry_friction_holds_nothing(path: CommandPath) -> None:
+def test_a_wheel_without_dry_friction_holds_nothing() -> None:
     physics = {name: sets for name, sets in ROBOT.physics.items() if name != "friction.coulomb"}
-    drivers = RestingDrivers(evolve(ROBOT, physics=physics))
-    for angle in (0.0, 0.1, 0.1):
+    robot = evolve(ROBOT, physics=physics)
+    drivers, path = RestingDrivers(robot), _standing(robot)
+    for angle in (0.0, PUSHED, PUSHED):
         drivers.voltages(path, (angle, 0.0, 0.0), REST, 1.0)
     assert path.wheel(at.INTEGRAL)[0] == 0.0
 
@@ -186,5 +187,5 @@ def test_after_a_leap_of_the_clock_nothing_is_remembered(path: CommandPath) -> N
     path.state[at.STATE_HEADER + at.SPEED] = 0.1
     drivers.voltages(path, REST, REST, 1.0)
     path.state[at.STATE_HEADER + at.SPEED] = 0.0
-    drivers.voltages(path, (0.1, 0.0, 0.0), REST, 1.0)
+    drivers.voltages(path, (PUSHED, 0.0, 0.0), REST, 1.0)
     assert path.wheel(at.INTEGRAL)[0] < 0.0

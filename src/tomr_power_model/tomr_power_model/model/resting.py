@@ -11,18 +11,19 @@ what moves alike is driven alike.
 
 What a push leaves in a driver's sum stays while friction holds the wheel, seconds long, and what
 is expected of the wheel then would be wrong. So while a wheel stands that in the simulation stands
-too, or turns slowly and no faster than it is asked to, the simulation's sum follows the driver's.
-Elsewhere it must not: what a faulty wheel does would be expected of it. No push makes a difference
-as large as an encoder that reads standstill, and no friction holds a wheel with a sum that makes
-the simulated one creep: from then on the sums have nothing in common until the wheel turns as
-expected.
+too, or turns slowly and no faster than it is asked to, the simulation's sum follows the driver's as
+far as friction holds the simulated wheel: more no push leaves, but an encoder that reads standstill
+does, and a fault that has just ended. Elsewhere it must not: what a faulty wheel does would be
+expected of it. A sum that makes the simulated wheel creep is not the driver's: from then on the
+sums have nothing in common until the wheel turns.
 """
 
 from collections.abc import Sequence
 from typing import Protocol
 
 from tomr_power_model.dynamics import layout as at
-from tomr_power_model.effects import EFFECTS
+from tomr_power_model.dynamics.holding import Holding
+from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.robot import WHEELS, Robot
 
 _UNKNOWN = float("nan")
@@ -33,7 +34,6 @@ _STANDS = 0.05  # rad/s
 _CREEPS = 0.01  # rad/s: faster than it is asked to
 _SLOW = 0.5  # rad/s
 _FOLLOWS = 0.5  # share of the difference in a tick
-_PUSHED = 0.25  # most that a push leaves, as a share of the supply's voltage
 
 
 class SimulatedDrivers(Protocol):
@@ -60,16 +60,14 @@ class RestingDrivers:
         """Of a robot; only dry friction holds a wheel that its driver turns."""
         self._proportional = robot.controller.proportional
         self._integral = robot.controller.integral
-        unlike = _PUSHED * robot.supply.nominal_voltage
-        self._most = unlike / self._integral if self._integral else 0.0  # rad
-        self._sticks = any(EFFECTS[name].dry_torque is not None for name in robot.physics)
+        self._holding = Holding(vehicle_of(robot))
         self.clear()
 
     def clear(self) -> None:
         """What the drivers' sums hold is not known until the next command."""
         self._offset = [_UNKNOWN] * WHEELS  # rad
         self._before = [_UNKNOWN] * WHEELS  # V, at the end of the last tick
-        self._strange = [False] * WHEELS  # differences that no push makes
+        self._strange = [False] * WHEELS  # differences that are not the drivers'
         self._followed = [False] * WHEELS  # in the last tick
 
     def forget(self) -> None:
@@ -116,12 +114,9 @@ class RestingDrivers:
         if self._offset[wheel] != self._offset[wheel]:
             self._offset[wheel] = -ahead
         self._offset[wheel] -= fades * (ahead + self._offset[wheel])
-        apart = ahead + self._offset[wheel]
-        if abs(apart) > self._most:
-            self._strange[wheel] = True
-        elif fades:
+        if fades:
             self._strange[wheel] = False
-        return apart
+        return ahead + self._offset[wheel]
 
     def _follow(
         self,
@@ -132,15 +127,21 @@ class RestingDrivers:
     ) -> None:
         """Take the differences over into the simulation, where a push may have left them."""
         simulated, asked = path.wheel(at.SPEED), path.wheel(at.ASKED)
+        sums, held = path.wheel(at.INTEGRAL), self._held(path)
         for wheel in range(WHEELS):
             excess = abs(simulated[wheel]) - abs(asked[wheel])
             if self._followed[wheel] and excess > _CREEPS:
                 # With such a sum it would turn, and it does not: the difference is another's.
                 self._strange[wheel], self._offset[wheel] = True, -ahead[wheel]
             is_slow = excess < _CREEPS and abs(simulated[wheel]) < _SLOW
-            rests = self._sticks and is_slow and abs(speed[wheel]) < _STANDS
-            is_known = apart[wheel] == apart[wheel] and not self._strange[wheel]
-            self._followed[wheel] = rests and is_known
-            if self._followed[wheel]:
-                path.add_to_sum(wheel, _FOLLOWS * apart[wheel])
-                self._offset[wheel] -= _FOLLOWS * apart[wheel]
+            rests = is_slow and abs(speed[wheel]) < _STANDS and not self._strange[wheel]
+            more = _FOLLOWS * apart[wheel]  # NaN where not known
+            follows = rests and self._integral * abs(sums[wheel] + more) < held[wheel]
+            self._followed[wheel] = follows
+            if follows:
+                path.add_to_sum(wheel, more)
+                self._offset[wheel] -= more
+
+    def _held(self, path: SimulatedDrivers) -> list[float]:
+        """What friction holds each simulated wheel against [V]."""
+        return self._holding.voltages(*map(path.wheel, (at.DRY, at.SIDE_LIMIT, at.HOT)))
