@@ -374,6 +374,38 @@ def test_a_robot_that_stands_shows_no_other_fault_than_it_had() -> None:
     assert found == [(50, "slip"), (3000, "control system fault")]
 
 
+def test_a_robot_that_stands_well_may_show_a_fault() -> None:
+    judge = Leading(STATES[NORMAL], sure=True)
+    classifier, found = FaultClassifier(judge), []
+    for item in at_rest(50, 3000):
+        at = (item.stamp_ns - BASE) // MS
+        judge.state = STATES[CONTROL] if at >= 2000 else STATES[NORMAL]
+        diagnosis = classifier.classify(item)
+        if diagnosis is not None and diagnosis.changed:
+            found.append((at, diagnosis.state.name))
+    assert found[-1] == (2000, "control system fault")
+
+
+class OfWheel(Leading):
+    """Surely a lost signal, of one wheel."""
+
+    wheel = 0
+
+    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+        return evolve(super().judge(frame, elapsed_ns, unseen), wheel=self.wheel)
+
+
+def test_the_same_fault_of_another_wheel_is_said_of_that_one() -> None:
+    judge = OfWheel(STATES[CONTROL], sure=True)
+    classifier, wheels = FaultClassifier(judge), set()
+    for item in ticks(50, 3000):
+        judge.wheel = 0 if item.stamp_ns < BASE + 1500 * MS else 2
+        diagnosis = classifier.classify(item)
+        if diagnosis is not None:
+            wheels.add((item.stamp_ns >= BASE + 1500 * MS, diagnosis.wheel))
+    assert wheels == {(False, 0), (True, 2)}
+
+
 def test_slip_shows_now_and_then_and_is_let_go_later_than_a_fault() -> None:
     gone = {}
     for state in (STATES[SLIP], BURDENED, UNKNOWN, STATES[CONTROL], DRAGGING[0]):

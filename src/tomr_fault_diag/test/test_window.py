@@ -1,6 +1,7 @@
 """The window classifier: what it sees, how it gathers evidence, what it says of a motion."""
 
 import json
+import math
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -13,6 +14,7 @@ from tomr_fault_diag.classifier.belief import (
     CONTROLS,
     DRAGS,
     ENCODERS,
+    ENDED,
     EXTERNAL,
     HYPOTHESES,
     LOADED,
@@ -34,7 +36,7 @@ from tomr_fault_diag.classifier.features import (
     channels,
     channels_of,
 )
-from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
+from tomr_fault_diag.classifier.judges import _GROUPS, Opinion, WindowJudge, make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
@@ -298,6 +300,15 @@ def test_a_wheel_that_catches_up_after_a_fault_has_no_other(fault: int) -> None:
     assert belief.shares[NORMAL] > 0.9
 
 
+def test_a_wheel_that_catches_up_looks_well_or_like_any_fault_of_it() -> None:
+    likelihoods = np.full(HYPOTHESES, -9.0)
+    likelihoods[[NORMAL, WEAKS.start + 1, METERS.start]] = -2.0, 1.0, 5.0
+    guessed = math.log(2.5)
+    ended = of_states(likelihoods)[ENDED]
+    np.testing.assert_allclose(ended[:3], [-2.0 - guessed, 1.0 - guessed, -2.0 - guessed])
+    np.testing.assert_allclose(ended.reshape(-1, 3), np.tile(ended[:3], (len(ended) // 3, 1)))
+
+
 @pytest.mark.parametrize("next_one", [WEAKS.start + 1, CONTROLS.start, METERS.start + 1])
 def test_another_fault_that_stays_is_named_after_all(next_one: int) -> None:
     """Of the wheel that had one it takes a second: so long it may be catching up."""
@@ -315,6 +326,10 @@ def test_no_chance_is_lost_between_states() -> None:
         moves = _transitions(10.0**-caution)
         np.testing.assert_allclose(moves.sum(axis=1), 1.0, atol=1e-12)
         assert (moves > -1e-12).all()
+
+
+def test_every_state_leads_with_one_group() -> None:
+    assert sorted(state for group in _GROUPS for state in group) == list(range(len(STATE_OF)))
 
 
 class Saying:
@@ -396,6 +411,46 @@ def test_what_ails_a_motor_is_said_when_the_window_holds_nothing_older() -> None
         leading = NORMAL if 45 <= tick < 48 else DRAGS.start
         names.append(_said(network, judge, leading, standing_at(tick)).leading.name)
     assert "motor system fault 1" not in names
+
+
+def _first_names(
+    network: Saying, judge: WindowJudge, hypothesis: int, ticks: range, speed: float = 0.0
+) -> list[str]:
+    """Faults of wheel 1 in the order in which they are named."""
+    found: dict[str, None] = {}
+    for tick in ticks:
+        item = frame(tick, ALL, speed=(speed, 0.0, 0.0))
+        opinion = _said(network, judge, hypothesis, item)
+        if opinion.sure and 0 in (opinion.wheel, opinion.leading.wheel):
+            found[opinion.leading.name] = None
+    return list(found)
+
+
+@pytest.mark.parametrize(
+    ("hypothesis", "cause"), [(DRAGS.start, DRAGGING[0]), (WEAKS.start, DEGRADED[0])]
+)
+def test_every_cause_waits_for_a_window_of_it_alone(hypothesis: int, cause: State) -> None:
+    network = Saying()
+    judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]
+    expected = ["motor system fault 1", cause.name]
+    assert _first_names(network, judge, hypothesis, range(40)) == expected
+    # After another motor's, and when all is forgotten, anew.
+    _first_names(network, judge, ENCODERS.start + 1, range(40, 80))
+    assert _first_names(network, judge, hypothesis, range(80, 120)) == expected
+    judge.clear()
+    assert _first_names(network, judge, hypothesis, range(120, 160)) == expected
+
+
+def test_what_a_wheel_does_that_catches_up_leads_to_nothing() -> None:
+    network = Saying()
+    judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]
+    for tick in range(40):
+        _said(network, judge, ENCODERS.start, frame(tick))
+    leading = []
+    for tick in range(40, 54):
+        network.likelihoods[:], network.likelihoods[WEAKS.start] = -8.0, 0.0
+        leading.append(judge.judge(frame(tick), 50 * MS, Unseen()).leading)
+    assert leading[-1] is STATES[NORMAL]
 
 
 def test_a_fault_that_is_surely_of_one_motor_is_named_though_its_cause_is_not() -> None:
