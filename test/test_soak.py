@@ -54,6 +54,12 @@ def test_a_late_verdict_is_a_miss() -> None:
     assert not gap.passed
     assert "1 late" in gap.found
     assert "FAIL" in table(delays.items())
+    hearing = Delays("messages after", 6.0)
+    hearing.add("a kill", 5.9)
+    assert hearing.items()[0].what == "messages after: a kill"
+    assert hearing.items()[0].passed
+    hearing.add("a kill", 6.1)
+    assert not hearing.items()[0].passed
 
 
 @pytest.mark.parametrize(("growth", "passed"), [(0.04, True), (0.06, False), (-0.06, False)])

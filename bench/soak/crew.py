@@ -15,6 +15,7 @@ from processes import resident_mb
 
 from soak.judge import Item, Process
 from tomr_demo import bound
+from tomr_power_model.nodes.stage_node import HEARD
 
 _MARK = "TOMR_SOAK"  # in the environment of every process, whoever starts it
 _END_S = 5.0  # in which a node must end when told to
@@ -83,7 +84,14 @@ class Crew:
 
     def is_up(self, name: str) -> bool:
         """Whether a node has said what it listens to and publishes."""
-        return _UP in self.members[name].log.read_text("utf-8", "replace")
+        return self._has_said(name, _UP)
+
+    def hears(self, name: str) -> bool:
+        """Whether a node has said that it has heard all that it listens to."""
+        return self._has_said(name, HEARD)
+
+    def _has_said(self, name: str, words: str) -> bool:
+        return words in self.members[name].log.read_text("utf-8", "replace")
 
     def look(self) -> None:
         """Note the memory of all, from time to time."""

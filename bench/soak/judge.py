@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from attrs import define, field, frozen
 
 WITHIN = 2.0  # s in which a verdict must be found again
+HEARS_WITHIN = 6.0  # s in which DDS must find a restarted node its messages
 FLAT = 0.05  # of the memory after warm-up
 _BASE = 0.1  # share of a process's samples that its memory is held against
 
@@ -33,8 +34,10 @@ class Item:
 
 @define
 class Delays:
-    """How long verdicts took, by what they waited for."""
+    """How long something took, by what it waited for."""
 
+    what: str = "verdict after"
+    within: float = WITHIN  # s
     _taken: dict[str, list[float]] = field(factory=dict)  # s, NaN-free: the limit where never
 
     def add(self, what: str, seconds: float) -> None:
@@ -43,16 +46,15 @@ class Delays:
 
     def items(self) -> list[Item]:
         """A line for each thing waited for."""
-        return [_delay(what, taken) for what, taken in sorted(self._taken.items())]
+        return [self._item(cause, taken) for cause, taken in sorted(self._taken.items())]
 
-
-def _delay(what: str, taken: Sequence[float]) -> Item:
-    late = sum(seconds > WITHIN for seconds in taken)
-    median = statistics.median(taken)
-    found = (
-        f"{len(taken)} times, within {WITHIN:g} s, median {median:.2f} s, most {max(taken):.2f} s"
-    )
-    return Item(f"verdict after: {what}", found + (f", {late} late" if late else ""), not late)
+    def _item(self, cause: str, taken: Sequence[float]) -> Item:
+        late = sum(seconds > self.within for seconds in taken)
+        median, most = statistics.median(taken), max(taken)
+        times = f"{len(taken)} times, within {self.within:g} s"
+        found = f"{times}, median {median:.2f} s, most {most:.2f} s"
+        words = f"{self.what}: {cause}"
+        return Item(words, found + (f", {late} late" if late else ""), not late)
 
 
 def memory_items(processes: Iterable[Process], warm_up: float) -> list[Item]:

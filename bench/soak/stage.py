@@ -27,7 +27,7 @@ from soak.acts import (
     acts,
 )
 from soak.crew import Crew
-from soak.judge import Delays, Item, memory_items, table
+from soak.judge import HEARS_WITHIN, Delays, Item, memory_items, table
 from soak.relay_node import PLANT, Relay
 from tomr_fault_diag.classifier.states import DISOBEYS, FAULTLESS, POWER_SENSOR, UNKNOWN
 from tomr_power_model.errors import InputError
@@ -51,6 +51,7 @@ class Soak:
         self._robot, self._speed, self._seconds = robot, speed, seconds
         self._crew = Crew(self._command, out)
         self._delays = Delays()
+        self._hearing = Delays("messages after", HEARS_WITHIN)
         self._false: Counter[str] = Counter()
         self._verdicts: dict[str, tuple[str, int]] = {}  # suite: usable state, heard at [ns]
         self._heard = 0
@@ -97,6 +98,7 @@ class Soak:
         return [
             Item("driven", f"{driven:.1f} min of the robot in {passed:.1f} min", True),
             *self._delays.items(),
+            *self._hearing.items(),
             Item("false words", false or f"none in {self._heard} messages", not false),
             *memory_items(self._crew.lives, warm_up),
         ]
@@ -133,8 +135,8 @@ class Soak:
 
     def _await_nodes(self) -> None:
         names = [name for names in SUITES.values() for name in names]
-        self._until(lambda: all(map(self._crew.is_up, names)), "all nodes up")
         self._until(lambda: self._relay.is_simulator_ready and self._relay.now_ns, "the simulator")
+        self._until(lambda: all(map(self._crew.hears, names)), "all nodes hear all")
 
     def _said(self, suite: str, state: str, usable: bool) -> None:
         self._heard += 1
@@ -185,8 +187,13 @@ class Soak:
             if not answer.result().result.successful:
                 raise InputError(f"{condition.fault}: {answer.result().result.reason}")
 
-    def _await_verdict(self, what: str, suites: Iterable[str] = SUITES) -> None:
-        """Note how long it takes from now on until suites say what is so."""
+    def _await_verdict(
+        self, what: str, suites: Iterable[str] = SUITES, besides: Iterable[str] = ()
+    ) -> None:
+        """Note how long it takes from now on until suites say what is so.
+
+        `besides`: what may be said as well, and for a moment more.
+        """
         self._note(f"expecting {' or '.join(self._condition.states)} after: {what}")
         since_ns = self._relay.now_ns
         wanted, taken = self._condition.states, dict.fromkeys(suites, 0.0)
@@ -204,8 +211,9 @@ class Soak:
         self._until(found, "a verdict")
         for seconds in taken.values():
             self._delays.add(what, seconds)
-        self._allowed = _true_words(self._condition)
+        self._allowed = _true_words(self._condition).union(besides)
         self._drive(_QUIET)
+        self._allowed.difference_update(besides)
 
     def _interrupt(self, interruption: Interruption) -> None:
         relay = self._relay
@@ -253,18 +261,20 @@ class Soak:
         self._crew.kill(name)
         stamp = self._relay.now_ns
         self._crew.start(name)
-        if name != SIMULATOR:
+        if name == SIMULATOR:
+            # It stands until it hears commands again, and that may be said.
+            self._allowed.add(DISOBEYS.name)
+            self._until(lambda: self._relay.now_ns > stamp, "the simulator is back")
+        else:
             self._until(lambda: self._crew.is_up(name), f"{name} up again")
-            stamp = self._relay.now_ns
-            # Fast DDS may hold a writer up for seconds whose reader was killed.
-            self._until(lambda: self._relay.now_ns > stamp, "the robot's next message")
+        since = self._relay.now_ns
+        self._until(lambda: self._crew.hears(name), f"{name} hears again")
+        self._hearing.add(self._doing, (self._relay.now_ns - since) / NANOSECONDS)
+        if name == SIMULATOR:
+            self._set_fault(self._condition, self._condition.severity)
+            self._await_verdict(self._doing, besides=(DISOBEYS.name,))
+        else:
             self._await_verdict(self._doing, [suite for suite in SUITES if name in SUITES[suite]])
-            return
-        # It stands until commands find it again, and that may be said.
-        self._allowed.add(DISOBEYS.name)
-        self._until(lambda: self._relay.now_ns > stamp, "the simulator is back")
-        self._set_fault(self._condition, self._condition.severity)
-        self._await_verdict(self._doing)
 
 
 def _true_words(condition: Condition) -> set[str]:

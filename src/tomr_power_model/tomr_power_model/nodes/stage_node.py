@@ -36,6 +36,8 @@ from tomr_power_model.topics.inputs import Complaints, Input
 SENSOR_QOS = QoSProfile(depth=500, reliability=ReliabilityPolicy.BEST_EFFORT)
 STAGE_QOS = QoSProfile(depth=500, reliability=ReliabilityPolicy.RELIABLE)
 
+HEARD = "has heard every topic that it listens to"
+
 _SIGNAL_CHECK_S = 0.2  # the longest that a signal waits while no message comes
 
 
@@ -79,6 +81,7 @@ class StageNode(Node):
         self._outlets: dict[str, Any] = {}
         self._ends: list[Callable[[], object]] = []  # of what it listens to
         self._topics: dict[str, list[str]] = {"listens to": [], "publishes": []}
+        self._unheard: set[str] = set()  # topics it listens to, until the first message
 
     def listen(
         self, inputs: Iterable[Input], advance: Callable[[], None], qos: QoSProfile = SENSOR_QOS
@@ -90,6 +93,7 @@ class StageNode(Node):
     def _subscribe(self, item: Input, advance: Callable[[], None], qos: QoSProfile) -> None:
         clock = self.get_clock()
         self._note("listens to", item.topic, item.type_name)
+        self._unheard.add(item.topic)
 
         def subscribe(type_name: str) -> Any:
             kind = message_class(type_name)
@@ -97,6 +101,8 @@ class StageNode(Node):
 
             def receive(data: bytes) -> None:
                 now = clock.now().nanoseconds
+                if self._unheard:
+                    self._hear(item.topic)
                 if item.is_too_close is not None and item.is_too_close(flow.stamp_of(data)):
                     return
                 problem = flow.refuses(data, now)
@@ -123,8 +129,15 @@ class StageNode(Node):
             subscription = subscribe(item.type_name)
             self._ends.append(lambda: self.destroy_subscription(subscription))
 
+    def _hear(self, topic: str) -> None:
+        """Note the first message of a topic; whoever waits for the node learns when all came."""
+        self._unheard.discard(topic)
+        if not self._unheard:
+            self.get_logger().info(HEARD)
+
     def unlisten(self) -> None:
         """Take back all subscriptions."""
+        self._unheard.clear()
         for end in self._ends:
             end()
         self._ends.clear()

@@ -24,6 +24,7 @@ from tomr_power_model.nodes.command_line import node_arguments
 from tomr_power_model.nodes.command_type import CommandType
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
 from tomr_power_model.nodes.stage_node import (
+    HEARD,
     SENSOR_QOS,
     STAGE_QOS,
     message_class,
@@ -233,6 +234,7 @@ class SimBridge(Node):
         stamp = stamp_of(message, now, fallback=True)
         is_foreign = abs(stamp - now) > FOREIGN_NS
         self._simulation.command(*wanted, stamp_ns=now if is_foreign else stamp)
+        self.get_logger().info(HEARD, once=True)
 
     def _parameters_set(self, parameters: list[Parameter]) -> None:
         """Take over what the parameter callbacks let through."""
