@@ -12,8 +12,8 @@ from tomr_fault_diag.residuals.frame import (
     MOTORS,
     SPEEDS,
     TOTAL,
-    Residual,
     ResidualFrame,
+    measured_speed,
     residual_names,
 )
 from tomr_power_model.geometry.kinematics import wheel_angles, wheels_to_twist
@@ -95,7 +95,7 @@ class Gatherer:
         self.frame = frame
         self._speeds = tuple(
             speed if abs(speed) < _FASTEST else 0.0
-            for speed in (_measured_speed(frame.residuals[index]) for index in SPEEDS)
+            for speed in (measured_speed(frame.residuals[index]) for index in SPEEDS)
         )
 
     def diagnosis(self, statuses: Iterable[Status]) -> None:
@@ -166,17 +166,12 @@ class Gatherer:
             "message": status.message,
             "unseen": status.values.get("not_observable", ""),
             "shares": self.shares,
+            "severity": status.values.get("severity", ""),
             "evidence": [
                 text for key, text in status.values.items() if key.startswith("evidence ")
             ],
             "inputs": inputs,
         }
-
-
-def _measured_speed(residual: Residual) -> float:
-    """What the encoder said [rad/s]: residuals of speed count against the expected direction."""
-    sign = -1.0 if residual.modelled < 0.0 else 1.0
-    return residual.modelled + sign * residual.residual
 
 
 def spells(pictures: Sequence[Json]) -> list[list[Any]]:

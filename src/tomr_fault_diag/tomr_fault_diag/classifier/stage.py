@@ -6,6 +6,7 @@ from tomr_fault_diag.classifier.judges import Judge, Opinion
 from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
 from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.classifier.severity import Severity, SeverityWatch
 from tomr_fault_diag.classifier.states import (
     BURDENED,
     DISOBEYS,
@@ -38,6 +39,7 @@ class Diagnosis:
     wheel: int | None = None  # 0..2 that the state concerns, where it is known
     unseen: Unseen = field(factory=Unseen)
     usable: bool = True  # whether this tick held data to decide by
+    severity: Severity | None = None  # how bad it is, once that is known
 
 
 # Whatever comes next may follow at once.
@@ -57,8 +59,10 @@ class FaultClassifier:
     Where data are missing nothing is concluded.
     """
 
-    def __init__(self, judge: Judge) -> None:
+    def __init__(self, judge: Judge, severity: SeverityWatch | None = None) -> None:
+        """Without `severity` it is not told how bad a fault is."""
         self._judge = judge
+        self._severity = severity
         self._motion = MotionWatch()
         self._misfits = MisfitWatch()
         self._data = SufficiencyWatch()
@@ -79,6 +83,8 @@ class FaultClassifier:
         self._motion.clear()
         self._misfits.clear()
         self._data.clear()
+        if self._severity is not None:
+            self._severity.clear()
         self._stamp = 0
         self._opinion: Opinion | None = None
         self._unseen = Unseen()
@@ -112,6 +118,8 @@ class FaultClassifier:
         before = self._state
         self._decide(frame, elapsed)
         assert self._state is not None
+        if self._severity is not None and self._usable:
+            self._severity.take(frame, self._state, self._wheel)
         changed = self._state != before
         if not changed and not self._is_periodic(frame.stamp_ns, elapsed):
             return None
@@ -126,7 +134,13 @@ class FaultClassifier:
             self._wheel,
             self._unseen,
             self._usable,
+            self._how_bad(),
         )
+
+    def _how_bad(self) -> Severity | None:
+        if self._severity is None or self._state is None:
+            return None
+        return self._severity.severity(self._state, self._wheel)
 
     def _is_periodic(self, stamp: int, elapsed: int) -> bool:
         """Whether a multiple of the report period lies since the last frame: no timer needed."""

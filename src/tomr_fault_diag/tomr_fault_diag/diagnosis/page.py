@@ -306,6 +306,7 @@ def _episode(episode: Any, start_ns: int) -> dict[str, object]:
         "end": seconds(episode.end_ns, start_ns),
         "since": seconds(episode.since_ns, start_ns),
         "evidence": episode.evidence,
+        "severity": episode.severity.words if episode.severity else "",
         "colour": colour_of(episode.state),
         "is_fault": episode.is_fault,
     }

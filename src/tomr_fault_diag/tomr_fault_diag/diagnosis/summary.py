@@ -4,6 +4,7 @@ from collections import Counter
 
 from attrs import evolve, field, frozen
 
+from tomr_fault_diag.classifier.severity import Severity
 from tomr_fault_diag.classifier.stage import Diagnosis
 from tomr_fault_diag.classifier.states import (
     FAULTLESS,
@@ -28,6 +29,7 @@ class Episode:
     since_ns: int  # when its evidence began, mostly before it was named
     wheel: int | None = None  # 1..3
     evidence: tuple[str, ...] = ()
+    severity: Severity | None = None  # as last known
 
     @property
     def is_fault(self) -> bool:
@@ -93,6 +95,8 @@ class Summariser:
                     tuple(evidence),
                 )
             )
+        if diagnosis.severity is not None:
+            self._episodes[-1] = evolve(self._episodes[-1], severity=diagnosis.severity)
 
     def summary(self) -> Summary:
         """All that was gathered."""

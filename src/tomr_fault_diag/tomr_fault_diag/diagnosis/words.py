@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from attrs import asdict
+
 from tomr_fault_diag.diagnosis.replayed import Failed, Phase, Replayed
 from tomr_fault_diag.diagnosis.summary import Episode, Summary
 from tomr_power_model.errors import one_line
@@ -29,6 +31,8 @@ def summary_lines(summary: Summary, start_ns: int) -> Iterator[str]:
         )
         earlier = f", since {since:.2f} s" if episode.is_fault and since < begin else ""
         yield f"{begin:8.2f} s to {end:8.2f} s  {episode.state}{earlier}"
+        if episode.severity is not None:
+            yield f"{'':26}{episode.severity.words}"
         for line in episode.evidence:
             yield f"{'':26}{line}"
 
@@ -172,4 +176,5 @@ def _episode(episode: Episode) -> dict[str, Any]:
         "end_ns": episode.end_ns,
         "since_ns": episode.since_ns,
         "evidence": episode.evidence,
+        "severity": None if episode.severity is None else asdict(episode.severity),
     }

@@ -58,8 +58,8 @@ class Residual:
 @frozen
 class ResidualFrame:
     """Residuals of one tick: total power, motor powers 1-3 (measured - predicted from the
-    command), wheel speeds 1-3 (measured - expected), motor powers 1-3 (measured - derived from
-    the encoders)."""
+    command), wheel speeds 1-3 (measured - expected, in the expected direction), motor powers 1-3
+    (measured - derived from the encoders)."""
 
     stamp_ns: int
     residuals: tuple[Residual, ...]
@@ -68,6 +68,12 @@ class ResidualFrame:
     def codes(self) -> tuple[int, ...]:
         """Input of the paper's network, Wang 2024, Eq. 21."""
         return tuple(residual.code for residual in self.residuals)
+
+
+def measured_speed(residual: Residual) -> float:
+    """What the encoder showed [rad/s]: residuals of speed count in the expected direction."""
+    sign = -1.0 if residual.modelled < 0.0 else 1.0
+    return residual.modelled + sign * residual.residual
 
 
 def residual_names(wheel_topics: tuple[str, str, str]) -> tuple[str, ...]:

@@ -355,6 +355,7 @@ function showWords(picture) {
     shares.push(label, bar, text);
   }
   $("shares").replaceChildren(...shares);
+  $("severity").textContent = picture.severity || "";
   $("unseen").textContent = picture.unseen ? `not observable in this motion: ${picture.unseen}` : "";
   const lines = (picture.evidence || []).map((line) => {
     const item = document.createElement("li");

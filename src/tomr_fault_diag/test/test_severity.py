@@ -1,0 +1,258 @@
+"""How bad a fault is: worked by hand on the reference robot. Constants are known to 5 %."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from tomr_fault_diag.classifier.messages import diagnosis_message
+from tomr_fault_diag.classifier.severity import MEASURES, SeverityWatch, _student
+from tomr_fault_diag.classifier.stage import Diagnosis
+from tomr_fault_diag.classifier.states import (
+    BURDENED,
+    CONTROL,
+    DEGRADED,
+    DISOBEYS,
+    DRAGGING,
+    MOTOR,
+    NORMAL,
+    POWER_SENSOR,
+    PUSHED,
+    SLIP,
+    STATES,
+    STUCK,
+    UNKNOWN,
+    State,
+)
+from tomr_fault_diag.residuals.frame import Residual, ResidualFrame, Unit
+from tomr_power_model.robot import shipped_robot
+
+MS = 1_000_000
+BASE = 1_700_000_000_000 * MS
+ROBOT = shipped_robot("reference")
+# Of each motor: 0.7 N m/A at the wheel, 0.8 ohm, 1.2 W standby; wheels of 0.05 m.
+CONSTANT, RESISTANCE, STANDBY, RADIUS = 0.7, 0.8, 1.2, 0.05
+SPEED = np.array([4.0, -6.0, 2.0])
+CURRENT = np.array([0.5, -0.8, 0.3])  # that the motion takes [A]
+NAN = float("nan")
+
+
+def power(current: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """At the driver [W]."""
+    return np.asarray(STANDBY + RESISTANCE * current**2 + CONSTANT * speed * current)
+
+
+def frame(
+    tick: int,
+    shown: np.ndarray,
+    speed: np.ndarray = SPEED,
+    expected: np.ndarray = SPEED,
+    current: np.ndarray = CURRENT,
+    unit: Unit = "W",
+) -> ResidualFrame:
+    """Measured powers `shown`; what the model says follows from currents and speeds."""
+    of_encoders = power(current, speed) if unit == "W" else current
+    of_commands = power(current, expected) if unit == "W" else current
+    residuals = [Residual(0.0, 1.0, 30.0)]
+    residuals += [Residual(p - m, 1.0, m, unit) for p, m in zip(shown, of_commands, strict=True)]
+    residuals += [
+        Residual(math.copysign(1.0, m) * (w - m), 1.0, m, "rad/s")
+        for w, m in zip(speed, expected, strict=True)
+    ]
+    residuals += [Residual(p - m, 1.0, m, unit) for p, m in zip(shown, of_encoders, strict=True)]
+    return ResidualFrame(BASE + 50 * tick * MS, tuple(residuals))
+
+
+Make = Callable[[int], ResidualFrame]
+
+
+def told(state: State, wheel: int | None, ill: Make, well: Make | None = None) -> str:
+    """What is said after 5 s of a fault, before it 5 s of a robot that is well."""
+    watch = SeverityWatch(ROBOT)
+    for tick in range(100):
+        watch.take((well or healthy)(tick), STATES[NORMAL], None)
+    for tick in range(100, 200):
+        watch.take(ill(tick), state, wheel)
+    found = watch.severity(state, wheel)
+    return "" if found is None else found.words
+
+
+def healthy(tick: int) -> ResidualFrame:
+    return frame(tick, power(CURRENT, SPEED))
+
+
+def test_friction_added() -> None:
+    # 0.14 N m are 0.2 A, in the direction in which the wheel turns.
+    more = CURRENT + np.array([0.0, -0.2, 0.0])
+    words = told(DRAGGING[1], 1, lambda tick: frame(tick, power(more, SPEED)))
+    assert words == "friction added 0.14 N m (0.133 to 0.147 N m)"
+
+
+def test_a_winding_that_heats_more() -> None:
+    shown = power(CURRENT, SPEED) + np.array([0.5 * RESISTANCE * CURRENT[0] ** 2, 0.0, 0.0])
+    words = told(DEGRADED[0], 0, lambda tick: frame(tick, shown))
+    assert words == "winding resistance, or a loss like it, +50 % (+48 to +53 %)"
+
+
+def test_a_power_sensor_that_shows_too_little() -> None:
+    shown = power(CURRENT, SPEED) * np.array([1.0, 1.0, 0.6])
+    words = told(POWER_SENSOR[2], 2, lambda tick: frame(tick, shown))
+    assert words == "power shown -40 % (-42 to -38 %)"
+
+
+def test_a_motor_without_its_signal_draws_nothing() -> None:
+    shown = power(CURRENT * np.array([0.0, 1.0, 1.0]), SPEED)
+    words = told(STATES[CONTROL], 0, lambda tick: frame(tick, shown))
+    assert words == "motor power -100 % (-105 to -95 %)"
+
+
+def test_an_encoder_that_stands() -> None:
+    speed = SPEED * np.array([1.0, 1.0, 0.0])
+    words = told(STATES[MOTOR + 2], 2, lambda tick: frame(tick, power(CURRENT, SPEED), speed))
+    assert words == "wheel speed shown -100 % (-105 to -95 %)"
+
+
+def test_what_a_stuck_wheel_withstands() -> None:
+    speed, current = SPEED * np.array([0.0, 1.0, 1.0]), CURRENT + np.array([3.5, 0.0, 0.0])
+    words = told(STUCK[0], 0, lambda tick: frame(tick, power(current, speed), speed))
+    assert words == "withstands 2.8 N m (2.66 to 2.94 N m)"
+
+
+def test_a_force_that_resists() -> None:
+    # Straight ahead at 0.2 m/s: wheel torques are J^T F, with omega = sin(a) v / r.
+    ways = np.array([math.sin(math.radians(angle)) for angle in (0.0, 120.0, 240.0)])
+    speed = ways * 0.2 / RADIUS
+    torque = ways * RADIUS * 9.0 * 2.0 / 3.0
+    still = np.zeros(3)
+
+    def pulled(tick: int) -> ResidualFrame:
+        return frame(tick, power(torque / CONSTANT, speed), speed, speed, still)
+
+    words = told(
+        BURDENED, None, pulled, lambda tick: frame(tick, power(still, speed), current=still)
+    )
+    assert words == "resisting force 9 N (8.55 to 9.45 N)"
+
+
+def test_traction_is_what_wheels_hand_to_the_floor() -> None:
+    # 5 kg on each wheel; 0.06 N m Coulomb and 0.004 N m s/rad take 0.3 and 0.08 N of the rest.
+    load, speed = 5.0 * 9.80665, np.array([4.0, 4.0, 4.0])
+    torque = 0.06 + 0.004 * 4.0 + 0.05 * load * RADIUS
+
+    def slipping(tick: int) -> ResidualFrame:
+        return frame(tick, power(np.full(3, torque / CONSTANT), speed), speed, speed)
+
+    assert told(STATES[SLIP], None, slipping, slipping) == (
+        "traction used 0.05 of the load (0.0449 to 0.0551 of the load)"
+    )
+
+
+def test_currents_need_no_power() -> None:
+    watch = SeverityWatch(ROBOT)
+    shown = CURRENT + np.array([0.2, 0.0, 0.0])
+    for tick in range(100):
+        watch.take(frame(tick, shown, unit="A"), DRAGGING[0], 0)
+    found = watch.severity(DRAGGING[0], 0)
+    assert found is not None
+    assert found.value == pytest.approx(0.14)
+
+
+def test_the_other_way_around_it_is_as_bad() -> None:
+    more = -CURRENT + np.array([0.0, 0.2, 0.0])
+    words = told(
+        DRAGGING[1],
+        1,
+        lambda tick: frame(tick, power(more, -SPEED), -SPEED, -SPEED, -CURRENT),
+    )
+    assert words == "friction added 0.14 N m (0.133 to 0.147 N m)"
+
+
+def test_what_a_robot_shows_that_is_well_widens_the_interval() -> None:
+    more = CURRENT + np.array([0.0, -0.2, 0.0])
+    lacking = CURRENT + np.array([0.0, -0.05, 0.0])
+    words = told(
+        DRAGGING[1],
+        1,
+        lambda tick: frame(tick, power(more, SPEED)),
+        lambda tick: frame(tick, power(lacking, SPEED)),
+    )
+    assert words == "friction added 0.14 N m (0.098 to 0.182 N m)"
+
+
+def test_what_may_be_nothing_is_not_told() -> None:
+    noise = np.random.default_rng(7)
+
+    def noisy(tick: int) -> ResidualFrame:
+        return frame(tick, power(CURRENT, SPEED) + noise.normal(0.0, 1.0, 3))
+
+    assert told(DRAGGING[1], 1, noisy) == ""
+
+
+def test_nineteen_intervals_of_twenty_hold_the_truth() -> None:
+    noise, held = np.random.default_rng(3), 0
+    more = power(CURRENT + np.array([0.0, -0.2, 0.0]), SPEED)
+    for _ in range(200):
+        watch = SeverityWatch(ROBOT)
+        for tick in range(60):
+            watch.take(frame(tick, more + noise.normal(0.0, 0.2, 3)), DRAGGING[1], 1)
+        found = watch.severity(DRAGGING[1], 1)
+        assert found is not None
+        scatter = found.high - found.value - 0.05 * found.value
+        held += abs(found.value - 0.14) <= scatter
+    assert 180 <= held <= 199
+
+
+def test_nothing_is_told_of_a_moment_or_of_ticks_without_data() -> None:
+    more = power(CURRENT + np.array([0.0, -0.2, 0.0]), SPEED)
+    watch = SeverityWatch(ROBOT)
+    for tick in range(30):
+        watch.take(frame(tick, more), DRAGGING[1], 1)
+    assert watch.severity(DRAGGING[1], 1) is None
+    for tick in range(30, 200):
+        silent = frame(tick, more)
+        missing = evolve(silent.residuals[2], residual=NAN, missing="wheel_2/power")
+        residuals = (*silent.residuals[:2], missing, *silent.residuals[3:])
+        watch.take(evolve(silent, residuals=residuals), DRAGGING[1], 1)
+    assert watch.severity(DRAGGING[1], 1) is None
+
+
+def test_another_fault_begins_anew_and_its_cause_does_not() -> None:
+    watch = SeverityWatch(ROBOT)
+    more = power(CURRENT + np.array([0.0, -0.2, 0.0]), SPEED)
+    for tick in range(60):
+        watch.take(frame(tick, more), STATES[MOTOR + 1], 1)
+    watch.take(frame(60, more), DRAGGING[1], 1)
+    assert watch.severity(DRAGGING[1], 1) is not None
+    watch.take(frame(61, more), DRAGGING[2], 2)
+    assert watch.severity(DRAGGING[2], 2) is None
+
+
+def test_every_fault_of_a_part_has_a_measure() -> None:
+    measured = {state for measure in MEASURES for state in measure.states}
+    assert measured == {
+        *STATES[SLIP:], *DRAGGING, *STUCK, *DEGRADED, *POWER_SENSOR, BURDENED,
+    }  # fmt: skip
+    watch = SeverityWatch(ROBOT)
+    assert all(watch.severity(state, None) is None for state in (UNKNOWN, DISOBEYS, PUSHED))
+
+
+def test_a_message_tells_it() -> None:
+    watch = SeverityWatch(ROBOT)
+    more = power(CURRENT + np.array([0.0, -0.2, 0.0]), SPEED)
+    for tick in range(100):
+        watch.take(frame(tick, more), DRAGGING[1], 1)
+    diagnosis = Diagnosis(
+        BASE, DRAGGING[1], BASE, (), frame(100, more), False, 1,
+        severity=watch.severity(DRAGGING[1], 1),
+    )  # fmt: skip
+    values = dict(diagnosis_message(ROBOT, diagnosis, "robot").statuses[0].values)
+    assert values["severity"] == "friction added 0.14 N m (0.133 to 0.147 N m)"
+    plain = evolve(diagnosis, severity=None)
+    assert dict(diagnosis_message(ROBOT, plain, "robot").statuses[0].values)["severity"] == ""
+
+
+@pytest.mark.parametrize(("freedom", "quantile"), [(3, 3.182), (5, 2.571), (20, 2.086)])
+def test_students_quantile(freedom: int, quantile: float) -> None:
+    assert _student(freedom) == pytest.approx(quantile, rel=0.01)
