@@ -56,6 +56,7 @@ Sums = tuple[Array, Array]  # of x^2 and of x y, one for each wheel or one alone
 
 _STRETCH = to_ns(0.5)
 _CONSTANTS, _FRICTION = 0.05, 0.1  # what a description does not know of them
+_SELDOM = to_ns(0.2)  # between two looks at a robot that is well
 _NEXT = to_ns(0.3)  # the longest from one tick to the next
 _LEAST = 4  # stretches that an interval needs
 _MOST = 60  # stretches that are remembered
@@ -339,6 +340,7 @@ class SeverityWatch:
         self._well, self._ill = Stretches(), Stretches()
         self._named: tuple[int | None, int | None, str] | None = None
         self._last: Tick | None = None
+        self._due = 0  # when a robot that is well is looked at again [ns]
         self._begin(0)
 
     def _begin(self, stretch: int) -> None:
@@ -355,8 +357,9 @@ class SeverityWatch:
         if named != self._named:
             self._ill.clear()
             self._named = named
-        if named is None and state is not STATES[NORMAL]:
+        if named is None and (state is not STATES[NORMAL] or frame.stamp_ns < self._due):
             return
+        self._due = frame.stamp_ns + _SELDOM
         tick = self._last = Tick.of(self._motors, frame, self._last)
         if tick is None:
             return
