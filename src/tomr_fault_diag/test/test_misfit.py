@@ -41,9 +41,8 @@ def frame(at_ms: int, expected: Three, measured: Three, power: float = 0.0) -> R
 class Sure:
     """A judge that is sure of one state, whatever it sees."""
 
-    settings = ClassifierSettings()
-
     def __init__(self, state: int) -> None:
+        self.settings = ClassifierSettings()
         self.state = state
         self.cleared = 0
 
@@ -100,7 +99,7 @@ def test_no_wheel_is_accused_meanwhile() -> None:
 )
 def test_what_may_be_something_else(expected: Three, measured: Three) -> None:
     watch = MisfitWatch()
-    seen = [watch.take(frame(t, expected, measured)) for t in range(50, 3000, 50)]
+    seen = [watch.take(frame(t, expected, measured), 0.88) for t in range(50, 3000, 50)]
     assert not any(item.disobeys or item.ignores_commands for item in seen)
 
 
@@ -120,7 +119,9 @@ def test_more_that_the_computer_draws_is_not_unknown() -> None:
         for t in range(50, 2000, 50):
             item = frame(t, TURNING, TURNING)
             rest = item.residuals[2:]
-            seen = watch.take(evolve(item, residuals=(Residual(9.0, 2.0, 20.0), motor, *rest)))
+            seen = watch.take(
+                evolve(item, residuals=(Residual(9.0, 2.0, 20.0), motor, *rest)), 0.88
+            )
         return seen.unexplained
 
     assert not watched(Residual(0.0, 2.0, 20.0))
@@ -192,3 +193,56 @@ def test_levels() -> None:
         if diagnosis is not None:
             levels[diagnosis.state.name] = diagnosis.state.level
     assert levels["does not follow its commands"] is Level.ERROR
+
+
+def _supplied(shares: dict[int, float], end: int = 6000) -> list[ResidualFrame]:
+    """Frames of a drive whose supply has a share of its nominal voltage from some times [ms] on."""
+    found = []
+    for t in range(50, end, 50):
+        share = [share for begin, share in shares.items() if begin <= t][-1]
+        found.append(evolve(frame(t, TURNING, TURNING), supply=share))
+    return found
+
+
+def test_a_supply_that_stays_low_is_said_until_it_has_risen_again() -> None:
+    assert named(_supplied({0: 1.0, 1000: 0.87, 3000: 0.89, 4000: 0.91})) == [
+        (50, "normal"),
+        (2000, "low supply"),
+        (4600, "normal"),
+    ]
+
+
+def test_a_supply_that_sags_for_a_moment_is_not_low() -> None:
+    assert named(_supplied({0: 1.0, 1000: 0.8, 1950: 0.9, 2000: 0.8, 2950: 0.9})) == [
+        (50, "normal")
+    ]
+
+
+@pytest.mark.parametrize("share", [NAN, 0.881])
+def test_what_is_not_told_or_not_low_is_none(share: float) -> None:
+    assert named(_supplied({0: share})) == [(50, "normal")]
+
+
+def test_other_faults_are_named_beside_a_low_supply_and_leave_it_behind() -> None:
+    judge = Sure(NORMAL)
+    classifier, found = FaultClassifier(judge), []
+    for item in _supplied({0: 0.8}):
+        at = (item.stamp_ns - BASE) // MS
+        judge.state = CONTROL if 3000 <= at < 4000 else NORMAL
+        diagnosis = classifier.classify(item)
+        if diagnosis is not None and diagnosis.changed:
+            found.append((at, diagnosis.state.name))
+    assert found == [
+        (50, "normal"),
+        (1050, "low supply"),
+        (3000, "control system fault"),
+        (4600, "low supply"),
+    ]
+
+
+def test_what_is_low_is_set_and_0_is_never() -> None:
+    judge = Sure(NORMAL)
+    judge.settings = ClassifierSettings(low_supply=0.0)
+    classifier = FaultClassifier(judge)
+    found = [classifier.classify(item) for item in _supplied({0: 0.1})]
+    assert {item.state.name for item in found if item is not None} == {"normal"}

@@ -384,6 +384,18 @@ def test_unsigned_currents_are_magnitudes() -> None:
     assert _frames(robot, feed)[-1].codes == (0,) * 10
 
 
+def test_the_supplys_voltage_is_that_of_the_whole_else_the_middle_of_the_motors() -> None:
+    volts = {1: 18.0, 2: 21.0, 3: 24.0}
+    feed = {
+        f"wheel_{n}/power": lambda t, n=n: _battery(t, volts[n], -10.0 / volts[n]) for n in volts
+    }
+    whole = {**feed, "battery_state": lambda t: _battery(t, 19.2, -42.0 / 19.2)}
+    assert _frames(_robot(), whole)[-1].supply == 0.8
+    assert _frames(_robot(total="sum"), feed)[-1].supply == 0.875
+    unknown = {f"wheel_{n}/power": lambda t: _battery(t, NAN, -0.4) for n in volts}
+    assert math.isnan(_frames(_robot(total="sum"), unknown)[-1].supply)
+
+
 def test_a_frame_survives_its_message() -> None:
     robot = _robot()
     values = [0.123456, -4.0, 1e-7, NAN, 2.0, 3.0, -123456.0, 0.0, 1.5, 7.0]
@@ -391,8 +403,14 @@ def test_a_frame_survives_its_message() -> None:
         Residual(value, 1.0, 2.5, unit, missing="lost" if math.isnan(value) else "")
         for value, unit in zip(values, ["W", "A", "rad/s"] * 4, strict=False)
     )
-    frame = ResidualFrame(BASE, residuals)
-    back = frame_of(to_bag(residual_message(robot, frame).plain), BASE)
+    frame = ResidualFrame(BASE, residuals, 0.912)
+    message = to_bag(residual_message(robot, frame).plain)
+    back = frame_of(message, BASE)
+    assert back.supply == 0.912
+    assert [item.value for item in message.status[TOTAL].values if item.key == "supply"] == [
+        "0.912"
+    ]
+    assert not any(item.key == "supply" for item in message.status[MOTORS[0]].values)
     assert back.codes == frame.codes
     for one, other in zip(back.residuals, frame.residuals, strict=True):
         assert (one.residual == other.residual) or (one.stale and other.stale)

@@ -16,6 +16,7 @@ from tomr_fault_diag.classifier.states import (
     DEGRADED,
     DISOBEYS,
     DRAGGING,
+    LOW_SUPPLY,
     MOTOR,
     NORMAL,
     POWER_SENSOR,
@@ -232,7 +233,7 @@ def test_another_fault_begins_anew_and_its_cause_does_not() -> None:
 def test_every_fault_of_a_part_has_a_measure() -> None:
     measured = {state for measure in MEASURES for state in measure.states}
     assert measured == {
-        *STATES[SLIP:], *DRAGGING, *STUCK, *DEGRADED, *POWER_SENSOR, BURDENED,
+        *STATES[SLIP:], *DRAGGING, *STUCK, *DEGRADED, *POWER_SENSOR, BURDENED, LOW_SUPPLY,
     }  # fmt: skip
     watch = SeverityWatch(ROBOT)
     assert all(watch.severity(state, None) is None for state in (UNKNOWN, DISOBEYS, PUSHED))

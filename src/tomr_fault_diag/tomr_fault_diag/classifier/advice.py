@@ -17,6 +17,7 @@ CHECKS: Mapping[str, str] = {
     "external load": "what the robot pushes or tows, and what leans on it",
     "does not follow its commands": "e-stop, contactor, the drivers' supply, a collision monitor "
     "between cmd_vel and the drivers",
+    "low supply": "the battery's charge, its plugs and its fuse; charge it",
     "unknown": "what the evidence names, and whether robot.yaml still describes this robot",
     "stale": "whether the sensors' drivers and the other two nodes run",
     "not enough data": "the network's load, the sensors' rates and the stamps of their messages",

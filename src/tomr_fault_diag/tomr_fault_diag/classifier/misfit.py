@@ -22,6 +22,8 @@ _AT_LEAST = 2  # wheels that must be expected to turn: one alone may have a faul
 _IGNORED_FOR = to_ns(0.3)
 _FAR = 3.0  # bands
 _FAR_FOR = to_ns(1.0)
+_LOW_FOR = to_ns(1.0)
+_MORE = 0.02  # of the nominal voltage, by which it must rise to be no longer low
 _GAP = to_ns(1.0)  # a longer silence says nothing of what lay in it
 
 
@@ -32,10 +34,12 @@ class Misfit:
     ignores_commands: bool = False  # for a moment already: wheels stand that should turn
     disobeys: bool = False  # and for long enough to be named
     unexplained: bool = False  # some residual has been far out of its band for long
+    low_supply: bool = False  # its voltage has been too low for long
 
 
 class MisfitWatch:
-    """Remembers since when [ns] nothing follows, and each residual lies far out of its band."""
+    """Remembers since when [ns] nothing follows, the supply is low, and each residual lies far out
+    of its band."""
 
     def __init__(self) -> None:
         self.clear()
@@ -44,10 +48,11 @@ class MisfitWatch:
         """Forget what was seen."""
         self._ignored_since: int | None = None
         self._far_since: dict[int, int] = {}
+        self._low_since: int | None = None
         self._last = 0  # ns
 
-    def take(self, frame: ResidualFrame) -> Misfit:
-        """Take the newest tick."""
+    def take(self, frame: ResidualFrame, low_supply: float) -> Misfit:
+        """Take the newest tick; `low_supply`: share of the nominal voltage that is too low."""
         now = frame.stamp_ns
         if now - self._last > _GAP:
             self.clear()
@@ -61,10 +66,16 @@ class MisfitWatch:
         first = TOTAL if any(frame.residuals[index].stale for index in MOTORS) else TOTAL + 1
         far = [index for index in range(first, RESIDUALS) if _is_far(frame.residuals[index])]
         self._far_since = {index: self._far_since.get(index, now) for index in far}
+        is_low = frame.supply < low_supply + (_MORE if self._low_since is not None else 0.0)
+        if not is_low:  # nor where it is not told
+            self._low_since = None
+        elif self._low_since is None:
+            self._low_since = now
         return Misfit(
             ignores,
             self._ignored_since is not None and now - self._ignored_since >= _IGNORED_FOR,
             any(now - since >= _FAR_FOR for since in self._far_since.values()),
+            self._low_since is not None and now - self._low_since >= _LOW_FOR,
         )
 
 

@@ -87,6 +87,9 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
         False,
         read_only=False,
     ),
+    _live(
+        "low_supply", "share of supply.nominal_voltage that is too low; 0: none", 0.88, "", 0.0, 1.0
+    ),
     _live("report_period", "of /diagnostics besides changes", 1.0, "s", 0.05, 60.0),
 )
 
@@ -106,6 +109,7 @@ class ClassifierSettings:
     recovery_time: int = to_ns(0.6)
     slip_recovery_time: int = to_ns(1.0)
     latch: bool = False
+    low_supply: float = 0.88
     report_period: int = to_ns(1.0)
     hardware_id: str = NAMELESS
     input_order: str = "speeds_first"
@@ -135,6 +139,7 @@ class ClassifierSettings:
             recovery_time=to_ns(number("recovery_time")),
             slip_recovery_time=to_ns(number("slip_recovery_time")),
             latch=bool(values["latch"]),
+            low_supply=number("low_supply"),
             report_period=to_ns(number("report_period")),
             hardware_id=str(values["hardware_id"]) or NAMELESS,
             input_order=str(values["input_order"]),

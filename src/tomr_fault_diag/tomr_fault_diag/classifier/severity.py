@@ -26,6 +26,7 @@ from tomr_fault_diag.classifier.states import (
     CONTROL,
     DEGRADED,
     DRAGGING,
+    LOW_SUPPLY,
     MOTOR,
     NORMAL,
     POWER_SENSOR,
@@ -149,6 +150,7 @@ class Tick:
     from_encoders: Array
     commanded: Array
     are_currents: bool
+    supply: float  # voltage over the nominal one
 
     @classmethod
     def of(cls, motors: Motors, frame: ResidualFrame, last: "Tick | None") -> "Tick | None":
@@ -172,6 +174,7 @@ class Tick:
             _modelled([residuals[index] for index in ENCODERS]),
             _modelled(powers),
             powers[0].unit == "A",
+            frame.supply,
         )
 
     @property
@@ -252,6 +255,13 @@ def _doubt(motors: Motors) -> float:
     return float(np.mean(_FRICTION * np.abs(motors.at_floor(still, turning, still)) / motors.load))
 
 
+def _supply(tick: Tick) -> Sums:
+    """Voltage beyond the nominal one, as a share."""
+    if tick.supply != tick.supply:
+        return np.zeros(1), np.zeros(1)
+    return np.ones(1), np.array([tick.supply - 1.0])
+
+
 def _force(tick: Tick) -> Sums:
     """Force against the way that the robot moves [N]."""
     more = tick.current(tick.power, tick.speed) - tick.current(tick.from_encoders, tick.speed)
@@ -285,6 +295,7 @@ MEASURES: tuple[Measure, ...] = (
     Measure("wheel speed shown", "", _speed, STATES[MOTOR:]),
     Measure("traction used", "of the load", _traction, (STATES[SLIP],), 1, True, _doubt),
     Measure("resisting force", "N", _force, (BURDENED,), 1),
+    Measure("supply voltage", "", _supply, (LOW_SUPPLY,), 1, True),
 )
 
 

@@ -10,6 +10,7 @@ from tomr_fault_diag.classifier.severity import Severity, SeverityWatch
 from tomr_fault_diag.classifier.states import (
     BURDENED,
     DISOBEYS,
+    LOW_SUPPLY,
     NORMAL,
     NOT_ENOUGH,
     NOT_OBSERVABLE,
@@ -151,7 +152,7 @@ class FaultClassifier:
         """Look at a frame, if there is something in it, and name a state."""
         data = self._data.take(frame)
         self._unseen = evolve(self._motion.take(frame), blind=data.blind)
-        misfit, self._usable = self._misfits.take(frame), data.usable
+        misfit, self._usable = self._misfits.take(frame, self.settings.low_supply), data.usable
         if not data.usable:
             self._pause(frame, data)
             return
@@ -173,11 +174,7 @@ class FaultClassifier:
 
     def _weigh(self, opinion: Opinion, misfit: Misfit, stamp: int) -> None:
         """Name what the judge is sure of, or what it does not know."""
-        leading = opinion.leading
-        if leading is PUSHED and (misfit.ignores_commands or not opinion.sure):
-            leading = STATES[NORMAL]  # a fault that begins may look like a push at first
-        if leading in _WELL and misfit.unexplained:
-            leading = UNKNOWN
+        leading = _called(opinion, misfit)
         candidate = STATES[NORMAL] if leading in _WELL else leading
         if not _is_one_fault(candidate, self._candidate):
             self._candidate_since, self._sure_since = stamp, None
@@ -187,6 +184,9 @@ class FaultClassifier:
         if leading is UNKNOWN and misfit.unexplained:
             if self._state in _QUIET:
                 self._enter(UNKNOWN, stamp, None)
+        elif leading is LOW_SUPPLY:
+            if self._state in _QUIET or self._is_over(stamp):
+                self._enter(LOW_SUPPLY, stamp, None)
         elif leading in _WELL or ((misfit.ignores_commands or is_blind) and self._state in _QUIET):
             self._settle(stamp, leading)
         elif held and not is_blind and self._may_name(leading, opinion.wheel):
@@ -231,22 +231,30 @@ class FaultClassifier:
             quiet = POWER_SENSOR[ailing[0]]
         if self._state in _QUIET:
             self._enter(quiet, stamp, None)
-        elif self.settings.latch:
-            return
-        elif stamp - self._candidate_since >= self._recovery:
+        elif self._is_over(stamp):
             self._enter(quiet, self._candidate_since, None)
 
-    @property
-    def _recovery(self) -> int:
-        """How long normal must lead before what is named is let go [ns]."""
+    def _is_over(self, stamp: int) -> bool:
+        """Whether something else has led for so long that what is named may be let go."""
         settings = self.settings
         elusive = self._state in _ELUSIVE
-        return settings.slip_recovery_time if elusive else settings.recovery_time
+        recovery = settings.slip_recovery_time if elusive else settings.recovery_time
+        return not settings.latch and stamp - self._candidate_since >= recovery
 
     def _enter(self, state: State, since: int, wheel: int | None) -> None:
         self._wheel = wheel
         if state != self._state:
             self._state, self._since = state, since
+
+
+def _called(opinion: Opinion, misfit: Misfit) -> State:
+    """What leads: as the judge has it, and what it cannot know."""
+    leading = opinion.leading
+    if leading is PUSHED and (misfit.ignores_commands or not opinion.sure):
+        leading = STATES[NORMAL]  # a fault that begins may look like a push at first
+    if misfit.low_supply and (leading in _WELL or not opinion.sure):
+        return LOW_SUPPLY
+    return UNKNOWN if leading in _WELL and misfit.unexplained else leading
 
 
 def _is_one_fault(state: State, other: State) -> bool:

@@ -49,6 +49,7 @@ BURDENED = State("external load", Level.WARN)
 # Something is wrong that is none of these, or what is wrong cannot be told.
 DISOBEYS = State("does not follow its commands", Level.ERROR)
 UNKNOWN = State("unknown", Level.WARN)
+LOW_SUPPLY = State("low supply", Level.WARN)  # its voltage lies below what is normal
 WAITING = State("waiting", Level.OK)  # for a first command: what it asks for is not known
 STALE = State("stale", Level.STALE)  # nothing can be compared
 NOT_ENOUGH = State("not enough data", Level.STALE)  # too many gaps to say anything

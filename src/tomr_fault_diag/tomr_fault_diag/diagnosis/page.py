@@ -43,6 +43,7 @@ _FAULT_COLOURS = {
     "control system fault": "#d62828",
     "motor system fault": "#7b2cbf",
     "does not follow its commands": "#111827",
+    "low supply": "#b45309",
     "unknown": "#f77f00",
     "power sensor fault": "#0077b6",
     "dragging wheel": "#a0522d",

@@ -63,6 +63,7 @@ class ResidualFrame:
 
     stamp_ns: int
     residuals: tuple[Residual, ...]
+    supply: float = float("nan")  # voltage of the supply over the nominal one, where it is told
 
     @property
     def codes(self) -> tuple[int, ...]:

@@ -30,7 +30,7 @@ class SupplyWindow:
         self._period = period_ns
         self._stale = stale_ns
         self._signed = signed
-        self._samples: deque[tuple[int, float, float]] = deque()
+        self._samples: deque[tuple[int, float, float, float]] = deque()
 
     def clear(self) -> None:
         """Forget all samples."""
@@ -39,7 +39,7 @@ class SupplyWindow:
     def add(self, reading: PowerReading) -> None:
         """Take a reading newer than those before."""
         drawn = reading.current if self._signed else abs(reading.current)
-        self._samples.append((reading.stamp_ns, reading.power, drawn))
+        self._samples.append((reading.stamp_ns, reading.power, drawn, reading.voltage))
 
     def at(self, tick_ns: int) -> Measured:
         """Mean over (tick - period, tick]: power, or current if the voltage is unknown."""
@@ -49,5 +49,11 @@ class SupplyWindow:
         powers = [s[1] for s in inside if s[1] == s[1]]  # not NaN
         if powers:
             return Measured(sum(powers) / len(powers), "W")
-        currents = [current for _, _, current in inside if not math.isnan(current)]
+        currents = [current for _, _, current, _ in inside if not math.isnan(current)]
         return Measured(sum(currents) / len(currents) if currents else NAN, "A")
+
+    def voltage_at(self, tick_ns: int) -> float:
+        """Mean voltage over (tick - period, tick] [V], NaN where it is not told."""
+        inside = of_tick(self._samples, tick_ns, self._period, self._stale)
+        voltages = [voltage for _, _, _, voltage in inside if not math.isnan(voltage)]
+        return sum(voltages) / len(voltages) if voltages else NAN

@@ -1,10 +1,12 @@
 """Residuals as a DiagnosticArray and back."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from tomr_fault_diag.residuals.frame import (
     RESIDUALS,
+    TOTAL,
     UNITS,
     Residual,
     ResidualFrame,
@@ -22,14 +24,17 @@ def residual_message(
     robot: Robot, frame: ResidualFrame, hardware_id: str = ""
 ) -> DiagnosticMessage:
     """The message of one frame: a sentence to read, numbers to plot."""
+    names = residual_names(robot.wheel_topics)
     statuses = tuple(
-        _status(name, residual, hardware_id)
-        for name, residual in zip(residual_names(robot.wheel_topics), frame.residuals, strict=True)
+        _status(name, residual, hardware_id, [("supply", f"{frame.supply:.6g}")] * (not place))
+        for place, (name, residual) in enumerate(zip(names, frame.residuals, strict=True))
     )
     return DiagnosticMessage(TOPIC, frame.stamp_ns, statuses)
 
 
-def _status(name: str, residual: Residual, hardware_id: str) -> Status:
+def _status(
+    name: str, residual: Residual, hardware_id: str, more: Sequence[tuple[str, str]]
+) -> Status:
     return Status(
         name,
         _level(residual),
@@ -39,6 +44,7 @@ def _status(name: str, residual: Residual, hardware_id: str) -> Status:
             ("band", f"{residual.band:.6g}"),
             ("code", str(residual.code)),
             ("modelled", f"{residual.modelled:.6g}"),
+            *more,
         ),
         hardware_id,
     )
@@ -69,7 +75,16 @@ def frame_of(message: Any, stamp_ns: int) -> ResidualFrame:
     statuses = message.status
     if len(statuses) != RESIDUALS:
         raise Unusable(f"{len(statuses)} statuses, a frame has {RESIDUALS}")
-    return ResidualFrame(stamp_ns, tuple(_residual(status) for status in statuses))
+    residuals = tuple(_residual(status) for status in statuses)
+    return ResidualFrame(stamp_ns, residuals, _supply(statuses[TOTAL]))
+
+
+def _supply(status: Any) -> float:
+    told = next((item.value for item in status.values if item.key == "supply"), "nan")
+    try:
+        return float(told)
+    except ValueError:
+        raise Unusable(f"{status.name}: supply {told!r} is no number") from None
 
 
 def _residual(status: Any) -> Residual:

@@ -224,7 +224,18 @@ class ResidualStage:
                 *speeds,
                 *(self._derived(wheel, motors[wheel], absent) for wheel in range(WHEELS)),
             ),
+            self._supply_share(tick),
         )
+
+    def _supply_share(self, tick: int) -> float:
+        """Voltage of the supply over the nominal one, NaN where nothing tells it."""
+        told = [window.voltage_at(tick) for window in self._windows]
+        motors = sorted(voltage for voltage in told[:TOTAL] if voltage == voltage)
+        if told[TOTAL] == told[TOTAL]:
+            voltage = told[TOTAL]
+        else:
+            voltage = motors[len(motors) // 2] if motors else NAN
+        return rounded(voltage / self._robot.supply.nominal_voltage)
 
     def _supply(self, tick: int, wheel: int, speed: Residual) -> Measured:
         """What a motor draws, or why that is not known."""
