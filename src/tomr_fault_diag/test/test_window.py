@@ -138,6 +138,16 @@ def test_unknown_power_looks_as_modelled_and_draws_nothing() -> None:
     assert seen[9] > 0.0
 
 
+def test_a_model_that_is_beyond_all_looks_as_modelled() -> None:
+    item = frame(0, ALL)
+    endless = evolve(item.residuals[1], residual=math.inf, modelled=-math.inf)
+    other = evolve(item.residuals[2], residual=-math.inf)
+    seen = channels_of(
+        evolve(item, residuals=(item.residuals[0], endless, other, *item.residuals[3:]))
+    )
+    assert np.isfinite(seen).all()
+
+
 def test_each_wheel_sees_itself_first_and_turning_forwards() -> None:
     window = np.arange(WINDOW * CHANNELS, dtype=float).reshape(WINDOW, CHANNELS) + 1.0
     window[:, 15] *= -1.0  # wheel 2 turns backwards
@@ -378,6 +388,16 @@ def test_what_windows_say_only_slightly_never_adds_up_to_a_drag() -> None:
         for tick in range(400):
             opinion = judge.judge(frame(tick), 50 * MS, Unseen())
         assert opinion.leading is state
+
+
+@pytest.mark.parametrize(("off", "state"), [(1.0, POWER_SENSOR[0]), (-1.0, STATES[NORMAL])])
+def test_no_power_sensor_makes_a_wheel_turn_otherwise(off: float, state: State) -> None:
+    network = Saying()
+    judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]
+    for tick in range(20):
+        item = frame(tick, ALL, speed=(off if off < 0.0 else 0.0, 0.0, 0.0))
+        opinion = _said(network, judge, METERS.start, item)
+    assert opinion.leading is state
 
 
 def test_a_wheel_that_stands_while_it_drags_is_stuck() -> None:

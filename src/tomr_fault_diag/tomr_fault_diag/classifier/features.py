@@ -83,16 +83,12 @@ def _scaled(ratio: Array) -> Array:
 
 def channels_of(frame: ResidualFrame) -> Array:
     """Channels (20,) of one frame, as `channels`; plain floats, ten are too few for numpy."""
-    scaled = [
-        0.0 if item.stale else math.asinh(_FINE * item.residual / item.band)
-        for item in frame.residuals
-    ]
+    scaled = [_finite(_FINE * item.residual / item.band) for item in frame.residuals]
     values = [scaled[TOTAL], _balance(frame)]
     values += [*(scaled[k] for k in _MOTORS), *(scaled[k] for k in _ENCODERS)]
     for k in _MOTORS:
         item = frame.residuals[k]
-        drawn = item.modelled + item.residual
-        values.append(0.0 if item.stale else math.asinh(_FINE * drawn / item.band))
+        values.append(_finite(_FINE * (item.modelled + item.residual) / item.band))
     expected, measured = [], []
     for k in _SPEEDS:
         item = frame.residuals[k]
@@ -110,8 +106,13 @@ def _balance(frame: ResidualFrame) -> float:
     total, motors = frame.residuals[TOTAL], [frame.residuals[k] for k in _MOTORS]
     if total.stale or any(item.stale or item.unit != total.unit for item in motors):
         return 0.0
-    surplus = total.residual - math.fsum(item.residual for item in motors)
-    return math.asinh(_FINE * surplus / min(item.band for item in motors))
+    surplus = total.residual - sum(item.residual for item in motors)
+    return _finite(_FINE * surplus / min(item.band for item in motors))
+
+
+def _finite(ratio: float) -> float:
+    """As the network sees a ratio to a band; what is unknown, or beyond all, is "as modelled"."""
+    return math.asinh(ratio) if math.isfinite(ratio) else 0.0
 
 
 def by_wheel(window: NDArray[Real]) -> NDArray[Real]:

@@ -45,7 +45,7 @@ from tomr_fault_diag.classifier.states import (
     State,
 )
 from tomr_fault_diag.classifier.window_network import WindowNetwork
-from tomr_fault_diag.residuals.frame import INPUT_ORDERS, ResidualFrame
+from tomr_fault_diag.residuals.frame import INPUT_ORDERS, SPEEDS, ResidualFrame
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import WHEELS
 
@@ -57,6 +57,7 @@ _TICK = to_ns(0.05)
 _TOO_LONG = to_ns(0.5)  # between two frames that belong to one window
 _STAYS = 0.1  # of the share of a likelier fault of the same kind
 _STANDING = 6  # ticks
+_FAR = 3.0  # bands
 _STILL = 0.2  # of the expected speed: a slower wheel stands
 # Hypotheses that are named together.
 _GROUPS: tuple[list[int], ...] = (
@@ -154,11 +155,11 @@ class WindowJudge:
         count = 1 if self._slot is None else slot - self._slot
         self._slot = slot
         for _ in range(count):
-            self._opinion = self._step(channels_of(frame), unseen)
+            self._opinion = self._step(channels_of(frame), unseen, _astray(frame))
         return self._opinion
 
-    def _step(self, seen: Array, unseen: Unseen) -> Opinion:
-        """Opinion after one more tick of the network."""
+    def _step(self, seen: Array, unseen: Unseen, astray: list[int]) -> Opinion:
+        """Opinion after one more tick of the network; `astray`: wheels that turn otherwise."""
         self._window[:-1] = self._window[1:]
         self._window[-1] = seen
         self._lacking = max(self._lacking - 1, 0)
@@ -174,6 +175,9 @@ class WindowJudge:
             likelihoods[faults] = np.maximum(likelihoods[faults], likelihoods[NORMAL])
         for moved in unseen.moved:  # no fault turns a wheel that stands: somebody pushes
             likelihoods[[kind.start + moved for kind in _HIDDEN]] = likelihoods[NORMAL]
+        meters = [METERS.start + number for number in astray]
+        # No power sensor makes a wheel turn otherwise.
+        likelihoods[meters] = np.minimum(likelihoods[meters], likelihoods[NORMAL])
         if unseen.everything:  # a robot that stands says the same again and again
             slight = likelihoods - likelihoods[NORMAL] < self.settings.striking
             likelihoods[slight] = likelihoods[NORMAL]
@@ -245,6 +249,12 @@ def _ratios(likelihoods: Array) -> Array:
         ratios[kind] -= max(likelihoods[EXTERNAL] - likelihoods[NORMAL], 0.0)
     ratios[SLIP] += _SLIP_MARGIN
     return np.asarray(ratios)
+
+
+def _astray(frame: ResidualFrame) -> list[int]:
+    """Wheels whose speeds are far out of their bands."""
+    speeds = [frame.residuals[index] for index in SPEEDS]
+    return [wheel for wheel, item in enumerate(speeds) if abs(item.residual) > _FAR * item.band]
 
 
 def _stands(window: Array, wheel: int) -> bool:
