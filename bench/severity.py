@@ -109,15 +109,11 @@ def _recorded(task: tuple[Path, str, float], robot: Path) -> Case:
 
 
 def _practice() -> Iterator[tuple[Path, str, float]]:
-    recordings = Recordings.find()
-    for drive in recordings.drives("drives"):
-        path = recordings.truth / recordings.robot / f"{drive.identity}.json"
-        told = json.loads(path.read_text("utf-8"))["severity"]
-        if not told or not isinstance(told["value"], float):
-            continue
-        is_stuck = told["quantity"] == "torque" and told["value"] > _STUCK
-        if told["quantity"] in _PRACTICE and not is_stuck:
-            yield drive.bag, told["quantity"], told["value"]
+    for drive in Recordings.find().drives("drives"):
+        quantity, value = drive.severity or ("", 0.0)
+        is_stuck = quantity == "torque" and value > _STUCK
+        if quantity in _PRACTICE and not is_stuck:
+            yield drive.bag, quantity, value
 
 
 def _line(kind: str, cases: Sequence[Case]) -> str:

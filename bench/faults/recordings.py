@@ -21,6 +21,7 @@ class Drive:
     bag: Path
     is_normal: bool  # nothing goes wrong in it, from start to end
     bumps_ns: tuple[int, ...]  # stamps at which something pushes it
+    severity: tuple[str, float] | None = None  # quantity and value, where it is a number
 
 
 @frozen
@@ -64,7 +65,10 @@ class Recordings:
             is_normal = told["onset"] is None and told["extended"] == "none"
             start = int(told["t0_ns"])
             bumps = [start + round(1e9 * bump["t"]) for bump in told.get("bumps") or ()]
-            found.append(Drive(bag.name, bag, is_normal, tuple(bumps)))
+            size = told.get("severity") or {}
+            has_size = isinstance(size.get("value"), float)
+            severity = (size["quantity"], size["value"]) if has_size else None
+            found.append(Drive(bag.name, bag, is_normal, tuple(bumps), severity))
         return tuple(found)
 
     def real(self) -> Mapping[str, Any]:

@@ -7,16 +7,25 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from tomr_fault_diag.classifier.severity import Severity
+from tomr_fault_diag.classifier.stage import Diagnosis
+from tomr_fault_diag.classifier.states import STATES
 from tomr_fault_diag.cli.diagnose import EXIT_UNDECIDED, _exit_code
 from tomr_fault_diag.diagnosis.heard import Heard
 from tomr_fault_diag.diagnosis.labels import Label
 from tomr_fault_diag.diagnosis.page import colour_of, index_page, time_line
 from tomr_fault_diag.diagnosis.replayed import Failed, Phase, Replayed, Task
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
-from tomr_fault_diag.diagnosis.summary import Episode, Summary
+from tomr_fault_diag.diagnosis.summary import Episode, Summariser, Summary
 from tomr_fault_diag.diagnosis.track import Health, Said, Track, Tracker
-from tomr_fault_diag.diagnosis.words import as_json, bag_line, phases_line, verdict
-from tomr_fault_diag.residuals.frame import MOTORS, SPEEDS
+from tomr_fault_diag.diagnosis.words import (
+    as_json,
+    bag_line,
+    phases_line,
+    summary_lines,
+    verdict,
+)
+from tomr_fault_diag.residuals.frame import MOTORS, SPEEDS, Residual, ResidualFrame
 from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.plain import Level, Status
 
@@ -97,6 +106,32 @@ def test_names_are_text(page: str) -> None:
 def test_a_state_has_one_colour_on_every_page() -> None:
     assert colour_of("motor system fault 1") == colour_of("motor system fault 3")
     assert len({colour_of(state) for state in ("normal", "slip", "unknown", "stale")}) == 4
+
+
+def test_how_bad_it_was_stands_on_the_page_in_the_lines_and_in_the_numbers() -> None:
+    plain = summary(("slip", 2.0))
+    severity = Severity("traction used", "of the load", 0.05, 0.04, 0.06)
+    worst = evolve(plain.episodes[1], severity=severity)
+    found = evolve(plain, episodes=(plain.episodes[0], worst))
+    words = "traction used 0.05 of the load (0.04 to 0.06 of the load)"
+    assert time_line(replayed(found), [track()], [], WHEELS).count(words) == 1
+    assert [line.strip() for line in summary_lines(found, START)].count(words) == 1
+    first, second = as_json(replayed(found))["episodes"]
+    assert first["severity"] is None
+    assert second["severity"]["value"] == 0.05
+    assert second["severity"]["high"] == 0.06
+
+
+def test_an_episode_keeps_the_severity_told_last() -> None:
+    summariser = Summariser()
+    frame = ResidualFrame(START, (Residual(0.0, 1.0, 0.0),) * 10)
+    severities = [Severity("x", "N", value, 0.0, 9.0) for value in (1.0, 2.0)]
+    for severity in (None, *severities, None):
+        diagnosis = Diagnosis(START, STATES[1], START, (), frame, False, severity=severity)
+        summariser.diagnosis(diagnosis, [])
+        summariser.frame(frame)
+    (episode,) = summariser.summary().episodes
+    assert episode.severity == severities[1]
 
 
 def test_a_fault_in_one_phase_only_is_a_fault() -> None:

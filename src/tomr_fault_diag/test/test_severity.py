@@ -8,7 +8,9 @@ import pytest
 from attrs import evolve
 
 from tomr_fault_diag.classifier.messages import diagnosis_message
-from tomr_fault_diag.classifier.severity import MEASURES, SeverityWatch, _student
+from tomr_fault_diag.classifier.severity import SeverityWatch
+from tomr_fault_diag.classifier.severity.measures import MEASURES
+from tomr_fault_diag.classifier.severity.watch import _student
 from tomr_fault_diag.classifier.stage import Diagnosis
 from tomr_fault_diag.classifier.states import (
     BURDENED,
@@ -94,7 +96,7 @@ def test_friction_added() -> None:
 def test_a_winding_that_heats_more() -> None:
     shown = power(CURRENT, SPEED) + np.array([0.5 * RESISTANCE * CURRENT[0] ** 2, 0.0, 0.0])
     words = told(DEGRADED[0], 0, lambda tick: frame(tick, shown))
-    assert words == "winding resistance, or a loss like it, +50 % (+48 to +53 %)"
+    assert words == "winding resistance, or a loss like it, +50 % (+47 to +52 %)"
 
 
 def test_a_power_sensor_that_shows_too_little() -> None:
@@ -150,14 +152,30 @@ def test_traction_is_what_wheels_hand_to_the_floor() -> None:
     )
 
 
-def test_currents_need_no_power() -> None:
-    watch = SeverityWatch(ROBOT)
-    shown = CURRENT + np.array([0.2, 0.0, 0.0])
+@pytest.mark.parametrize("signed", [True, False])
+def test_currents_need_no_power(signed: bool) -> None:
+    measurement = evolve(ROBOT.measurement, quantity="motor_current", signed=signed)
+    watch = SeverityWatch(evolve(ROBOT, measurement=measurement))
+    more, current = CURRENT + np.array([0.0, -0.2, 0.0]), CURRENT
+    if not signed:
+        more, current = np.abs(more), np.abs(current)
     for tick in range(100):
-        watch.take(frame(tick, shown, unit="A"), DRAGGING[0], 0)
-    found = watch.severity(DRAGGING[0], 0)
+        watch.take(frame(tick, more, current=current, unit="A"), DRAGGING[1], 1)
+    found = watch.severity(DRAGGING[1], 1)
     assert found is not None
     assert found.value == pytest.approx(0.14)
+
+
+def test_currents_of_a_supply_whose_voltage_is_not_told_are_powers() -> None:
+    watch = SeverityWatch(ROBOT)
+    shown, current = (
+        power(CURRENT + more, SPEED) / 24.0 for more in (np.array([0.0, -0.2, 0.0]), 0.0)
+    )
+    for tick in range(100):
+        watch.take(frame(tick, shown, current=current, unit="A"), DRAGGING[1], 1)
+    found = watch.severity(DRAGGING[1], 1)
+    assert found is not None
+    assert found.value == pytest.approx(0.14, rel=0.01)
 
 
 def test_the_other_way_around_it_is_as_bad() -> None:

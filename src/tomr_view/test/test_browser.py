@@ -89,6 +89,7 @@ def test_a_recording_is_shown_and_scrubbed(
     assert text("state") == "motor system fault 3 (wheel_3_joint)"
     assert evaluate("document.getElementById('state').dataset.level") == "2"
     assert "wheel_3 power: " in text("evidence")
+    assert text("severity").startswith("wheel speed shown -")
     assert "of 21.9 s" in text("moment")
     assert text("link") == ""
     assert evaluate("document.getElementById('faults').hidden") is True

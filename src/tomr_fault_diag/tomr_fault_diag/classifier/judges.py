@@ -30,6 +30,7 @@ from tomr_fault_diag.classifier.belief import (
     of_states,
 )
 from tomr_fault_diag.classifier.features import CHANNELS, WINDOW, channels_of, turning
+from tomr_fault_diag.classifier.misfit import is_far
 from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
@@ -57,7 +58,6 @@ _TICK = to_ns(0.05)
 _TOO_LONG = to_ns(0.5)  # between two frames that belong to one window
 _STAYS = 0.1  # of the share of a likelier fault of the same kind
 _STANDING = 6  # ticks
-_FAR = 3.0  # bands
 _STILL = 0.2  # of the expected speed: a slower wheel stands
 # Hypotheses that are named together.
 _GROUPS: tuple[list[int], ...] = (
@@ -253,8 +253,7 @@ def _ratios(likelihoods: Array) -> Array:
 
 def _astray(frame: ResidualFrame) -> list[int]:
     """Wheels whose speeds are far out of their bands."""
-    speeds = [frame.residuals[index] for index in SPEEDS]
-    return [wheel for wheel, item in enumerate(speeds) if abs(item.residual) > _FAR * item.band]
+    return [wheel for wheel, index in enumerate(SPEEDS) if is_far(frame.residuals[index])]
 
 
 def _stands(window: Array, wheel: int) -> bool:

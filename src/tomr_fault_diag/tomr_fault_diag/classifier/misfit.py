@@ -64,7 +64,7 @@ class MisfitWatch:
             self._ignored_since = now
         # What no motor takes of the total is the computer's: it counts where they are not known.
         first = TOTAL if any(frame.residuals[index].stale for index in MOTORS) else TOTAL + 1
-        far = [index for index in range(first, RESIDUALS) if _is_far(frame.residuals[index])]
+        far = [index for index in range(first, RESIDUALS) if is_far(frame.residuals[index])]
         self._far_since = {index: self._far_since.get(index, now) for index in far}
         is_low = frame.supply < low_supply + (_MORE if self._low_since is not None else 0.0)
         if not is_low:  # nor where it is not told
@@ -88,5 +88,6 @@ def _ignores_commands(speeds: list[Residual]) -> bool:
     )
 
 
-def _is_far(item: Residual) -> bool:
+def is_far(item: Residual) -> bool:
+    """Whether a residual is far out of its band."""
     return abs(item.residual) > _FAR * item.band  # false where either is NaN

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from attrs import frozen
 
-from tomr_fault_diag.residuals.frame import SPEEDS, Residual, ResidualFrame
+from tomr_fault_diag.residuals.frame import SPEEDS, Residual, ResidualFrame, measured_speed
 from tomr_power_model.model.ticks import to_ns
 
 _TURNING = 0.5  # rad/s: a slower wheel counts as idle
@@ -95,6 +95,4 @@ def _is_told_to_turn(speed: Residual) -> bool:
 
 def _turns(speed: Residual) -> bool:
     """One that is not known may."""
-    expected = speed.modelled
-    measured = expected + (-speed.residual if expected < 0.0 else speed.residual)
-    return not abs(measured) < _TURNING
+    return not abs(measured_speed(speed)) < _TURNING
