@@ -240,6 +240,16 @@ def test_other_faults_are_named_beside_a_low_supply_and_leave_it_behind() -> Non
     ]
 
 
+def test_a_fault_that_is_not_sure_is_not_named_beside_a_low_supply() -> None:
+    class Unsure(Sure):
+        def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+            return evolve(super().judge(frame, elapsed_ns, unseen), sure=False)
+
+    classifier = FaultClassifier(Unsure(CONTROL))
+    found = [classifier.classify(item) for item in _supplied({0: 0.8})]
+    assert [item.state.name for item in found if item is not None][-1] == "low supply"
+
+
 def test_what_is_low_is_set_and_0_is_never() -> None:
     judge = Sure(NORMAL)
     judge.settings = ClassifierSettings(low_supply=0.0)

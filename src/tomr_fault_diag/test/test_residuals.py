@@ -1,6 +1,7 @@
 """The residual stage: codes, bands, staleness, and the ways in which power may be published."""
 
 import math
+import random
 from collections.abc import Callable
 from types import SimpleNamespace as Message
 from typing import Any
@@ -307,6 +308,27 @@ def test_an_input_that_sends_what_cannot_be_used_says_so(
             said.update({status.name: status.message for status in report.statuses})
     assert said.pop(f"inputs: {topic}") == words
     assert set(said.values()) == {"as it should be"}
+
+
+def test_samples_that_come_in_another_order_are_a_gap_until_the_clock_begins_anew() -> None:
+    stage, found = ResidualStage(_robot()), []
+    takers = {item.topic: item.take for item in residual_inputs(_robot(), stage)}
+    dice = random.Random(3)
+    for number in range(300):
+        # After 2 s another clock, and true stamps.
+        begin, by = (0, 0.1) if number < 200 else (-90_000, 0.0)
+        stamp = BASE + (begin + 10 * number) * MS
+        message = _joints(stamp)
+        message.position = message.position + message.velocity * dice.gauss(0.0, by)
+        if number % 5 == 0:
+            stage.prediction(_prediction(stamp))
+        for topic, make in WATTS.items():
+            takers[topic](make(stamp), stamp)
+        takers["joint_states"](message, stamp)
+        found += stage.due()
+    speeds = [frame.residuals[SPEEDS[0]].missing for frame in found]
+    assert set(speeds[12:38]) == {"a gap in joint_states: its stamps do not fit"}
+    assert speeds[-10:] == [""] * 10
 
 
 def test_an_angle_that_no_wheel_reaches_is_no_sample_unless_it_stays() -> None:

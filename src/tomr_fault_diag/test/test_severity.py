@@ -7,11 +7,15 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from tomr_fault_diag.classifier.judges import Opinion
 from tomr_fault_diag.classifier.messages import diagnosis_message
+from tomr_fault_diag.classifier.observability import Unseen
+from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.severity import SeverityWatch
 from tomr_fault_diag.classifier.severity.measures import MEASURES
+from tomr_fault_diag.classifier.severity.tick import Motors, Tick
 from tomr_fault_diag.classifier.severity.watch import _student
-from tomr_fault_diag.classifier.stage import Diagnosis
+from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import (
     BURDENED,
     CONTROL,
@@ -99,6 +103,45 @@ def test_a_winding_that_heats_more() -> None:
     assert words == "winding resistance, or a loss like it, +50 % (+47 to +52 %)"
 
 
+def test_a_wheel_that_stands_tells_nothing_of_its_winding() -> None:
+    shown = power(CURRENT, SPEED) + np.array([0.5 * RESISTANCE * CURRENT[0] ** 2, 0.0, 0.0])
+    still = SPEED * np.array([0.0, 1.0, 1.0])
+
+    def now_and_then(tick: int) -> ResidualFrame:
+        if tick // 10 % 2:
+            return frame(tick, power(CURRENT, still) + 1.0, still, still)
+        return frame(tick, shown)
+
+    words = told(DEGRADED[0], 0, now_and_then)
+    assert words == "winding resistance, or a loss like it, +50 % (+47 to +52 %)"
+
+
+def test_currents_do_not_tell_what_a_winding_loses() -> None:
+    measurement = evolve(ROBOT.measurement, quantity="motor_current")
+    watch = SeverityWatch(evolve(ROBOT, measurement=measurement))
+    for tick in range(100):
+        watch.take(frame(tick, 1.5 * CURRENT, unit="A"), DEGRADED[0], 0)
+    assert watch.severity(DEGRADED[0], 0) is None
+
+
+def test_a_robot_that_hardly_moves_tells_no_force() -> None:
+    speed = 0.01 / RADIUS * np.sin(np.radians([0.0, 120.0, 240.0]))  # 0.01 m/s ahead
+    watch = SeverityWatch(ROBOT)
+    for tick in range(100):
+        watch.take(frame(tick, power(CURRENT + 1.0, speed), speed, speed), BURDENED, None)
+    assert watch.severity(BURDENED, None) is None
+
+
+def test_a_voltage_that_is_not_told_leaves_out_its_ticks() -> None:
+    watch = SeverityWatch(ROBOT)
+    for tick in range(100):
+        supply = NAN if tick % 2 else 0.8
+        watch.take(evolve(frame(tick, power(CURRENT, SPEED)), supply=supply), LOW_SUPPLY, None)
+    found = watch.severity(LOW_SUPPLY, None)
+    assert found is not None
+    assert found.value == pytest.approx(-0.2)
+
+
 def test_a_power_sensor_that_shows_too_little() -> None:
     shown = power(CURRENT, SPEED) * np.array([1.0, 1.0, 0.6])
     words = told(POWER_SENSOR[2], 2, lambda tick: frame(tick, shown))
@@ -152,6 +195,41 @@ def test_traction_is_what_wheels_hand_to_the_floor() -> None:
     )
 
 
+def test_the_wheels_that_push_hardest_tell_the_traction() -> None:
+    # Of the load, by the cubes of the forces: (0.06**4 + 2 * 0.03**4) / (0.06**3 + 2 * 0.03**3).
+    load, speed = 5.0 * 9.80665, np.array([4.0, 4.0, 4.0])
+    torque = 0.06 + 0.004 * 4.0 + np.array([0.06, 0.03, 0.03]) * load * RADIUS
+    shown = power(torque / CONSTANT, speed)
+    watch = SeverityWatch(ROBOT)
+    for tick in range(100):
+        watch.take(frame(tick, shown, speed, speed), STATES[SLIP], None)
+    found = watch.severity(STATES[SLIP], None)
+    assert found is not None
+    assert found.value == pytest.approx(0.054, rel=1e-3)
+
+
+def test_a_tick_knows_how_fast_its_speeds_change() -> None:
+    motors = Motors(ROBOT)
+    shown, faster = power(CURRENT, SPEED), np.array([0.1, -0.2, 0.0])
+    first = Tick.of(motors, frame(0, shown), None)
+    assert first is not None
+    assert first.change.tolist() == [0.0, 0.0, 0.0]
+    second = Tick.of(motors, frame(2, shown, SPEED + faster), first)
+    assert second is not None
+    np.testing.assert_allclose(second.change, faster / 0.1)
+    late = Tick.of(motors, frame(8, shown, SPEED + faster), first)
+    assert late is not None
+    assert late.change.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_what_turns_wheels_faster_is_not_handed_to_the_floor() -> None:
+    motors, still = Motors(ROBOT), np.zeros(3)
+    faster = motors.forces(CURRENT, SPEED, np.array([10.0, 0.0, 0.0]))
+    steady = motors.forces(CURRENT, SPEED, still)
+    inertia = ROBOT.motors[0].rotor_inertia * ROBOT.motors[0].gear_ratio ** 2 + ROBOT.wheel_inertia
+    np.testing.assert_allclose(steady - faster, [10.0 * inertia / RADIUS, 0.0, 0.0])
+
+
 @pytest.mark.parametrize("signed", [True, False])
 def test_currents_need_no_power(signed: bool) -> None:
     measurement = evolve(ROBOT.measurement, quantity="motor_current", signed=signed)
@@ -198,6 +276,18 @@ def test_what_a_robot_shows_that_is_well_widens_the_interval() -> None:
         lambda tick: frame(tick, power(lacking, SPEED)),
     )
     assert words == "friction added 0.14 N m (0.098 to 0.182 N m)"
+
+
+def test_what_a_pushed_robot_shows_is_not_how_it_is_when_it_is_well() -> None:
+    more, pushed = (power(CURRENT + np.array([0.0, by, 0.0]), SPEED) for by in (-0.2, -0.05))
+    watch = SeverityWatch(ROBOT)
+    for tick in range(200):
+        well = tick < 100
+        state = PUSHED if well else DRAGGING[1]
+        watch.take(frame(tick, pushed if well else more), state, None if well else 1)
+    found = watch.severity(DRAGGING[1], 1)
+    assert found is not None
+    assert found.words == "friction added 0.14 N m (0.133 to 0.147 N m)"
 
 
 def test_what_may_be_nothing_is_not_told() -> None:
@@ -275,3 +365,33 @@ def test_a_message_tells_it() -> None:
 @pytest.mark.parametrize(("freedom", "quantile"), [(3, 3.182), (5, 2.571), (20, 2.086)])
 def test_students_quantile(freedom: int, quantile: float) -> None:
     assert _student(freedom) == pytest.approx(quantile, rel=0.01)
+
+
+def test_after_a_clock_goes_back_it_is_told_anew() -> None:
+    more = power(CURRENT + np.array([0.0, -0.2, 0.0]), SPEED)
+    found = []
+    classifier = FaultClassifier(Dragging(), SeverityWatch(ROBOT))
+    for tick in (*range(1000, 1200), *range(100, 140)):
+        diagnosis = classifier.classify(frame(tick, more))
+        if diagnosis is not None:
+            found.append((diagnosis.stamp_ns, diagnosis.severity is not None))
+    before = [told for stamp, told in found if stamp > BASE + 500 * 50 * MS]
+    again = [told for stamp, told in found if stamp < BASE + 500 * 50 * MS]
+    assert before[-1]
+    assert again
+    assert not any(again)
+
+
+class Dragging:
+    """A judge that is sure of a wheel that drags."""
+
+    settings = ClassifierSettings()
+
+    def clear(self) -> None:
+        pass
+
+    def interrupt(self) -> None:
+        pass
+
+    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+        return Opinion(np.eye(6)[MOTOR + 1], sure=True, wheel=1, state=DRAGGING[1])

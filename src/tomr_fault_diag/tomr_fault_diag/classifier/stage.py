@@ -119,7 +119,7 @@ class FaultClassifier:
         before = self._state
         self._decide(frame, elapsed)
         assert self._state is not None
-        if self._severity is not None and self._usable:
+        if self._severity is not None:
             self._severity.take(frame, self._state, self._wheel)
         changed = self._state != before
         if not changed and not self._is_periodic(frame.stamp_ns, elapsed):

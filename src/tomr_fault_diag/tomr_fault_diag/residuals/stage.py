@@ -2,7 +2,6 @@
 
 import math
 from collections import deque
-from statistics import median
 from typing import Self
 
 from attrs import evolve, frozen
@@ -21,6 +20,7 @@ from tomr_fault_diag.residuals.frame import (
 )
 from tomr_fault_diag.residuals.measured import Measured, SupplyWindow
 from tomr_fault_diag.residuals.repeats import RepeatWatch, Work
+from tomr_fault_diag.residuals.scatter import ScatterWatch
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_power_model.drive.plausible import PowerLimits, fastest_wheel
 from tomr_power_model.drive.sources import (
@@ -38,7 +38,6 @@ from tomr_power_model.model.encoders import (
     EncoderSample,
     EncoderWindow,
     Triple,
-    WheelEstimate,
 )
 from tomr_power_model.model.input_health import InputReporter, InputState
 from tomr_power_model.model.prediction import Prediction
@@ -54,7 +53,6 @@ _TRANSIENT = to_ns(0.15)
 _FEWEST = 2  # ticks, of slow decisions
 
 _UNSURE = 0.5  # bands: a speed is not known whose standard deviation is larger
-_SCATTERS = 20  # ticks over which the scatter of stamps is looked at
 _TURNS = 0.3  # rad/s: a slower wheel may rest
 
 _UNKNOWN_READINGS = (UNKNOWN_READING, UNKNOWN_READING, UNKNOWN_READING)
@@ -111,7 +109,7 @@ class ResidualStage:
         self._predictions: dict[int, Prediction] = {}
         lately = max(_FEWEST, round(_TRANSIENT / ticks.period))
         self._recent: deque[_Modelled] = deque(maxlen=lately)
-        self._scatter: deque[float] = deque(maxlen=_SCATTERS)
+        self._scatter = ScatterWatch()
         self._decided = 0  # newest tick
 
     def retune(self, bands: BandSettings) -> None:
@@ -203,6 +201,7 @@ class ResidualStage:
                 watch.clear()
             self._decided = 0
             self._encoders.leap()
+            self._scatter.clear()
             self._predictions.clear()
             self._recent.clear()
         return arrival
@@ -300,7 +299,10 @@ class ResidualStage:
         pauses = self._encoders.continuity.is_broken(tick)
         is_fresh = tick - self._encoders.continuity.last(tick) < self.settings.stale
         reason = f"{GAP}{ENCODERS}" if pauses and is_fresh else "no fresh joint_states"
-        scatter = self._scatter_of(estimate)
+        self._scatter.take(estimate)
+        scatter, disorder = self._scatter.seconds, self._scatter.is_disorder
+        if disorder:
+            reason = f"{GAP}{ENCODERS}: its stamps do not fit"
         speeds = []
         for wheel, value in enumerate(estimate.speed.tolist()):
             models = [past.speed[wheel] for past in self._recent]
@@ -309,7 +311,9 @@ class ResidualStage:
             sign = -1.0 if model < 0.0 else 1.0
             spread = bands.speed_transient * _spread(models)
             band = max(bands.speed, bands.speed_relative * abs(model)) + spread
-            if estimate.gain * scatter * max(abs(model), abs(value)) > _UNSURE * band:
+            if disorder:
+                value = NAN
+            elif estimate.gain * scatter * max(abs(model), abs(value)) > _UNSURE * band:
                 value, reason = NAN, SCATTER
             missing = _missing(value, model, reason, absent)
             speeds.append(
@@ -318,12 +322,6 @@ class ResidualStage:
                 )
             )
         return speeds
-
-    def _scatter_of(self, estimate: WheelEstimate) -> float:
-        """How far the times of encoder samples have scattered lately [s]."""
-        if estimate.scatter == estimate.scatter:  # not NaN
-            self._scatter.append(estimate.scatter)
-        return median(self._scatter) if self._scatter else 0.0
 
     def _least(self, unit: Unit) -> float:
         bands = self.settings.bands

@@ -1,0 +1,67 @@
+"""Stamps that scatter: how far the samples lie off the motion that they show."""
+
+import random
+from collections.abc import Callable
+
+from tomr_fault_diag.residuals.scatter import ScatterWatch
+from tomr_power_model.model.encoders import EncoderSample, EncoderWindow
+
+MS = 1_000_000
+BASE = 1_700_000_000_000 * MS
+NOTHING = (float("nan"),) * 3
+SPEED = 8.0  # rad/s of the fastest wheel
+
+Angle = Callable[[float], float]  # rad, at a time [s]
+
+
+def _watched(times: list[int], angle: Angle) -> ScatterWatch:
+    """Of samples every 10 ms that were taken at other times [ms], over 3 s."""
+    window = EncoderWindow(100 * MS, 50 * MS, 200 * MS)
+    watch = ScatterWatch()
+    for number, time in enumerate(times):
+        turned = angle(1e-3 * time)
+        positions = (turned, -0.5 * turned, -0.5 * turned)
+        window.add(EncoderSample(BASE + 10 * number * MS, positions, NOTHING))
+        if number % 5 == 4:
+            watch.take(window.at(BASE + 10 * number * MS))
+    return watch
+
+
+def _jittered(deviation: float) -> list[int]:
+    dice = random.Random(3)
+    return sorted(round(10 * number + dice.gauss(0.0, deviation)) for number in range(300))
+
+
+def _shuffled(deviation: float) -> list[int]:
+    dice = random.Random(3)
+    return sorted(range(0, 3000, 10), key=lambda time: time + dice.gauss(0.0, deviation))
+
+
+def test_true_stamps_do_not_scatter() -> None:
+    watch = _watched(list(range(0, 3000, 10)), lambda time: SPEED * time)
+    assert watch.seconds < 1e-9
+    assert not watch.is_disorder
+
+
+def test_samples_in_another_order_than_they_were_taken_in_are_disorder() -> None:
+    assert _watched(_shuffled(200.0), lambda time: SPEED * time).is_disorder
+
+
+def test_stamps_that_jitter_by_milliseconds_are_no_disorder() -> None:
+    watch = _watched(_jittered(5.0), lambda time: SPEED * time)
+    assert watch.seconds > 0.001
+    assert not watch.is_disorder
+
+
+def test_coarse_encoders_of_a_slow_robot_are_no_disorder() -> None:
+    count = 0.15  # rad: 42 a turn
+    watch = _watched(list(range(0, 3000, 10)), lambda time: count * round(2.0 * time / count))
+    assert watch.seconds > 0.015  # as much as in disorder
+    assert not watch.is_disorder
+
+
+def test_what_was_seen_can_be_forgotten() -> None:
+    watch = _watched(_shuffled(200.0), lambda time: SPEED * time)
+    watch.clear()
+    assert not watch.is_disorder
+    assert watch.seconds == 0.0

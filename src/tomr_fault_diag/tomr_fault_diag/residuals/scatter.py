@@ -1,0 +1,43 @@
+"""How far the stamps of encoder samples scatter about the motion that their angles show."""
+
+from collections import deque
+from statistics import median
+
+import numpy as np
+
+from tomr_power_model.model.encoders import WheelEstimate
+
+_TICKS = 20  # that moved, looked at
+# Samples that scatter by so much time and, which coarse encoders do not reach, so far come in
+# another order than they were taken in: no stamp can be trusted, neither those of powers.
+_DISORDER = 0.015  # s
+_DISORDER_ANGLE = 0.15  # rad
+
+
+class ScatterWatch:
+    """Remembers how the last estimates fitted their samples."""
+
+    def __init__(self) -> None:
+        self._seconds: deque[float] = deque(maxlen=_TICKS)
+        self._angles: deque[float] = deque(maxlen=_TICKS)  # rad
+
+    def clear(self) -> None:
+        """Forget all estimates."""
+        self._seconds.clear()
+        self._angles.clear()
+
+    def take(self, estimate: WheelEstimate) -> None:
+        """Take the estimate of a tick; one whose scatter does not show changes nothing."""
+        if estimate.scatter == estimate.scatter:  # not NaN
+            self._seconds.append(estimate.scatter)
+            self._angles.append(estimate.scatter * float(np.linalg.norm(estimate.speed)))
+
+    @property
+    def seconds(self) -> float:
+        """Scatter of the samples' times [s], 0 where none was seen."""
+        return median(self._seconds) if self._seconds else 0.0
+
+    @property
+    def is_disorder(self) -> bool:
+        """Whether the samples come in another order than they were taken in."""
+        return self.seconds > _DISORDER and median(self._angles) > _DISORDER_ANGLE
