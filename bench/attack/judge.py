@@ -51,6 +51,7 @@ _NODES = (
     "tomr_fault_diag.nodes.fault_classifier_node",
 )
 _ANSWERS = (0, 1, 2, 3)  # 3: nothing could be decided
+_LISTINGS = frozenset({"--parameters", "--help"})  # options that end a command before it works
 _QUIET = ("note:", "warning:", "error:", "usage:", "interrupted")
 
 
@@ -205,6 +206,8 @@ def _false_word(given: Attack, code: int, output: str) -> str:
     if given.tool == "tomr_gap" and code == 1 and given.names is not None and not given.names:
         return "false word: mismatch"
     if given.tool != "tomr_diagnose" or code not in (0, 1) or "--json" not in given.arguments:
+        return ""
+    if not _LISTINGS.isdisjoint(given.arguments):
         return ""
     try:
         found = json.loads(output)
