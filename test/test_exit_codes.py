@@ -123,6 +123,36 @@ def test_a_signal_while_modules_load(number: int, code: int) -> None:
     assert (run.returncode, run.stderr) == (code, "interrupted\n")
 
 
+_FINALISER = """
+import os, signal, sys, time
+from tomr_power_model.cli import run_main
+class Last:
+    def __del__(self):
+        os.kill(os.getpid(), {number})
+        time.sleep(0.0)
+def main(_):
+    last = Last()
+    del last
+    time.sleep(20)
+    return 0
+sys.exit(run_main(main))
+"""
+
+
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=["INT", "TERM"]
+)
+def test_a_signal_in_a_finaliser_is_not_lost(number: int, code: int) -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", _FINALISER.format(number=int(number))],
+        capture_output=True,
+        text=True,
+        timeout=15,
+        env=_environment(),
+    )
+    assert (run.returncode, run.stderr) == (code, "interrupted\n")
+
+
 _TWICE = """
 import os, signal
 from tomr_power_model.nodes.stage_node import StopRequest

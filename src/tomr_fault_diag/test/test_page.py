@@ -122,6 +122,27 @@ def test_how_bad_it_was_stands_on_the_page_in_the_lines_and_in_the_numbers() -> 
     assert second["severity"]["high"] == 0.06
 
 
+def test_what_has_changed_slowly_stands_there_too() -> None:
+    changes = (Severity("payload", "kg", 3.0, 2.5, 3.5),)
+    found = evolve(summary(), conditions=changes)
+    words = "payload 3 kg (2.5 to 3.5 kg)"
+    page = time_line(replayed(found), [track()], [], WHEELS)
+    assert f"Changed slowly, and no fault: {words}." in page
+    assert f"  changed: {words}" in list(summary_lines(found, START))
+    assert as_json(replayed(found))["conditions"][0]["value"] == 3.0
+    assert "Changed slowly" not in time_line(replayed(summary()), [track()], [], WHEELS)
+
+
+def test_the_conditions_told_last_stand() -> None:
+    summariser, frame = Summariser(), ResidualFrame(START, (Residual(0.0, 1.0, 0.0),) * 10)
+    changes = [(Severity("x", "kg", value, 0.0, 9.0),) for value in (1.0, 2.0)]
+    for conditions in changes:
+        diagnosis = Diagnosis(START, STATES[1], START, (), frame, False, conditions=conditions)
+        summariser.diagnosis(diagnosis, [])
+        summariser.frame(frame)
+    assert summariser.summary().conditions == changes[1]
+
+
 def test_an_episode_keeps_the_severity_told_last() -> None:
     summariser = Summariser()
     frame = ResidualFrame(START, (Residual(0.0, 1.0, 0.0),) * 10)

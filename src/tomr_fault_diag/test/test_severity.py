@@ -12,9 +12,9 @@ from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.severity import SeverityWatch
+from tomr_fault_diag.classifier.severity.interval import student
 from tomr_fault_diag.classifier.severity.measures import MEASURES
 from tomr_fault_diag.classifier.severity.tick import Motors, Tick
-from tomr_fault_diag.classifier.severity.watch import _student
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import (
     BURDENED,
@@ -364,7 +364,7 @@ def test_a_message_tells_it() -> None:
 
 @pytest.mark.parametrize(("freedom", "quantile"), [(3, 3.182), (5, 2.571), (20, 2.086)])
 def test_students_quantile(freedom: int, quantile: float) -> None:
-    assert _student(freedom) == pytest.approx(quantile, rel=0.01)
+    assert student(freedom) == pytest.approx(quantile, rel=0.01)
 
 
 def test_after_a_clock_goes_back_it_is_told_anew() -> None:

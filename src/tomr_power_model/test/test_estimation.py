@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from attrs import evolve
 from numpy.typing import NDArray
+from scipy.linalg import cho_solve
 from scipy.optimize import least_squares, lsq_linear
 from scipy.stats import multivariate_normal
 
+from tomr_power_model.estimation.factor import posterior_factor
 from tomr_power_model.estimation.gauss_newton import (
     GaussNewtonSettings,
     Linearisation,
@@ -186,3 +188,16 @@ def test_blocks_are_long_against_correlation_and_drives_where_there_are_many() -
 def test_coordinates_of_the_mass_centre_are_set_one_by_one() -> None:
     base = ParameterisedRobot(read_description("reference"), "reference")
     assert base.given({"robot.mass_center.y": 0.03}).robot.mass_center[1] == 0.03
+
+
+def test_large_columns_that_are_alike_do_not_end_a_fit() -> None:
+    column = np.random.default_rng(3).normal(size=(2000, 1)) * 1e8
+    columns = column * np.array([[1.0, 3.0, 1.0 + 1e-16, 0.3]])
+    factor = posterior_factor(columns.T @ columns)
+    found = cho_solve(factor, columns.T @ column[:, 0])
+    np.testing.assert_allclose(columns @ found, column[:, 0], rtol=1e-6)
+
+
+def test_the_factor_is_of_the_prior_and_the_data() -> None:
+    root = np.tril(posterior_factor(np.array([[3.0, 1.0], [1.0, 5.0]]))[0])
+    np.testing.assert_allclose(root @ root.T, [[4.0, 1.0], [1.0, 6.0]])

@@ -102,3 +102,9 @@ def test_noise_of_a_voltage_does_not_grow_with_it(white: np.ndarray) -> None:
     noise = white * np.hypot(0.1, 0.1 * value)
     sigma = noise_of([_channel("voltage")], noise, NOTHING, value, time_derivative=STILL).sigma
     assert np.ptp(sigma) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_channel_that_repeats_a_value_is_no_more_exact_than_a_sensor() -> None:
+    value = np.full(COUNT, 24.0)
+    sigma = noise_of([_channel()], STILL, value[:, None], value, time_derivative=STILL).sigma
+    np.testing.assert_allclose(sigma, 24e-6)

@@ -32,6 +32,7 @@ DEBUG = "TOMR_DEBUG"  # environment: not empty, show where an error comes from
 
 _UNWRITTEN = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 
+_AGAIN = 0.02  # s
 _signals: list[int] = []  # that asked this process to end
 
 Main = Callable[[Sequence[str] | None], int]
@@ -139,7 +140,7 @@ def _end_cleanly_on_signals() -> None:
     """Let SIGINT and SIGTERM end a command as exceptions: temporary files go with it.
 
     An extension module that loads while one is raised may make an error of its own of it: so they
-    are noted as well.
+    are noted as well. Where one cannot be raised, as in a finaliser, it is raised soon after.
     """
     if threading.current_thread() is not threading.main_thread():
         return
@@ -147,8 +148,20 @@ def _end_cleanly_on_signals() -> None:
         signal.signal(signal.SIGINT, _leave)
     if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
         signal.signal(signal.SIGTERM, _leave)
+    sys.unraisablehook = _unraisable
 
 
 def _leave(number: int, _: object) -> NoReturn:
     _signals.append(number)
     raise KeyboardInterrupt
+
+
+def _unraisable(what: "sys.UnraisableHookArgs") -> None:
+    if not (_signals and issubclass(what.exc_type, KeyboardInterrupt)):
+        sys.__unraisablehook__(what)
+        return
+    # Raised right here it would be lost as well.
+    here = threading.get_ident()
+    again = threading.Timer(_AGAIN, signal.pthread_kill, (here, _signals[-1]))
+    again.daemon = True
+    again.start()

@@ -64,6 +64,21 @@ def simulation() -> RecordingSimulation:
     return RecordingSimulation.of(recorded, robot, channels_of(recorded, robot))
 
 
+def test_a_few_values_make_no_channel() -> None:
+    robot = shipped_robot("reference")
+    recorded = _recorded(robot)
+    few = evolve(
+        recorded,
+        total_time=recorded.total_time[:9],
+        total=recorded.total[:9],
+        total_voltage=recorded.total_voltage[:9],
+    )
+    lost = {channel.name for channel in channels_of(recorded, robot)} - {
+        channel.name for channel in channels_of(few, robot)
+    }
+    assert lost == {"battery_state", "battery_state voltage"}
+
+
 def test_ten_minutes_are_predicted_as_well_at_the_end_as_at_the_beginning() -> None:
     """By a description that is wrong by a little, of a robot that stops and stands in between."""
     robot = shipped_robot("reference")

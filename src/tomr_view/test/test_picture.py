@@ -72,6 +72,7 @@ def test_the_words_of_the_diagnosis(gatherer: Gatherer) -> None:
     assert gatherer.picture()["message"] == "no diagnosis yet"
     values = {"state": "slip", "p slip": "0.9", "p normal": "0.1", "evidence 1": "a", "x": "y"}
     values["severity"] = "traction used 0.05"
+    values["conditions"] = "payload 3 kg"
     gatherer.diagnosis(
         [
             Status("/r1/fault_classifier: drive", 1, "slip", values),
@@ -84,6 +85,7 @@ def test_the_words_of_the_diagnosis(gatherer: Gatherer) -> None:
     assert picture["shares"] == {"slip": 0.9, "normal": 0.1}
     assert picture["evidence"] == ["a"]
     assert picture["severity"] == "traction used 0.05"
+    assert picture["conditions"] == "payload 3 kg"
     assert [item["topic"] for item in picture["inputs"]] == ["joint_states"]
 
 

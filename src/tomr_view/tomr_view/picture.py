@@ -167,6 +167,7 @@ class Gatherer:
             "unseen": status.values.get("not_observable", ""),
             "shares": self.shares,
             "severity": status.values.get("severity", ""),
+            "conditions": status.values.get("conditions", ""),
             "evidence": [
                 text for key, text in status.values.items() if key.startswith("evidence ")
             ],

@@ -33,6 +33,8 @@ def diagnosis_message(
     values = [("state", diagnosis.state.name), ("six_state", six_state(diagnosis.state))]
     values += [("since", f"{seconds}.{rest:09d}")]
     values.append(("severity", diagnosis.severity.words if diagnosis.severity else ""))
+    changes = [change.words for change in diagnosis.conditions]
+    values.append(("conditions", "; ".join(changes)))
     values.append(("check_first", check_first(diagnosis.state)))
     values.append(("not_observable", ", ".join(diagnosis.unseen.words)))
     for state, share in zip(NAMED, diagnosis.probabilities, strict=False):

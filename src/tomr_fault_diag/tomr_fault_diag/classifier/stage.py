@@ -41,6 +41,7 @@ class Diagnosis:
     unseen: Unseen = field(factory=Unseen)
     usable: bool = True  # whether this tick held data to decide by
     severity: Severity | None = None  # how bad it is, once that is known
+    conditions: tuple[Severity, ...] = ()  # what has changed slowly, and is no fault
 
 
 # Whatever comes next may follow at once.
@@ -61,7 +62,7 @@ class FaultClassifier:
     """
 
     def __init__(self, judge: Judge, severity: SeverityWatch | None = None) -> None:
-        """Without `severity` it is not told how bad a fault is."""
+        """Without `severity` it is not told how bad a fault is, nor what has changed slowly."""
         self._judge = judge
         self._severity = severity
         self._motion = MotionWatch()
@@ -136,6 +137,7 @@ class FaultClassifier:
             self._unseen,
             self._usable,
             self._how_bad(),
+            () if self._severity is None else self._severity.conditions,
         )
 
     def _how_bad(self) -> Severity | None:

@@ -116,6 +116,7 @@ def time_line(
         length=length,
         ticks=_axis(length),
         episodes=[_episode(episode, start) for episode in found.phases[0].summary.episodes],
+        conditions=[change.words for change in found.phases[0].summary.conditions],
         streams=_streams(found),
         notes=list(notes(found)),
         data=json.dumps(data, separators=(",", ":")),

@@ -45,6 +45,7 @@ class Summary:
     stale_shares: tuple[float, ...]  # of the ticks, by residual
     episodes: tuple[Episode, ...]
     missing: str = ""  # what was missing most often of what a residual needs
+    conditions: tuple[Severity, ...] = ()  # what had changed slowly at the end
 
     @property
     def has_fault(self) -> bool:
@@ -70,6 +71,7 @@ class Summariser:
     _stale: Counter[int] = field(factory=Counter)
     _missing: Counter[str] = field(factory=Counter)
     _episodes: list[Episode] = field(factory=list)
+    _conditions: list[Severity] = field(factory=list)
 
     def frame(self, frame: ResidualFrame) -> None:
         """Count a tick; its diagnosis, if there is one, comes before it."""
@@ -95,6 +97,7 @@ class Summariser:
                     tuple(evidence),
                 )
             )
+        self._conditions[:] = diagnosis.conditions
         if diagnosis.severity is not None:
             self._episodes[-1] = evolve(self._episodes[-1], severity=diagnosis.severity)
 
@@ -108,4 +111,5 @@ class Summariser:
             tuple(self._stale[index] / max(ticks, 1) for index in range(RESIDUALS)),
             tuple(self._episodes),
             missing[0] if missing else "",
+            tuple(self._conditions),
         )

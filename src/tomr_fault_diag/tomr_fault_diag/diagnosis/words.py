@@ -24,6 +24,8 @@ def summary_lines(summary: Summary, start_ns: int) -> Iterator[str]:
     stale = max(summary.stale_shares)
     if stale:
         yield f"  up to {100 * stale:.1f} % of a residual without an input"
+    for change in summary.conditions:
+        yield f"  changed: {change.words}"
     for episode in summary.episodes:
         since, begin, end = (
             seconds(stamp, start_ns)
@@ -149,6 +151,7 @@ def as_json(replayed: Replayed) -> dict[str, Any]:
         "shares": first.shares,
         "stale_shares": first.stale_shares,
         "episodes": [_episode(episode) for episode in first.episodes],
+        "conditions": [asdict(change) for change in first.conditions],
     }
     if len(replayed.phases) > 1:
         found["phases"] = [_phase(phase) for phase in replayed.phases]

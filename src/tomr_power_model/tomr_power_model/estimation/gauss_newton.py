@@ -16,7 +16,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from attrs import define, field, frozen
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_solve
+
+from tomr_power_model.estimation.factor import posterior_factor
 
 Array = NDArray[np.float64]
 
@@ -67,7 +69,7 @@ class MapEstimate:
     @classmethod
     def at(cls, units: Array, point: Linearisation) -> "MapEstimate":
         """From the normal equations at a point."""
-        factor = cho_factor(point.information + np.eye(len(units)), lower=True)
+        factor = posterior_factor(point.information)
         return cls(units, point.residual, point.gradient - units, factor)
 
     @property

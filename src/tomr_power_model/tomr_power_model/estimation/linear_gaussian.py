@@ -13,7 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_solve
+
+from tomr_power_model.estimation.factor import posterior_factor
 
 Array = NDArray[np.float64]
 Matrix = NDArray[np.float32] | Array  # columns may be stored in single precision
@@ -70,7 +72,7 @@ class Solution:
 def solve(gram: Gram, chosen: Sequence[int]) -> Solution:
     """Posterior of a subset of columns."""
     rows = np.asarray(chosen, dtype=np.intp)
-    factor = cho_factor(gram.matrix[np.ix_(rows, rows)] + np.eye(len(rows)), lower=True)
+    factor = posterior_factor(gram.matrix[np.ix_(rows, rows)])
     mean = cho_solve(factor, gram.vector[rows])
     explained = float(gram.vector[rows] @ mean)
     value = 0.5 * explained - float(np.log(np.diag(factor[0])).sum())

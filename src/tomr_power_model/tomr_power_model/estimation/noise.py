@@ -27,6 +27,7 @@ _ROUNDS = 4
 _RIDGE = 1e-2
 _FLOOR = 0.3  # of the median deviation: a channel that stands still for long is not that exact
 _OUTLIER = 4.0  # standard deviations: beyond, a sample weighs less
+_EXACT = 1e-6  # of a quantity: no sensor knows it better
 _LAGS = 80
 _UNCORRELATED = 0.03
 
@@ -88,8 +89,10 @@ def noise_of(
     """
     rows = rows_of(channels)
     variance = np.empty_like(residual)
+    least = []
     for channel, part in zip(channels, rows, strict=True):
-        variance[part] = _scale(residual[part], channel.quantum) ** 2
+        least.append(_least(residual[part] + value[part], channel.quantum))
+        variance[part] = _scale(residual[part], least[-1]) ** 2
     times = np.ones(len(rows))
     outlier = np.ones_like(residual)
     columns = columns[:, _distinct(columns, _weight(rows, variance, times, outlier))]
@@ -99,7 +102,7 @@ def noise_of(
         for number, (channel, part) in enumerate(zip(channels, rows, strict=True)):
             noise = left[part]
             variance[part] = _variance(
-                channel, noise, variance[part], value[part], time_derivative[part]
+                channel, noise, variance[part], value[part], time_derivative[part], least[number]
             )
             standard = noise / np.sqrt(variance[part])
             series = np.clip(standard, -_OUTLIER, _OUTLIER)
@@ -148,11 +151,19 @@ def _left(columns: Matrix, residual: Array, weight: Array, local: Sequence[Local
     return np.asarray(left)
 
 
-def _scale(noise: Array, quantum: float) -> float:
-    return max(robust_scale(noise), 0.1 * float(np.std(noise)), quantum / math.sqrt(12.0), 1e-9)
+def _least(measured: Array, quantum: float) -> float:
+    """Standard deviation that any channel has, also one that repeats a single value."""
+    exact = _EXACT * math.sqrt(float(np.mean(measured**2)))
+    return max(quantum / math.sqrt(12.0), exact, 1e-9)
 
 
-def _variance(channel: Channel, noise: Array, before: Array, value: Array, change: Array) -> Array:
+def _scale(noise: Array, least: float) -> float:
+    return max(robust_scale(noise), 0.1 * float(np.std(noise)), least)
+
+
+def _variance(
+    channel: Channel, noise: Array, before: Array, value: Array, change: Array, least: float
+) -> Array:
     features = [np.ones_like(noise)]
     if channel.kind != "voltage":
         features += [change**2, value**2]
@@ -160,7 +171,7 @@ def _variance(channel: Channel, noise: Array, before: Array, value: Array, chang
     square = np.minimum(noise**2, _OUTLIER**2 * before) / before
     unit = np.sqrt((matrix**2).sum(axis=0)) + 1e-300
     shares, _ = nnls(matrix / unit, square)
-    floor = max((_FLOOR * _scale(noise, channel.quantum)) ** 2, channel.quantum**2 / 12.0)
+    floor = max((_FLOOR * _scale(noise, least)) ** 2, least**2)
     if channel.kind in ("speed", "yaw"):
         floor += (SIMULATOR.motion * float(np.std(value))) ** 2
     return np.asarray(np.maximum((matrix * before[:, None]) @ (shares / unit), floor))

@@ -17,6 +17,7 @@ MOTOR_KINDS: tuple[Kind, ...] = ("power", "current")
 DRAWN_KINDS: tuple[Kind, ...] = (*MOTOR_KINDS, "total")
 
 _BLOCK = 0.05  # s, over which wheel speed and yaw rate are averaged
+_FEWEST = 10  # values of a channel
 _GAP = 3.0  # usual periods between two encoder samples: a longer time is a gap, and stays one
 
 
@@ -39,12 +40,12 @@ class Channel:
 
 
 def channels_of(recorded: Drive, robot: Robot) -> tuple[Channel, ...]:
-    """All channels of a recording that hold anything."""
+    """All channels of a recording that hold enough to tell their noise."""
     found = [*_powers(recorded, robot), *_speeds(recorded, robot)]
     if len(recorded.yaw_time) > 1:
         found.append(_blocks(recorded))
     known = (channel.at(np.isfinite(channel.value)) for channel in found)
-    return tuple(channel for channel in known if len(channel.time))
+    return tuple(channel for channel in known if len(channel.time) >= _FEWEST)
 
 
 def _powers(recorded: Drive, robot: Robot) -> list[Channel]:

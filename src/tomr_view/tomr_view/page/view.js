@@ -356,6 +356,7 @@ function showWords(picture) {
   }
   $("shares").replaceChildren(...shares);
   $("severity").textContent = picture.severity || "";
+  $("conditions").textContent = picture.conditions ? `changed: ${picture.conditions}` : "";
   $("unseen").textContent = picture.unseen ? `not observable in this motion: ${picture.unseen}` : "";
   const lines = (picture.evidence || []).map((line) => {
     const item = document.createElement("li");

@@ -94,8 +94,7 @@ def _traction(tick: Tick) -> Sums:
 
 def _doubt(motors: Motors) -> float:
     """Of a traction, from the friction at the axles."""
-    still, turning = np.zeros(len(motors.load)), np.ones(len(motors.load))
-    return float(np.mean(_FRICTION * np.abs(motors.forces(still, turning, still)) / motors.load))
+    return float(np.mean(_FRICTION * motors.friction(1.0) / (motors.radius * motors.load)))
 
 
 def _force(tick: Tick) -> Sums:

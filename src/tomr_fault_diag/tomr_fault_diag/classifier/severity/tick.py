@@ -26,7 +26,7 @@ from tomr_power_model.robot import WHEELS, Robot
 Array = NDArray[np.float64]
 
 MOVES = 0.5  # rad/s
-_NEXT = to_ns(0.3)  # the longest from one tick to the next
+NEXT = to_ns(0.3)  # the longest from one tick to the next
 _UNKNOWN = float("nan")
 
 
@@ -39,6 +39,7 @@ class Motors:
         self.constant = wheels[:, at.CONSTANT]  # N m/A at the wheel
         self.resistance = wheels[:, at.RESISTANCE]  # ohm
         self.load = wheels[:, at.LOAD]  # N
+        self.radius = wheels[:, at.RADIUS]  # m
         self.voltage = robot.supply.nominal_voltage
         self.tells_currents = robot.measurement.quantity == "motor_current"
         self.tells_signs = robot.measurement.signed
@@ -47,7 +48,13 @@ class Motors:
         self.to_force = np.linalg.pinv(body.from_force)  # wheel torques to the body's force
         self._numbers = numbers.tolist()
         self._laws = plain(tuple(robot.physics))
+        self.mass = body.mass  # kg
         self.idle = self._idle()  # W
+
+    def friction(self, speed: float) -> Array:
+        """Of each axle at a speed [N m]."""
+        still = np.zeros(WHEELS)
+        return self.radius * np.abs(self.forces(still, still + speed, still))
 
     def _idle(self) -> Array:
         """What drivers draw that feed no motor."""
@@ -105,7 +112,7 @@ class Tick:
             return None
         speed = np.array([measured_speed(item) for item in speeds])
         change = np.zeros(WHEELS)
-        if last is not None and 0 < frame.stamp_ns - last.stamp_ns <= _NEXT:
+        if last is not None and 0 < frame.stamp_ns - last.stamp_ns <= NEXT:
             change = (speed - last.speed) * (NANOSECONDS / (frame.stamp_ns - last.stamp_ns))
         expected = _modelled(speeds)
         is_supplied = powers[0].unit == "A" and not motors.tells_currents

@@ -16,11 +16,12 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_fault_diag.classifier.severity.conditions import ConditionsWatch
+from tomr_fault_diag.classifier.severity.interval import Severity, student
 from tomr_fault_diag.classifier.severity.measures import MEASURES, Measure
-from tomr_fault_diag.classifier.severity.tick import Motors, Tick
+from tomr_fault_diag.classifier.severity.tick import NEXT, Motors, Tick
 from tomr_fault_diag.classifier.states import NORMAL, STATES, State
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_power_model.model.ticks import to_ns
@@ -36,32 +37,12 @@ _MOST = 60  # stretches that are remembered
 _SUMS = sum(measure.wheels for measure in MEASURES)
 
 
-@frozen
-class Severity:
-    """A quantity and its interval of 95 %; shares are of 1."""
-
-    quantity: str
-    unit: str  # empty: a share
-    value: float
-    low: float
-    high: float
-
-    @property
-    def words(self) -> str:
-        """As a reader wants it: winding resistance +80 % (+72 to +88 %)."""
-        numbers = (self.value, self.low, self.high)
-        if not self.unit:
-            value, low, high = (f"{100.0 * number:+.0f}" for number in numbers)
-            return f"{self.quantity} {value} % ({low} to {high} %)"
-        value, low, high = (f"{number:.3g}" for number in numbers)
-        return f"{self.quantity} {value} {self.unit} ({low} to {high} {self.unit})"
-
-
 class SeverityWatch:
     """Follows a robot tick by tick and says how bad what is named is."""
 
     def __init__(self, robot: Robot) -> None:
         self._motors = Motors(robot)
+        self._conditions = ConditionsWatch(self._motors)
         self._places = _places()
         self.clear()
 
@@ -73,6 +54,7 @@ class SeverityWatch:
         self._named: tuple[int | None, int | None, str] | None = None
         self._last: Tick | None = None
         self._due = 0  # when a robot that is well is looked at again [ns]
+        self._conditions.clear()
         self._begin(0)
 
     def _begin(self, stretch: int) -> None:
@@ -90,12 +72,25 @@ class SeverityWatch:
         if named != self._named:
             self._ill.clear()
             self._named = named
-        if named is None and (state is not STATES[NORMAL] or frame.stamp_ns < self._due):
-            return
-        self._due = frame.stamp_ns + _SELDOM
+        if named is not None:
+            self._look(frame)
+        elif state is STATES[NORMAL] and frame.stamp_ns >= self._due:
+            self._look_at_well(frame)
+
+    def _look(self, frame: ResidualFrame) -> Tick | None:
         tick = self._last = Tick.of(self._motors, frame, self._last)
         if tick is not None:
             self._sums += np.concatenate([measure.sums(tick) for measure in MEASURES], axis=1)
+        return tick
+
+    def _look_at_well(self, frame: ResidualFrame) -> None:
+        """Take two ticks in a row now and then: one alone does not tell how speeds change."""
+        last = self._last
+        tick = self._look(frame)
+        if last is None or tick is None or frame.stamp_ns - last.stamp_ns > NEXT:
+            return
+        self._conditions.take(tick)
+        self._due, self._last = frame.stamp_ns + _SELDOM, None
 
     def _fault_of(
         self, state: State, wheel: int | None
@@ -104,6 +99,11 @@ class SeverityWatch:
         if state not in self._places:
             return None
         return state.paper, wheel, "" if state.paper is not None else state.name
+
+    @property
+    def conditions(self) -> tuple[Severity, ...]:
+        """What has changed slowly, and is no fault, as far as it can be told."""
+        return self._conditions.changes
 
     def severity(self, state: State, wheel: int | None) -> Severity | None:
         """Of what is named, or None where there is nothing to tell yet."""
@@ -143,18 +143,4 @@ def _slope(stretches: Sequence[Array], place: int) -> tuple[float, float] | None
         return None
     others = (y.sum() - y) / (x.sum() - x)
     error = math.sqrt((count - 1.0) / count * float(np.sum((others - others.mean()) ** 2)))
-    return float(y.sum() / x.sum()), _student(count - 1) * error
-
-
-def _student(freedom: int) -> float:
-    """97.5 % quantile of Student's t, by Cornish and Fisher (0.5 % off at 3 degrees).
-
-    scipy.special, which has it, takes a node 15 MB and a quarter of a second.
-    """
-    z = 1.959964
-    return (
-        z
-        + (z**3 + z) / (4.0 * freedom)
-        + (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / (96.0 * freedom**2)
-        + (3.0 * z**7 + 19.0 * z**5 + 17.0 * z**3 - 15.0 * z) / (384.0 * freedom**3)
-    )
+    return float(y.sum() / x.sum()), student(count - 1) * error

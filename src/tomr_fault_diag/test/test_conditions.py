@@ -1,0 +1,218 @@
+"""What changes slowly and is no fault, worked by hand on the reference robot."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from tomr_fault_diag.classifier.messages import diagnosis_message
+from tomr_fault_diag.classifier.severity import Severity, SeverityWatch
+from tomr_fault_diag.classifier.severity.conditions import _rows
+from tomr_fault_diag.classifier.severity.tick import Motors, Tick
+from tomr_fault_diag.classifier.stage import Diagnosis
+from tomr_fault_diag.classifier.states import DRAGGING, NORMAL, PUSHED, STATES, State
+from tomr_fault_diag.residuals.frame import Residual, ResidualFrame, Unit
+from tomr_power_model.robot import Robot, shipped_robot
+
+MS = 1_000_000
+BASE = 1_700_000_000_000 * MS
+ROBOT = shipped_robot("reference")
+# Of each motor: 0.7 N m/A at the wheel, 0.8 ohm, 1.2 W standby; wheels of 0.05 m.
+CONSTANT, RESISTANCE, STANDBY, RADIUS = 0.7, 0.8, 1.2, 0.05
+CURRENTS = evolve(ROBOT, measurement=evolve(ROBOT.measurement, quantity="motor_current"))
+NAN = float("nan")
+
+Array = np.ndarray
+# Current [A] of the encoders, speed and its change [rad/s, rad/s^2] to watts or amperes shown.
+Shown = Callable[[Array, Array, Array], Array]
+
+
+def power(current: Array, speed: Array) -> Array:
+    """At the driver [W]."""
+    return np.asarray(STANDBY + RESISTANCE * current**2 + CONSTANT * speed * current)
+
+
+def motion(tick: int) -> tuple[Array, Array, Array]:
+    """Current [A], speed [rad/s] and its change [rad/s^2] of wheels that each go their own way."""
+    time, rates = 0.05 * tick, np.array([0.9, 1.3, 1.7])
+    speed = 6.0 * np.sin(rates * time)
+    change = 6.0 * rates * np.cos(rates * time)
+    return 0.1 * np.sign(speed) + 0.1 * change, speed, change
+
+
+def frame(tick: int, shown: Shown, unit: Unit = "W", noise: float = 0.0) -> ResidualFrame:
+    """What encoders explain, and what is shown."""
+    current, speed, _ = motion(tick)
+    before = motion(tick - 1)[1]
+    measured = shown(current, speed, (speed - before) / 0.05)
+    measured = measured + noise * np.random.default_rng(tick).normal(size=3)
+    explained = power(current, speed) if unit == "W" else current
+    powers = [Residual(m - e, 1.0, e, unit) for m, e in zip(measured, explained, strict=True)]
+    speeds = [Residual(0.0, 1.0, w, "rad/s") for w in speed]
+    return ResidualFrame(
+        BASE + 50 * tick * MS, (Residual(0.0, 1.0, 30.0), *powers, *speeds, *powers)
+    )
+
+
+def told(
+    shown: Shown,
+    state: State = STATES[NORMAL],
+    ticks: int = 3000,
+    robot: Robot = ROBOT,
+    unit: Unit = "W",
+    supply: float = NAN,
+) -> dict[str, Severity]:
+    """What is said after so many ticks."""
+    watch = SeverityWatch(robot)
+    wheel = 1 if state in DRAGGING else None
+    for tick in range(ticks):
+        watch.take(evolve(frame(tick, shown, unit, 0.02), supply=supply), state, wheel)
+    return {change.quantity: change for change in watch.conditions}
+
+
+def unchanged(current: Array, speed: Array, change: Array) -> Array:
+    return power(current, speed)
+
+
+def holds(change: Severity, truth: float) -> bool:
+    """Whether an interval holds the truth, and is no wider than a third of it either way."""
+    return change.low < truth < change.high and change.high - change.low < 0.67 * truth
+
+
+def test_a_robot_as_described_has_not_changed() -> None:
+    assert told(unchanged) == {}
+
+
+def test_hot_windings() -> None:
+    found = told(lambda i, w, a: power(i, w) + 0.3 * RESISTANCE * i**2)
+    assert set(found) == {"winding resistance"}
+    assert holds(found["winding resistance"], 0.3)
+
+
+def test_stiff_grease_at_one_axle() -> None:
+    more = np.array([0.0, 0.04, 0.0]) / CONSTANT
+    found = told(lambda i, w, a: power(i + np.sign(w) * more, w))
+    assert set(found) == {"friction of motor 2"}
+    assert holds(found["friction of motor 2"], 0.04)
+    assert found["friction of motor 2"].unit == "N m"
+
+
+def test_a_payload() -> None:
+    # What the floor takes of a torque: 0.06 N m and 0.004 N m s/rad of it turn the axle, and the
+    # wheel and its rotor take theirs.
+    inertia = ROBOT.motors[0].rotor_inertia * ROBOT.motors[0].gear_ratio ** 2 + ROBOT.wheel_inertia
+
+    def loaded(current: Array, speed: Array, change: Array) -> Array:
+        axle = 0.06 * np.sign(speed) + 0.004 * speed
+        floor = CONSTANT * current - axle - inertia * change
+        return power(current + 0.3 * floor / CONSTANT, speed)
+
+    found = told(loaded)
+    assert set(found) == {"payload"}
+    assert holds(found["payload"], 0.3 * ROBOT.mass)
+    assert found["payload"].unit == "kg"
+
+
+def test_drivers_that_draw_more() -> None:
+    found = told(lambda i, w, a: power(i, w) + np.array([0.0, 0.0, 0.8]))
+    assert set(found) == {"standby power of motor 3"}
+    assert holds(found["standby power of motor 3"], 0.8)
+
+
+def test_a_battery_that_has_given_much() -> None:
+    found = told(unchanged, supply=0.93)
+    assert set(found) == {"supply voltage"}
+    assert found["supply voltage"].value == pytest.approx(-0.07)
+    assert told(unchanged, supply=0.97) == {}
+
+
+def test_currents_tell_friction() -> None:
+    more = np.array([0.04, 0.0, 0.0]) / CONSTANT
+    found = told(lambda i, w, a: i + np.sign(w) * more, robot=CURRENTS, unit="A")
+    assert set(found) == {"friction of motor 1"}
+    assert holds(found["friction of motor 1"], 0.04)
+
+
+@pytest.mark.parametrize(
+    ("speed", "change", "current", "rows"),
+    [
+        (4.0, 0.0, 0.5, 1),
+        (-4.0, 0.0, -0.5, 1),
+        (0.4, 0.0, 0.5, 0),  # hardly turns
+        (-4.0, 1.5, -0.5, 0),  # slows down
+        (4.0, 1.5, 0.5, 1),
+        (1.0, 0.0, 0.5, 0),  # sets off: 0.7 V of back-EMF, 0.4 V twice over the winding
+        (1.2, 0.0, 0.5, 1),
+    ],
+)
+def test_which_motors_tell_something(
+    speed: float, change: float, current: float, rows: int
+) -> None:
+    motors, still = Motors(ROBOT), Residual(0.0, 1.0, 0.0, "rad/s")
+    watts = float(power(np.array(current), np.array(speed)))
+    powers = (Residual(0.0, 1.0, watts), Residual(0.0, 1.0, STANDBY), Residual(0.0, 1.0, STANDBY))
+
+    def at(tick: int, turning: float) -> ResidualFrame:
+        speeds = (Residual(0.0, 1.0, turning, "rad/s"), still, still)
+        return ResidualFrame(
+            BASE + 50 * tick * MS, (Residual(0.0, 1.0, 30.0), *powers, *speeds, *powers)
+        )
+
+    before = Tick.of(motors, at(0, speed - 0.05 * change), None)
+    tick = Tick.of(motors, at(1, speed), before)
+    assert tick is not None
+    assert len(_rows(tick)) == rows
+
+
+def test_what_is_little_is_not_told() -> None:
+    assert told(lambda i, w, a: power(i, w) + 0.05 * RESISTANCE * i**2) == {}
+
+
+def test_it_takes_minutes_of_driving() -> None:
+    hot = lambda i, w, a: power(i, w) + 0.3 * RESISTANCE * i**2  # noqa: E731
+    assert told(hot, ticks=900) == {}
+    assert set(told(hot, ticks=2000)) == {"winding resistance"}
+
+
+@pytest.mark.parametrize("state", [PUSHED, DRAGGING[1]])
+def test_only_a_robot_that_is_well_has_conditions(state: State) -> None:
+    hot = lambda i, w, a: power(i, w) + 0.3 * RESISTANCE * i**2  # noqa: E731
+    assert told(hot, state) == {}
+
+
+def test_ticks_apart_tell_no_payload_and_no_ticks_nothing() -> None:
+    watch = SeverityWatch(ROBOT)
+    for tick in range(0, 60_000, 20):  # a second apart
+        watch.take(frame(tick, lambda i, w, a: 2.0 * power(i, w)), STATES[NORMAL], None)
+    assert watch.conditions == ()
+
+
+def test_five_minutes_are_remembered_and_a_clock_that_leaps_forgets() -> None:
+    watch = SeverityWatch(ROBOT)
+    for tick in range(12_000):
+        hot = 0.3 * (tick < 3000)
+        watch.take(
+            frame(tick, lambda i, w, a, s=hot: power(i, w) + s * RESISTANCE * i**2),
+            STATES[NORMAL],
+            None,
+        )
+        if tick == 2999:
+            assert watch.conditions
+    assert watch.conditions == ()
+    watch.clear()
+    assert watch.conditions == ()
+
+
+def test_a_message_tells_them() -> None:
+    changes = (
+        Severity("winding resistance", "", 0.2, 0.15, 0.25),
+        Severity("payload", "kg", 3.0, 2.5, 3.5),
+    )
+    diagnosis = Diagnosis(
+        BASE, STATES[NORMAL], BASE, (), frame(1, unchanged), False, conditions=changes
+    )
+    values = dict(diagnosis_message(ROBOT, diagnosis, "robot").statuses[0].values)
+    assert values["conditions"] == (
+        "winding resistance +20 % (+15 to +25 %); payload 3 kg (2.5 to 3.5 kg)"
+    )

@@ -1,0 +1,182 @@
+"""How a robot that is well differs from its description, followed over minutes.
+
+Windings heat, grease stiffens, a payload is put on, the floor is another: none is a fault. What
+motors draw beyond what the encoders explain is fitted jointly by what such changes would add,
+
+    P - P_e = s R i_e^2 + (omega + 2 R i_e / k) tau + R (tau / k)^2 + p,
+    tau = sign(omega) f + m r F_e,
+
+with s a share of every winding's resistance, f friction [N m] and p standby power [W] of each
+motor, and m a payload as a share of the mass, which takes that share more of the force F_e that the
+wheel hands to the floor; i - i_e = tau / k where currents are measured. Least squares over the last
+five minutes of driving that were called normal, drawn to 0 by how much each may change, with
+intervals of 95 % by the jackknife. What is told is surer, for it is looked for all the time.
+
+It is told and nothing else: no residual is corrected by it, so that it can swallow no fault.
+"""
+
+from collections import deque
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomr_fault_diag.classifier.severity.interval import Severity, student
+from tomr_fault_diag.classifier.severity.tick import MOVES, Motors, Tick
+from tomr_power_model.robot import WHEELS
+
+Array = NDArray[np.float64]
+
+_LENGTH = 40  # ticks of a stretch: 8 s of driving at the rate of looks
+_MOST = 40  # stretches that are remembered
+_LEAST = 8  # that an interval needs
+_ROUNDS = 3  # of the fit, for the square of tau
+
+# A row: what one motor that turns shows in a tick.
+_WHEEL, _LOSS, _GAIN, _SQUARE, _SIGN, _CARRIED, _SHOWN = range(7)
+
+_TYPICAL = 5.0  # rad/s
+_SLOWS = 1.0  # rad/s^2
+_WINDINGS, _PAYLOAD = 0, 1
+_FRICTION, _STANDBY = 2, 2 + WHEELS  # of the first motor
+_UNKNOWNS = 2 + 2 * WHEELS
+
+# How much each may change: a share of the resistance, of the mass, of the friction; W.
+_CHANGES = (0.5, 0.5, 1.0, 1.0)
+# What is worth telling, in the same units; a share of the nominal voltage.
+_WORTH = (0.1, 0.1, 0.2, 0.5)
+_WORTH_VOLTAGE = 0.05
+_SURE = 1.5  # halves of an interval: eight unknowns are looked at again and again
+_CONSTANTS = 0.05  # of what a description says of them: how well they are known
+
+
+class ConditionsWatch:
+    """Follows a robot that is called normal and says how it has changed."""
+
+    def __init__(self, motors: Motors) -> None:
+        own = float(motors.friction(_TYPICAL).mean())
+        scales = np.array([1.0, 1.0, *[own] * WHEELS, *[1.0] * WHEELS])
+        kinds = [0, 1, *[2] * WHEELS, *[3] * WHEELS]
+        self._mass = motors.mass
+        self._priors = np.array(_CHANGES)[kinds] * scales
+        self._worth = np.array(_WORTH)[kinds] * scales
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._stretches: deque[Array] = deque(maxlen=_MOST)  # rows, (k, 7) each
+        self._voltages: deque[float] = deque(maxlen=_MOST)  # of the supply, over the nominal one
+        self._rows: list[Array] = []
+        self._supplies: list[float] = []
+        self.changes: tuple[Severity, ...] = ()
+
+    def take(self, tick: Tick) -> None:
+        """Take a tick of a robot that is called normal; where it stands it tells nothing."""
+        rows = _rows(tick)
+        if not len(rows):
+            return
+        self._rows.append(rows)
+        if tick.supply == tick.supply:
+            self._supplies.append(tick.supply)
+        if len(self._rows) < _LENGTH:
+            return
+        self._stretches.append(np.concatenate(self._rows))
+        if self._supplies:
+            self._voltages.append(float(np.mean(self._supplies)))
+        self._rows, self._supplies = [], []
+        self.changes = (*self._of_supply(), *self._of_motors())
+
+    def _of_supply(self) -> Iterator[Severity]:
+        count = len(self._voltages)
+        if count < _LEAST:
+            return
+        lacks = np.array(self._voltages) - 1.0
+        half = student(count - 1) * float(lacks.std(ddof=1)) / count**0.5
+        if abs(lacks.mean()) > max(_SURE * half, _WORTH_VOLTAGE):
+            yield _change("supply voltage", "", lacks.mean(), half)
+
+    def _of_motors(self) -> Iterator[Severity]:
+        if len(self._stretches) < _LEAST:
+            return
+        value, half = self._fitted()
+        half = half + _CONSTANTS * np.abs(value)
+        for quantity, unit, place, size in (
+            ("winding resistance", "", _WINDINGS, 1.0),
+            ("payload", "kg", _PAYLOAD, self._mass),
+            *((f"friction of motor {w + 1}", "N m", _FRICTION + w, 1.0) for w in range(WHEELS)),
+            *((f"standby power of motor {w + 1}", "W", _STANDBY + w, 1.0) for w in range(WHEELS)),
+        ):
+            if abs(value[place]) > max(_SURE * half[place], self._worth[place]):
+                yield _change(quantity, unit, size * value[place], size * half[place])
+
+    def _fitted(self) -> tuple[Array, Array]:
+        """The unknowns and half their intervals, (_UNKNOWNS,) each."""
+        rows = np.concatenate(self._stretches)
+        edges = np.cumsum([0, *(len(stretch) for stretch in self._stretches)])
+        parts = [slice(*edge) for edge in pairwise(edges.tolist())]
+        value, left = np.zeros(_UNKNOWNS), rows[:, _SHOWN]
+        for _ in range(_ROUNDS):
+            terms, wanted = _equations(rows, value)
+            normal = np.array([terms[part].T @ terms[part] for part in parts])
+            shown = np.array([terms[part].T @ wanted[part] for part in parts])
+            prior = np.diag(float(np.mean(left**2)) / self._priors**2)
+            value = np.linalg.solve(normal.sum(axis=0) + prior, shown.sum(axis=0))
+            left = wanted - terms @ value
+        # Of all stretches but one, each.
+        others = np.linalg.solve(
+            normal.sum(axis=0) - normal + prior, (shown.sum(axis=0) - shown)[:, :, None]
+        )[:, :, 0]
+        count = len(others)
+        spread = np.sqrt((count - 1.0) / count * ((others - others.mean(axis=0)) ** 2).sum(axis=0))
+        return value, student(count - 1) * spread
+
+
+def _rows(tick: Tick) -> Array:
+    """What the motors show that turn and neither set off nor slow down, (k, 7)."""
+    motors = tick.motors
+    rows = np.zeros((WHEELS, 7))
+    rows[:, _WHEEL] = np.arange(WHEELS)
+    if motors.tells_currents:
+        rows[:, _GAIN] = 1.0 / motors.constant
+        rows[:, _SHOWN] = tick.current - tick.expected_current
+    else:
+        rows[:, _LOSS] = motors.resistance * tick.expected_current**2
+        rows[:, _GAIN] = (
+            tick.speed + 2.0 * motors.resistance * tick.expected_current / motors.constant
+        )
+        rows[:, _SQUARE] = motors.resistance / motors.constant**2
+        rows[:, _SHOWN] = tick.power - tick.from_encoders
+    rows[:, _SIGN] = np.sign(tick.speed)
+    rows[:, _CARRIED] = motors.radius * motors.forces(
+        tick.expected_current, tick.speed, tick.change
+    )
+    # Of two currents that make the same power a wheel that slows down may have either.
+    slows = np.sign(tick.speed) * tick.change < -_SLOWS
+    # Of one that sets off a payload and hot windings look alike.
+    sets_off = motors.constant * np.abs(tick.speed) < 2.0 * motors.resistance * np.abs(
+        tick.expected_current
+    )
+    return rows[(np.abs(tick.speed) > MOVES) & ~slows & ~sets_off]
+
+
+def _equations(rows: Array, value: Array) -> tuple[Array, Array]:
+    """Of rows, with tau's square as the last value has it: (k, _UNKNOWNS) and (k,)."""
+    wheel = rows[:, _WHEEL].astype(int)
+    at_wheel = np.eye(WHEELS)[wheel]
+    torque = rows[:, _SIGN] * value[_FRICTION + wheel] + rows[:, _CARRIED] * value[_PAYLOAD]
+    is_power = rows[:, _SQUARE] > 0.0
+    terms = np.column_stack(
+        (
+            rows[:, _LOSS],
+            rows[:, _GAIN] * rows[:, _CARRIED],
+            (rows[:, _GAIN] * rows[:, _SIGN])[:, None] * at_wheel,
+            is_power[:, None] * at_wheel,
+        )
+    )
+    shown = rows[:, _SHOWN] - rows[:, _SQUARE] * torque**2
+    return terms, shown
+
+
+def _change(quantity: str, unit: str, value: float, half: float) -> Severity:
+    return Severity(quantity, unit, float(value), float(value - half), float(value + half))

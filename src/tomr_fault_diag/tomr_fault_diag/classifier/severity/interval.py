@@ -1,0 +1,38 @@
+"""A quantity with its interval."""
+
+from attrs import frozen
+
+
+@frozen
+class Severity:
+    """A quantity and its interval of 95 %; shares are of 1."""
+
+    quantity: str
+    unit: str  # empty: a share
+    value: float
+    low: float
+    high: float
+
+    @property
+    def words(self) -> str:
+        """As a reader wants it: winding resistance +80 % (+72 to +88 %)."""
+        numbers = (self.value, self.low, self.high)
+        if not self.unit:
+            value, low, high = (f"{100.0 * number:+.0f}" for number in numbers)
+            return f"{self.quantity} {value} % ({low} to {high} %)"
+        value, low, high = (f"{number:.3g}" for number in numbers)
+        return f"{self.quantity} {value} {self.unit} ({low} to {high} {self.unit})"
+
+
+def student(freedom: int) -> float:
+    """97.5 % quantile of Student's t, by Cornish and Fisher (0.5 % off at 3 degrees).
+
+    scipy.special, which has it, takes a node 15 MB and a quarter of a second.
+    """
+    z = 1.959964
+    return (
+        z
+        + (z**3 + z) / (4.0 * freedom)
+        + (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / (96.0 * freedom**2)
+        + (3.0 * z**7 + 19.0 * z**5 + 17.0 * z**3 - 15.0 * z) / (384.0 * freedom**3)
+    )
