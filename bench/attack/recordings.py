@@ -20,7 +20,7 @@ from tomr_power_model.recordings import RecordingWriter
 Raws = Iterable[Raw]
 _STAMP, _HEAD = struct.Struct("<iI"), 4  # the stamp comes after what tells the encoding
 SECOND = 1_000_000_000
-_DEAD_S = 2.5
+_DEAD_S = 2.0  # as the classifier has it
 EXTREMES = (math.nan, math.inf, -math.inf, 1e308, -1e308, 1e30, -1e30, 1e6, 0.0, 5e-324)
 _SENSORS = ("/joint_states", "/wheel_1/power", "/wheel_2/power", "/wheel_3/power")
 
