@@ -31,6 +31,26 @@ def test_stamps_that_repeat_or_go_back_are_dropped() -> None:
     assert made.since(made.first)[0].tolist() == pytest.approx([0.0, 1.0, 2.0])
 
 
+@pytest.mark.parametrize("late", [9, 11])
+@pytest.mark.parametrize("lost", [False, True])
+def test_too_many_stamps_that_go_back_are_refused(late: int, lost: bool) -> None:
+    # Ten samples apart, each with the stamp of the one three before, or with none.
+    times = np.arange(100.0) * 0.1
+    for number in range(late):
+        at = 5 + 8 * number
+        times[at] = -START / SECOND if lost else times[at - 3] + 0.05
+    if late < 10:
+        assert series(*times).dropped == late
+        return
+    with pytest.raises(InputError, match="joint_states: 11 % of its stamps precede"):
+        series(*times)
+
+
+def test_a_topic_whose_stamps_all_come_twice_is_read() -> None:
+    made = series(*np.repeat(np.arange(100.0) * 0.1, 2))
+    assert (len(made), made.dropped) == (100, 100)
+
+
 @pytest.mark.parametrize("stray", [3.2e7, -3.2e7, 3600.0])
 @pytest.mark.parametrize("place", [0, 40, 80])
 def test_a_stray_stamp_does_not_take_the_others_with_it(stray: float, place: int) -> None:

@@ -15,6 +15,7 @@ Stamps = NDArray[np.int64]
 _CLOCK_SPAN = 10.0  # s, that it takes to compare clocks
 _STRAY = 0.01  # share of samples that may be stamped far from the others
 _FEW = 5  # samples that may be, however few there are
+_BACK = 0.1  # share of samples whose stamps may go back, or be none
 
 
 class Series:
@@ -39,7 +40,7 @@ class Series:
         """Drop what repeats or goes back, and stray stamps where a stream has no long silences.
 
         Raises:
-            InputError: too many samples, or stamps that jump for good.
+            InputError: too many samples, or stamps that jump for good or keep going back.
         """
         if len(self._stamps) > limits().samples:
             too_large(place, f"{len(self._stamps):,} samples", "samples")
@@ -50,6 +51,12 @@ class Series:
             self.strays = len(kept) - len(near)
             kept = near
         before = np.maximum.accumulate(np.concatenate([[0], stamps[kept]]))[:-1]
+        back = len(stamps) - np.count_nonzero(stamps > 0) + np.count_nonzero(stamps[kept] < before)
+        if back > max(_FEW, _BACK * len(stamps)):
+            raise InputError(
+                f"{place}: {100.0 * back / len(stamps):.0f} % of its stamps precede an earlier one "
+                "or are none: no fit can rest on it; stamp by a clock that goes on, record again"
+            )
         self._kept = kept[stamps[kept] > before]
         self.dropped = len(stamps) - len(self._kept) - self.strays
         self._times = stamps[self._kept]
