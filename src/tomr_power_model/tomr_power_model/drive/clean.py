@@ -7,6 +7,7 @@ from attrs import evolve
 from numpy.typing import NDArray
 
 from tomr_power_model.drive.cut import measured_when, without
+from tomr_power_model.drive.lost import lost_commands
 from tomr_power_model.drive.motion import measured_speed
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
@@ -29,8 +30,8 @@ def cleaned(drive: Drive, robot: Robot) -> Drive:
     """A recording without what cannot be used, with notes.
 
     Raises:
-        InputError: too short, clocks that do not meet, no power, or an encoder with hardly any
-            samples.
+        InputError: too short, clocks that do not meet, no power, an encoder with hardly any
+            samples, or too many commands lost.
     """
     _refuse_useless(drive)
     trimmed, notes = _trimmed(drive)
@@ -41,7 +42,28 @@ def cleaned(drive: Drive, robot: Robot) -> Drive:
             f"{drive.name}: it begins in motion: the first command is taken to have held "
             f"before, the first {_SETTLING:g} s are left out"
         )
-    return evolve(settled, notes=(*drive.notes, *notes))
+    known, left_out = _commanded(settled, robot)
+    return evolve(known, notes=(*drive.notes, *notes, *left_out))
+
+
+def _commanded(drive: Drive, robot: Robot) -> tuple[Drive, list[str]]:
+    """A recording without the times in which commands were lost."""
+    lost = lost_commands(drive, robot)
+    if not lost:
+        return drive, []
+    known = np.ones(len(drive.encoder_time), dtype=bool)
+    for start, end in lost:
+        known &= (drive.encoder_time < start) | (drive.encoder_time > end)
+    if np.mean(known) < _HALF:
+        raise InputError(
+            f"{drive.name}: cmd_vel: messages are missing where the command changes, {len(lost)} "
+            "times: nothing tells what the robot was asked for; record it again"
+        )
+    note = (
+        f"{drive.name}: cmd_vel: messages are missing where the command changes, {len(lost)} "
+        f"times: {100.0 * (1.0 - np.mean(known)):.0f} % of it are left out"
+    )
+    return without(drive, lost), [note]
 
 
 def check_duration(drives: tuple[Drive, ...]) -> None:
