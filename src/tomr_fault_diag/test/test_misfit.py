@@ -95,6 +95,7 @@ def test_no_wheel_is_accused_meanwhile() -> None:
         (TURNING, (1.0, -3.0, 2.0)),  # slower, but not standing
         ((0.2, -0.3, 0.1), (0.0, 0.0, 0.0)),  # creeping
         (TURNING, (NAN, NAN, NAN)),  # nobody knows
+        (TURNING, (0.0, 9.0, 0.0)),  # one is driven the other way
     ],
 )
 def test_what_may_be_something_else(expected: Three, measured: Three) -> None:

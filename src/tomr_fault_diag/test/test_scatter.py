@@ -3,8 +3,10 @@
 import random
 from collections.abc import Callable
 
+import numpy as np
+
 from tomr_fault_diag.residuals.scatter import ScatterWatch
-from tomr_power_model.model.encoders import EncoderSample, EncoderWindow
+from tomr_power_model.model.encoders import EncoderSample, EncoderWindow, WheelEstimate
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
@@ -17,7 +19,7 @@ Angle = Callable[[float], float]  # rad, at a time [s]
 def _watched(times: list[int], angle: Angle) -> ScatterWatch:
     """Of samples every 10 ms that were taken at other times [ms], over 3 s."""
     window = EncoderWindow(100 * MS, 50 * MS, 200 * MS)
-    watch = ScatterWatch()
+    watch = ScatterWatch(fastest=40.0)
     for number, time in enumerate(times):
         turned = angle(1e-3 * time)
         positions = (turned, -0.5 * turned, -0.5 * turned)
@@ -57,6 +59,16 @@ def test_coarse_encoders_of_a_slow_robot_are_no_disorder() -> None:
     count = 0.15  # rad: 42 a turn
     watch = _watched(list(range(0, 3000, 10)), lambda time: count * round(2.0 * time / count))
     assert watch.seconds > 0.015  # as much as in disorder
+    assert not watch.is_disorder
+
+
+def test_a_speed_that_no_wheel_reaches_is_disorder_until_others_outweigh_it() -> None:
+    watch = ScatterWatch(fastest=40.0)
+    true = WheelEstimate(np.full(3, 8.0), np.zeros(3), scatter=0.001)
+    watch.take(WheelEstimate(np.array([0.0, -41.0, 41.0]), np.zeros(3)))
+    assert watch.is_disorder
+    watch.take(true)
+    watch.take(true)
     assert not watch.is_disorder
 
 

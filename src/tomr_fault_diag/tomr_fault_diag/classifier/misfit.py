@@ -18,6 +18,7 @@ from tomr_power_model.model.ticks import to_ns
 
 _TURNING = 0.5  # rad/s: a wheel that is expected to turn
 _STANDING = 0.2  # of the expected speed: a slower wheel does not follow
+_BACK = 1.0  # of the expected speed: one that turns back faster does something else
 _AT_LEAST = 2  # wheels that must be expected to turn: one alone may have a fault of its own
 _IGNORED_FOR = to_ns(0.3)
 _FAR = 3.0  # bands
@@ -82,10 +83,14 @@ class MisfitWatch:
 def _ignores_commands(speeds: list[Residual]) -> bool:
     """Whether none of the wheels turns that are expected to, and there are enough of these."""
     turning = [item for item in speeds if abs(item.modelled) > _TURNING and not item.stale]
-    # Residuals of speed are signed along the expected direction.
     return len(turning) >= _AT_LEAST and all(
-        abs(item.modelled) + item.residual < _STANDING * abs(item.modelled) for item in turning
+        -_BACK < _followed(item) < _STANDING for item in turning
     )
+
+
+def _followed(item: Residual) -> float:
+    """Measured speed over the expected one; residuals are signed along the expected direction."""
+    return 1.0 + item.residual / abs(item.modelled)
 
 
 def is_far(item: Residual) -> bool:

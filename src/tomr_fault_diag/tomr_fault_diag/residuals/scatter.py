@@ -1,5 +1,6 @@
 """How far the stamps of encoder samples scatter about the motion that their angles show."""
 
+import math
 from collections import deque
 from statistics import median
 
@@ -17,7 +18,9 @@ _DISORDER_ANGLE = 0.15  # rad
 class ScatterWatch:
     """Remembers how the last estimates fitted their samples."""
 
-    def __init__(self) -> None:
+    def __init__(self, fastest: float) -> None:
+        """`fastest` that a wheel can turn [rad/s]: what seems faster was not measured then."""
+        self._fastest = fastest
         self._seconds: deque[float] = deque(maxlen=_TICKS)
         self._angles: deque[float] = deque(maxlen=_TICKS)  # rad
 
@@ -28,7 +31,10 @@ class ScatterWatch:
 
     def take(self, estimate: WheelEstimate) -> None:
         """Take the estimate of a tick; one whose scatter does not show changes nothing."""
-        if estimate.scatter == estimate.scatter:  # not NaN
+        if np.any(np.abs(estimate.speed) > self._fastest):
+            self._seconds.append(math.inf)
+            self._angles.append(math.inf)
+        elif estimate.scatter == estimate.scatter:  # not NaN
             self._seconds.append(estimate.scatter)
             self._angles.append(estimate.scatter * float(np.linalg.norm(estimate.speed)))
 

@@ -102,14 +102,15 @@ class ResidualStage:
         self._repeats = [RepeatWatch() for _ in self._topics]
         self._limits = PowerLimits.of(robot)
         self._health = InputReporter()
+        fastest = fastest_wheel(robot)
         self._encoders = EncoderWindow(
-            self.settings.encoder_window, ticks.period, self.settings.stale, fastest_wheel(robot)
+            self.settings.encoder_window, ticks.period, self.settings.stale, fastest
         )
         self._has_motor_power = bool(motor_topics(robot))
         self._predictions: dict[int, Prediction] = {}
         lately = max(_FEWEST, round(_TRANSIENT / ticks.period))
         self._recent: deque[_Modelled] = deque(maxlen=lately)
-        self._scatter = ScatterWatch()
+        self._scatter = ScatterWatch(fastest)
         self._decided = 0  # newest tick
 
     def retune(self, bands: BandSettings) -> None:

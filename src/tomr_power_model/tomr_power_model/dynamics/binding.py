@@ -19,6 +19,7 @@ from io import BytesIO
 from pathlib import Path
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
+from uuid import uuid4
 
 from tomr_power_model.dynamics import batch, contacts, inverse, layout, numbers, start, step
 from tomr_power_model.effects import EFFECTS, LAWS, base
@@ -171,16 +172,25 @@ def _compilers(folder: Path | None) -> tuple[Jit, Jit]:
     import numba
 
     config: Any = numba.config
+    tag = uuid4().hex if folder is None else folder.name
+
+    def renamed(function: Any) -> Any:
+        """Of another vocabulary's code in one process the linker would take what has its name."""
+        name = f"{function.__name__}_{tag}"
+        parts = (function.__globals__, name, function.__defaults__, function.__closure__)
+        copy = FunctionType(function.__code__, *parts)
+        copy.__qualname__, copy.__module__ = name, function.__module__
+        return copy
 
     def jit(function: Any) -> Any:
-        return numba.njit(nogil=True, error_model="numpy")(function)
+        return numba.njit(nogil=True, error_model="numpy")(renamed(function))
 
     def entry(function: Any) -> Any:
         before = config.CACHE_DIR
         config.CACHE_DIR = "" if folder is None else str(folder)
         try:
             cached = folder is not None
-            return numba.njit(nogil=True, error_model="numpy", cache=cached)(function)
+            return numba.njit(nogil=True, error_model="numpy", cache=cached)(renamed(function))
         finally:
             config.CACHE_DIR = before
 
