@@ -4,13 +4,14 @@ Windings heat, grease stiffens, a payload is put on, the floor is another: none 
 motors draw beyond what the encoders explain is fitted jointly by what such changes would add,
 
     P - P_e = s R i_e^2 + (omega + 2 R i_e / k) tau + R (tau / k)^2 + p,
-    tau = sign(omega) f + m r F_e,
+    tau = sign(omega) f + m tau_move + n tau_turn,
 
 with s a share of every winding's resistance, f friction [N m] and p standby power [W] of each
-motor, and m a payload as a share of the mass, which takes that share more of the force F_e that the
-wheel hands to the floor; i - i_e = tau / k where currents are measured. Least squares over the last
-five minutes of driving that were called normal, drawn to 0 by how much each may change, with
-intervals of 95 % by the jackknife. What is told is surer, for it is looked for all the time.
+motor, and m and n a payload's mass and inertia as shares of the robot's, which take as much more of
+the torques that move it and turn it; i - i_e = tau / k where currents are measured. Least squares
+over the last five minutes of driving that were called normal, drawn to 0 by how much each may
+change, with intervals of 95 % by the jackknife. What is told is surer, for it is looked for all the
+time, and windings only beyond what a payload's jerks may feign.
 
 It is told and nothing else: no residual is corrected by it, so that it can swallow no fault.
 """
@@ -34,13 +35,15 @@ _LEAST = 8  # that an interval needs
 _ROUNDS = 3  # of the fit, for the square of tau
 
 # A row: what one motor that turns shows in a tick.
-_WHEEL, _LOSS, _GAIN, _SQUARE, _SIGN, _CARRIED, _SHOWN = range(7)
+_WHEEL, _LOSS, _GAIN, _SQUARE, _SIGN, _CARRIED, _TURNED, _SHOWN = range(8)
 
 _TYPICAL = 5.0  # rad/s
 _SLOWS = 1.0  # rad/s^2
-_WINDINGS, _PAYLOAD = 0, 1
-_FRICTION, _STANDBY = 2, 2 + WHEELS  # of the first motor
-_UNKNOWNS = 2 + 2 * WHEELS
+_EVEN = 0.1  # of a current, and of that of friction
+_JERKS = 0.5  # of a payload, that looks like hot windings
+_WINDINGS, _PAYLOAD, _INERTIA = 0, 1, 2
+_FRICTION, _STANDBY = 3, 3 + WHEELS  # of the first motor
+_UNKNOWNS = 3 + 2 * WHEELS
 
 # How much each may change: a share of the resistance, of the mass, of the friction; W.
 _CHANGES = (0.5, 0.5, 1.0, 1.0)
@@ -55,9 +58,11 @@ class ConditionsWatch:
     """Follows a robot that is called normal and says how it has changed."""
 
     def __init__(self, motors: Motors) -> None:
-        own = float(motors.friction(_TYPICAL).mean())
-        scales = np.array([1.0, 1.0, *[own] * WHEELS, *[1.0] * WHEELS])
-        kinds = [0, 1, *[2] * WHEELS, *[3] * WHEELS]
+        friction = motors.friction(_TYPICAL)
+        own = float(friction.mean())
+        self._friction = friction / motors.constant  # A
+        scales = np.array([1.0, 1.0, 1.0, *[own] * WHEELS, *[1.0] * WHEELS])
+        kinds = [0, 1, 1, *[2] * WHEELS, *[3] * WHEELS]
         self._mass = motors.mass
         self._priors = np.array(_CHANGES)[kinds] * scales
         self._worth = np.array(_WORTH)[kinds] * scales
@@ -65,15 +70,15 @@ class ConditionsWatch:
 
     def clear(self) -> None:
         """Forget all."""
-        self._stretches: deque[Array] = deque(maxlen=_MOST)  # rows, (k, 7) each
+        self._stretches: deque[Array] = deque(maxlen=_MOST)  # rows, (k, 8) each
         self._voltages: deque[float] = deque(maxlen=_MOST)  # of the supply, over the nominal one
         self._rows: list[Array] = []
         self._supplies: list[float] = []
         self.changes: tuple[Severity, ...] = ()
 
-    def take(self, tick: Tick) -> None:
-        """Take a tick of a robot that is called normal; where it stands it tells nothing."""
-        rows = _rows(tick)
+    def take(self, tick: Tick, last: Tick) -> None:
+        """Take a tick of a robot that is called normal, and the one before; at rest none tells."""
+        rows = _rows(tick, last, self._friction)
         if not len(rows):
             return
         self._rows.append(rows)
@@ -101,6 +106,7 @@ class ConditionsWatch:
             return
         value, half = self._fitted()
         half = half + _CONSTANTS * np.abs(value)
+        half[_WINDINGS] += _JERKS * abs(value[_PAYLOAD])
         for quantity, unit, place, size in (
             ("winding resistance", "", _WINDINGS, 1.0),
             ("payload", "kg", _PAYLOAD, self._mass),
@@ -132,10 +138,13 @@ class ConditionsWatch:
         return value, student(count - 1) * spread
 
 
-def _rows(tick: Tick) -> Array:
-    """What the motors show that turn and neither set off nor slow down, (k, 7)."""
+def _rows(tick: Tick, last: Tick, friction: Array) -> Array:
+    """What the motors show that turn evenly and neither set off nor slow down, (k, 8).
+
+    `friction`: current that it usually takes [A], (3,).
+    """
     motors = tick.motors
-    rows = np.zeros((WHEELS, 7))
+    rows = np.zeros((WHEELS, 8))
     rows[:, _WHEEL] = np.arange(WHEELS)
     if motors.tells_currents:
         rows[:, _GAIN] = 1.0 / motors.constant
@@ -148,28 +157,37 @@ def _rows(tick: Tick) -> Array:
         rows[:, _SQUARE] = motors.resistance / motors.constant**2
         rows[:, _SHOWN] = tick.power - tick.from_encoders
     rows[:, _SIGN] = np.sign(tick.speed)
-    rows[:, _CARRIED] = motors.radius * motors.forces(
-        tick.expected_current, tick.speed, tick.change
-    )
+    # Of the torques that reach the floor, those that move the robot and those that turn it.
+    pushing = motors.radius * motors.forces(tick.expected_current, tick.speed, tick.change)
+    parts = motors.to_twist.T * (motors.to_force @ pushing)
+    rows[:, _CARRIED], rows[:, _TURNED] = parts[:, :2].sum(axis=1), parts[:, 2]
     # Of two currents that make the same power a wheel that slows down may have either.
     slows = np.sign(tick.speed) * tick.change < -_SLOWS
     # Of one that sets off a payload and hot windings look alike.
     sets_off = motors.constant * np.abs(tick.speed) < 2.0 * motors.resistance * np.abs(
         tick.expected_current
     )
-    return rows[(np.abs(tick.speed) > MOVES) & ~slows & ~sets_off]
+    # What encoders show of a jerk is late and smooth.
+    current = tick.expected_current
+    jerks = np.abs(current - last.expected_current) > _EVEN * (np.abs(current) + friction)
+    return rows[(np.abs(tick.speed) > MOVES) & ~slows & ~sets_off & ~jerks]
 
 
 def _equations(rows: Array, value: Array) -> tuple[Array, Array]:
     """Of rows, with tau's square as the last value has it: (k, _UNKNOWNS) and (k,)."""
     wheel = rows[:, _WHEEL].astype(int)
     at_wheel = np.eye(WHEELS)[wheel]
-    torque = rows[:, _SIGN] * value[_FRICTION + wheel] + rows[:, _CARRIED] * value[_PAYLOAD]
+    torque = (
+        rows[:, _SIGN] * value[_FRICTION + wheel]
+        + rows[:, _CARRIED] * value[_PAYLOAD]
+        + rows[:, _TURNED] * value[_INERTIA]
+    )
     is_power = rows[:, _SQUARE] > 0.0
     terms = np.column_stack(
         (
             rows[:, _LOSS],
             rows[:, _GAIN] * rows[:, _CARRIED],
+            rows[:, _GAIN] * rows[:, _TURNED],
             (rows[:, _GAIN] * rows[:, _SIGN])[:, None] * at_wheel,
             is_power[:, None] * at_wheel,
         )

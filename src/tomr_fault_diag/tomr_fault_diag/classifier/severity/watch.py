@@ -89,7 +89,7 @@ class SeverityWatch:
         tick = self._look(frame)
         if last is None or tick is None or frame.stamp_ns - last.stamp_ns > NEXT:
             return
-        self._conditions.take(tick)
+        self._conditions.take(tick, last)
         self._due, self._last = frame.stamp_ns + _SELDOM, None
 
     def _fault_of(
