@@ -327,6 +327,18 @@ def test_nothing_is_told_of_a_moment_or_of_ticks_without_data() -> None:
     assert watch.severity(DRAGGING[1], 1) is None
 
 
+def test_what_is_beyond_all_numbers_is_left_out() -> None:
+    more = power(CURRENT + np.array([0.0, -0.2, 0.0]), SPEED)
+    huge = np.array([1e300, 1.0, 1.0])
+    words = told(
+        DRAGGING[1],
+        1,
+        lambda tick: frame(tick, more * huge if tick % 7 == 0 else more),
+        lambda tick: frame(tick, power(CURRENT, SPEED) * huge),
+    )
+    assert words == "friction added 0.14 N m (0.133 to 0.147 N m)"
+
+
 def test_another_fault_begins_anew_and_its_cause_does_not() -> None:
     watch = SeverityWatch(ROBOT)
     more = power(CURRENT + np.array([0.0, -0.2, 0.0]), SPEED)

@@ -4,6 +4,7 @@
 of the command itself 70 (sysexits.h: EX_SOFTWARE), results that could not be said 74 (EX_IOERR).
 """
 
+import _thread
 import argparse
 import contextlib
 import errno
@@ -11,6 +12,7 @@ import os
 import signal
 import sys
 import threading
+import time
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
@@ -32,7 +34,7 @@ DEBUG = "TOMR_DEBUG"  # environment: not empty, show where an error comes from
 
 _UNWRITTEN = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 
-_AGAIN = 0.02  # s
+_AGAIN = 0.1  # s
 _signals: list[int] = []  # that asked this process to end
 
 Main = Callable[[Sequence[str] | None], int]
@@ -161,7 +163,10 @@ def _unraisable(what: "sys.UnraisableHookArgs") -> None:
         sys.__unraisablehook__(what)
         return
     # Raised right here it would be lost as well.
-    here = threading.get_ident()
-    again = threading.Timer(_AGAIN, signal.pthread_kill, (here, _signals[-1]))
-    again.daemon = True
-    again.start()
+    _thread.start_new_thread(_send_again, (threading.get_ident(), _signals[-1]))
+
+
+def _send_again(thread: int, number: int) -> None:
+    time.sleep(_AGAIN)
+    with contextlib.suppress(OSError):
+        signal.pthread_kill(thread, number)

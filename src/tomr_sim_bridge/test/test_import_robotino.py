@@ -1,5 +1,6 @@
 """tomr_import_robotino: hand-worked numbers, honest errors, and the real files where they are."""
 
+import contextlib
 import csv
 import math
 import os
@@ -19,6 +20,7 @@ from tomr_power_model.messages.intake import header_stamp_ns
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import shipped_robot
 from tomr_sim_bridge.cli.import_robotino import import_robotino
+from tomr_sim_bridge.importers.archive import unpack
 from tomr_sim_bridge.importers.dataset import open_dataset
 from tomr_sim_bridge.importers.robotino import EPOCH_NS, body_twist, camera_pose
 
@@ -326,3 +328,22 @@ def test_archives_that_are_none(
     finally:
         limits.cache_clear()
     assert not (tmp_path / "out.csv").exists()
+
+
+@pytest.mark.parametrize("mode", ["w:gz", "w:bz2", "w:xz"])
+def test_an_archive_that_ends_anywhere_is_refused_in_one_line(tmp_path: Path, mode: str) -> None:
+    (tmp_path / "a.csv").write_text("x")
+    whole = tmp_path / "whole"
+    with tarfile.open(whole, mode) as tar:  # type: ignore[call-overload]
+        tar.add(tmp_path / "a.csv", "a.csv")
+    data, cut = whole.read_bytes(), tmp_path / "cut"
+    for length in (*range(40), len(data) // 2, len(data) - 1):
+        cut.write_bytes(data[:length])
+        with contextlib.suppress(InputError):  # or what is lost is padding alone
+            unpack(cut, tmp_path / "out")
+    named = bytearray(data[:12])
+    if mode == "w:gz":
+        named[3] |= 8  # a name that never ends
+        cut.write_bytes(named)
+        with pytest.raises(InputError, match="cannot be unpacked"):
+            unpack(cut, tmp_path / "out")

@@ -93,6 +93,7 @@ class PowerPredictor:
         self._gyro: tuple[int, float] | None = None
         self._given: tuple[int, Triple] | None = None  # the newest command
         self._intervals: deque[int] = deque(maxlen=_INTERVALS)  # of the commands [ns]
+        self._begun: int | None = None  # the first tick, in motion, of which not all is known
         self._losses: deque[int] = deque()  # stamps of commands before which one was lost
         self._heading = 0.0  # at the start of the next tick, against the first [rad]
         self._model.clear()
@@ -176,11 +177,13 @@ class PowerPredictor:
 
     def _predict(self, tick: int) -> Prediction:
         # What the simulation needs to begin, or to be put where a ripple acts.
-        starts = self._path.state is None or self._ripples
-        estimate = self._encoders.at(tick) if starts else UNKNOWN_MOTION
+        begins = self._path.state is None
+        estimate = self._encoders.at(tick) if begins or self._ripples else UNKNOWN_MOTION
         speed, gyro = estimate.speed.tolist(), self._yaw_rate(tick)
         before = self._moved(estimate, -0.5 * self._period_s)
         commanded = self._path.over(tick, Seen(self._twist(speed), before, self._heading))
+        if begins and commanded is not None and _is_half_known(speed):
+            self._begun = tick
         if commanded is not None:
             estimate = self._encoders.beside(tick, self._path.motion)
             speed = estimate.speed.tolist()
@@ -222,9 +225,12 @@ class PowerPredictor:
     def _is_silent(self, tick: int, commanded: Commanded, speed: Sequence[float]) -> bool:
         """Whether the commands paused lately, so that what the robot was told is not known.
 
+        Nor is it known for a moment of a robot that was moving already, nobody knows how.
         After `command_timeout` it was told to stop; that it stands as it should ends the doubt.
         Without a timeout commands may come when they change only, and no silence means anything.
         """
+        if self._begun is not None and tick - self._begun < _UNSURE:
+            return True
         timeout = self.settings.command_timeout
         if not timeout:
             return False
@@ -342,3 +348,9 @@ def _voltages(means: Means) -> list[float]:
 def _triple(values: Sequence[float] | Array) -> Triple:
     first, second, third = (float(value) for value in values)
     return first, second, third
+
+
+def _is_half_known(speed: Sequence[float]) -> bool:
+    """Whether some wheels turn, and of others nothing is known."""
+    turns = any(abs(value) > _RESTS for value in speed)
+    return turns and any(math.isnan(value) for value in speed)

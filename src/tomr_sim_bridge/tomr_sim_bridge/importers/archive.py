@@ -42,7 +42,8 @@ def unpack(archive: Path, folder: Path) -> Path:
         # Read once from its beginning to its end; nothing is unpacked to find out its size.
         with tarfile.open(archive, mode="r|*", tarinfo=_Bounded) as tar:
             _extract(tar, archive, folder)
-    except (tarfile.TarError, EOFError, OSError, ValueError, zlib.error) as error:
+    # TypeError: of tarfile where a compressed file ends within its header.
+    except (tarfile.TarError, EOFError, OSError, TypeError, ValueError, zlib.error) as error:
         if isinstance(error, InputError):
             raise
         reason = " ".join(str(error).split())

@@ -78,9 +78,15 @@ class SeverityWatch:
             self._look_at_well(frame)
 
     def _look(self, frame: ResidualFrame) -> Tick | None:
-        tick = self._last = Tick.of(self._motors, frame, self._last)
-        if tick is not None:
-            self._sums += np.concatenate([measure.sums(tick) for measure in MEASURES], axis=1)
+        with np.errstate(over="ignore", invalid="ignore"):
+            tick = Tick.of(self._motors, frame, self._last)
+            if tick is not None:
+                sums = np.concatenate([measure.sums(tick) for measure in MEASURES], axis=1)
+                if np.isfinite(sums).all():
+                    self._sums += sums
+                else:  # of a robot or a sensor that is beyond all numbers
+                    tick = None
+        self._last = tick
         return tick
 
     def _look_at_well(self, frame: ResidualFrame) -> None:
