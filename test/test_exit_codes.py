@@ -126,6 +126,7 @@ def test_a_signal_while_modules_load(number: int, code: int) -> None:
 _FINALISER = """
 import os, signal, sys, time
 from tomr_power_model.cli import run_main
+signal.signal(signal.SIGINT, signal.default_int_handler)  # as above
 class Last:
     def __del__(self):
         os.kill(os.getpid(), {number})
