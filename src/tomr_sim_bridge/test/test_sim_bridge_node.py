@@ -149,11 +149,14 @@ def test_real_time_that_cannot_be_held_slows_the_clock(
     operator: Operator, spawn: Callable, wait_until: Callable
 ) -> None:
     bridge = spawn(command_of("real_time_factor:=100.0", "start_time:=1.0"))
-    bridge.wait_for_output("100 times real time cannot be held")
-    wait_until(lambda: operator.spin() or len(operator.heard["joint_states"]) > 50, "samples")
-    stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in
-              operator.heard["joint_states"]]  # fmt: skip
-    assert {later - earlier for earlier, later in pairwise(stamps)} == {10_000_000}
+    # Odometry is reliable; taken all the while, as what waits too long is dropped.
+    heard = operator.heard["odom"]
+    wait_until(
+        lambda: operator.spin() or (len(heard) > 50 and "cannot be held" in bridge.output),
+        "100 times real time cannot be held",
+    )
+    stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in heard]
+    assert {later - earlier for earlier, later in pairwise(stamps)} == {50_000_000}
     assert stamps == sorted(stamps)
     assert bridge.stop() == 0
     assert bridge.output.count("cannot be held") == 1  # throttled
