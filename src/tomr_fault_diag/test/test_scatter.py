@@ -65,11 +65,26 @@ def test_coarse_encoders_of_a_slow_robot_are_no_disorder() -> None:
 def test_a_speed_that_no_wheel_reaches_is_disorder_until_others_outweigh_it() -> None:
     watch = ScatterWatch(fastest=40.0)
     true = WheelEstimate(np.full(3, 8.0), np.zeros(3), scatter=0.001)
-    watch.take(WheelEstimate(np.array([0.0, -41.0, 41.0]), np.zeros(3)))
+    watch.take(WheelEstimate(np.array([0.0, -41.0, 1.0]), np.zeros(3)))
     assert watch.is_disorder
     watch.take(true)
     watch.take(true)
     assert not watch.is_disorder
+
+
+def test_ticks_whose_scatter_does_not_show_change_nothing() -> None:
+    watch = _watched(_shuffled(200.0), lambda time: SPEED * time)
+    for _ in range(30):
+        watch.take(WheelEstimate(np.zeros(3), np.zeros(3)))
+    assert watch.is_disorder
+
+
+def test_a_second_of_order_is_enough() -> None:
+    watch = _watched(_shuffled(200.0), lambda time: SPEED * time)
+    for _ in range(20):
+        watch.take(WheelEstimate(np.full(3, 8.0), np.zeros(3), scatter=0.001))
+    assert not watch.is_disorder
+    assert watch.seconds == 0.001
 
 
 def test_what_was_seen_can_be_forgotten() -> None:

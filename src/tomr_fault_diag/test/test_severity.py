@@ -12,7 +12,7 @@ from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.severity import SeverityWatch
-from tomr_fault_diag.classifier.severity.interval import student
+from tomr_fault_diag.classifier.severity.interval import jackknife_half, student
 from tomr_fault_diag.classifier.severity.measures import MEASURES
 from tomr_fault_diag.classifier.severity.tick import Motors, Tick
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
@@ -377,6 +377,23 @@ def test_a_message_tells_it() -> None:
 @pytest.mark.parametrize(("freedom", "quantile"), [(3, 3.182), (5, 2.571), (20, 2.086)])
 def test_students_quantile(freedom: int, quantile: float) -> None:
     assert student(freedom) == pytest.approx(quantile, rel=0.01)
+
+
+def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
+    values = np.array([1.0, 2.0, 4.0, 9.0])  # deviate by 12.667 squared, of 3 degrees
+    half = jackknife_half((values.sum() - values) / 3.0)
+    assert half == pytest.approx(student(3) * math.sqrt(12.667 / 4.0), rel=1e-3)
+
+
+def test_numbers_beyond_all_are_left_out() -> None:
+    more = CURRENT + np.array([0.0, -0.2, 0.0])
+
+    def beyond_all(tick: int) -> ResidualFrame:
+        shown = power(more, SPEED)
+        return frame(tick, shown * (1e300 if tick % 7 == 0 else 1.0))
+
+    words = told(DRAGGING[1], 1, beyond_all)
+    assert words == "friction added 0.14 N m (0.133 to 0.147 N m)"
 
 
 def test_after_a_clock_goes_back_it_is_told_anew() -> None:

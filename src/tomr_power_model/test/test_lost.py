@@ -53,18 +53,41 @@ def test_where_nothing_changed_nothing_was_lost(drive: Drive, robot: Robot) -> N
     assert lost_commands(less(drive, 20, 21, 22, 23), robot) == []
 
 
-def test_a_stick_that_moves_slowly_may_lose_one(drive: Drive, robot: Robot) -> None:
-    command = drive.command.copy()
-    command[:, 0] = 0.5 * np.sin(0.6 * drive.command_time)
-    assert lost_commands(less(evolve(drive, command=command), 50), robot) == []
+@pytest.mark.parametrize(("axis", "most"), [(0, 0.5), (2, 2.0)])  # m/s, rad/s
+def test_a_stick_that_moves_slowly_may_lose_one(
+    axis: int, most: float, drive: Drive, robot: Robot
+) -> None:
+    command = np.zeros_like(drive.command)
+    command[:, axis] = most * np.sin(0.6 * drive.command_time)
+    assert lost_commands(less(evolve(drive, command=command), 5), robot) == []
+
+
+def test_stamps_that_jitter_lose_nothing(drive: Drive, robot: Robot) -> None:
+    jitter = 0.002 * (-1.0) ** np.arange(len(drive.command_time))
+    command = np.zeros_like(drive.command)
+    command[:, 0] = 0.7 * (-1.0) ** (np.arange(len(command)) // 2)
+    found = evolve(drive, command_time=drive.command_time + jitter, command=command)
+    assert lost_commands(found, robot) == []
+
+
+def sent_after(steps: np.ndarray, drive: Drive) -> Drive:
+    """Commands that differ, so long [s] after one another."""
+    time = np.cumsum(steps)
+    time = time[time < drive.duration]
+    command = np.zeros((len(time), 3))
+    command[:, 0] = 0.3 * (-1.0) ** np.arange(len(time))
+    return evolve(drive, command_time=time, command=command)
+
+
+def test_a_sender_without_a_rate_loses_nothing(drive: Drive, robot: Robot) -> None:
+    steps = np.random.default_rng(3).uniform(PERIOD, 1.8 * PERIOD, 200)
+    assert lost_commands(sent_after(steps, drive), robot) == []
 
 
 def test_a_sender_that_sends_what_changes_loses_nothing(drive: Drive, robot: Robot) -> None:
-    dice = np.random.default_rng(3)
-    rows = np.sort(dice.choice(len(drive.command_time), 12, replace=False))
-    time = np.sort(dice.uniform(0.0, drive.duration, 12))
-    seldom = evolve(drive, command_time=time, command=drive.command[rows])
-    assert lost_commands(seldom, robot) == []
+    periods = np.random.default_rng(3).integers(2, 12, 100)
+    periods[::8] = 1
+    assert lost_commands(sent_after(PERIOD * periods, drive), robot) == []
     none = evolve(drive, command_time=np.empty(0), command=np.empty((0, 3)))
     assert lost_commands(none, robot) == []
 

@@ -274,21 +274,26 @@ def _doubted(
     return len(forgotten)
 
 
-def test_of_a_start_in_motion_of_which_not_all_is_known_nothing_is_said_for_a_moment() -> None:
-    def known(lost: bool) -> list[int]:
-        predictor, found = PowerPredictor(shipped_robot("reference")), []
-        speed = twist_to_wheels(shipped_robot("reference")) @ (0.0, 0.3, 0.4)
-        for at_ms, kind in _events(2000):
-            stamp = BASE + at_ms * MS
-            if kind == "encoders":
-                first, second, third = (float(value) for value in speed * at_ms * 1e-3)
-                predictor.encoders(stamp, (first, second, math.nan if lost else third), NAN3)
-            elif at_ms >= 500:
-                predictor.command(stamp, (0.0, 0.3, 0.4))
-            found.extend(predictor.due())
-        return [
-            (item.stamp_ns - BASE) // MS for item in found if not math.isnan(item.motors[0].power)
-        ]
-
-    assert min(known(lost=False)) <= 600
-    assert 1000 <= min(known(lost=True)) <= 1600
+@pytest.mark.parametrize(
+    ("twist", "is_known", "first"),
+    [
+        ((0.0, 0.3, 0.4), True, 500),  # ms: when the first command comes
+        ((0.0, 0.0, 0.0), False, 1000),  # when the encoder that is lacking is waited for no more
+        ((0.0, 0.3, 0.4), False, 1500),
+    ],
+)
+def test_of_a_start_in_motion_of_which_not_all_is_known_nothing_is_said_for_a_moment(
+    twist: Twist, is_known: bool, first: int
+) -> None:
+    predictor, found = PowerPredictor(shipped_robot("reference")), []
+    speed = twist_to_wheels(shipped_robot("reference")) @ twist
+    for at_ms, kind in _events(2000):
+        stamp = BASE + at_ms * MS
+        if kind == "encoders":
+            one, two, three = (float(value) for value in speed * at_ms * 1e-3)
+            predictor.encoders(stamp, (one, two, three if is_known else math.nan), NAN3)
+        elif at_ms >= 500:
+            predictor.command(stamp, twist)
+        found.extend(predictor.due())
+    predicted = [item.stamp_ns for item in found if not math.isnan(item.motors[0].power)]
+    assert (min(predicted) - BASE) // MS == first

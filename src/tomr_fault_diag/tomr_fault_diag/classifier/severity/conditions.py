@@ -23,7 +23,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from tomr_fault_diag.classifier.severity.interval import Severity, student
+from tomr_fault_diag.classifier.severity.interval import Severity, jackknife_half
 from tomr_fault_diag.classifier.severity.tick import MOVES, Motors, Tick
 from tomr_power_model.robot import WHEELS
 
@@ -93,13 +93,12 @@ class ConditionsWatch:
         self.changes = (*self._of_supply(), *self._of_motors())
 
     def _of_supply(self) -> Iterator[Severity]:
-        count = len(self._voltages)
-        if count < _LEAST:
-            return
         lacks = np.array(self._voltages) - 1.0
-        half = student(count - 1) * float(lacks.std(ddof=1)) / count**0.5
-        if abs(lacks.mean()) > max(_SURE * half, _WORTH_VOLTAGE):
-            yield _change("supply voltage", "", lacks.mean(), half)
+        count = len(lacks)
+        if count >= _LEAST:
+            others = (lacks.sum() - lacks) / (count - 1)
+            half = float(jackknife_half(others))
+            yield from _change("supply voltage", "", lacks.mean(), half, _WORTH_VOLTAGE)
 
     def _of_motors(self) -> Iterator[Severity]:
         if len(self._stretches) < _LEAST:
@@ -113,8 +112,8 @@ class ConditionsWatch:
             *((f"friction of motor {w + 1}", "N m", _FRICTION + w, 1.0) for w in range(WHEELS)),
             *((f"standby power of motor {w + 1}", "W", _STANDBY + w, 1.0) for w in range(WHEELS)),
         ):
-            if abs(value[place]) > max(_SURE * half[place], self._worth[place]):
-                yield _change(quantity, unit, size * value[place], size * half[place])
+            numbers = (size * number[place] for number in (value, half, self._worth))
+            yield from _change(quantity, unit, *numbers)
 
     def _fitted(self) -> tuple[Array, Array]:
         """The unknowns and half their intervals, (_UNKNOWNS,) each."""
@@ -133,9 +132,7 @@ class ConditionsWatch:
         others = np.linalg.solve(
             normal.sum(axis=0) - normal + prior, (shown.sum(axis=0) - shown)[:, :, None]
         )[:, :, 0]
-        count = len(others)
-        spread = np.sqrt((count - 1.0) / count * ((others - others.mean(axis=0)) ** 2).sum(axis=0))
-        return value, student(count - 1) * spread
+        return value, jackknife_half(others)
 
 
 def _rows(tick: Tick, last: Tick, friction: Array) -> Array:
@@ -196,5 +193,9 @@ def _equations(rows: Array, value: Array) -> tuple[Array, Array]:
     return terms, shown
 
 
-def _change(quantity: str, unit: str, value: float, half: float) -> Severity:
-    return Severity(quantity, unit, float(value), float(value - half), float(value + half))
+def _change(
+    quantity: str, unit: str, value: float, half: float, worth: float
+) -> Iterator[Severity]:
+    """Nothing where it is not worth telling, or not sure."""
+    if abs(value) > max(_SURE * half, worth):
+        yield Severity(quantity, unit, float(value), float(value - half), float(value + half))

@@ -1,6 +1,10 @@
 """A quantity with its interval."""
 
+import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 
 @frozen
@@ -22,6 +26,16 @@ class Severity:
             return f"{self.quantity} {value} % ({low} to {high} %)"
         value, low, high = (f"{number:.3g}" for number in numbers)
         return f"{self.quantity} {value} {self.unit} ({low} to {high} {self.unit})"
+
+
+def jackknife_half(others: Array) -> Array:
+    """Half an interval of 95 %, (...), of estimates that leave out one of n parts each, (n, ...).
+
+    Independent parts; n at least 2 (Efron and Tibshirani 1993, Eq. 11.5).
+    """
+    count = len(others)
+    spread = ((others - others.mean(axis=0)) ** 2).sum(axis=0)
+    return np.asarray(student(count - 1) * np.sqrt((count - 1.0) / count * spread))
 
 
 def student(freedom: int) -> float:

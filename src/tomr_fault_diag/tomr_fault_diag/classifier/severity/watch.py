@@ -11,7 +11,6 @@ what its description lacks, or the fault before it was noticed, and by what a de
 know: its constants to 5 %, the friction of an axle to a tenth. What includes 0 is not told.
 """
 
-import math
 from collections import deque
 from collections.abc import Mapping, Sequence
 
@@ -19,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.severity.conditions import ConditionsWatch
-from tomr_fault_diag.classifier.severity.interval import Severity, student
+from tomr_fault_diag.classifier.severity.interval import Severity, jackknife_half
 from tomr_fault_diag.classifier.severity.measures import MEASURES, Measure
 from tomr_fault_diag.classifier.severity.tick import NEXT, Motors, Tick
 from tomr_fault_diag.classifier.states import NORMAL, STATES, State
@@ -144,9 +143,7 @@ def _places() -> Mapping[State, tuple[Measure, int]]:
 def _slope(stretches: Sequence[Array], place: int) -> tuple[float, float] | None:
     """A slope and half its interval; None where too few stretches tell."""
     x, y = np.array([sums[:, place] for sums in stretches if sums[0, place] > 0.0]).reshape(-1, 2).T
-    count = len(x)
-    if count < _LEAST:
+    if len(x) < _LEAST:
         return None
     others = (y.sum() - y) / (x.sum() - x)
-    error = math.sqrt((count - 1.0) / count * float(np.sum((others - others.mean()) ** 2)))
-    return float(y.sum() / x.sum()), student(count - 1) * error
+    return float(y.sum() / x.sum()), float(jackknife_half(others))
