@@ -112,6 +112,17 @@ def test_damaged_compiled_code_is_made_anew(
     assert binding._is_whole(kept)
 
 
+def test_code_of_two_folders_has_names_of_its_own(tmp_path: Path) -> None:
+    """The linker of a process takes one function for another of the same name."""
+
+    def law(number: float) -> float:
+        return number
+
+    folders = [tmp_path / "one", tmp_path / "two", None, None]
+    names = {compiler(law).__name__ for f in folders for compiler in binding._compilers(f)}
+    assert len(names) == len(folders)
+
+
 def test_two_processes_may_compile_at_once(tmp_path: Path) -> None:
     (tmp_path / "twice.py").write_text(TWICE, encoding="utf-8")
     code = "import twice; print(twice.result(twice.binding._cache_folder('1')))"
