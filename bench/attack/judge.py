@@ -213,9 +213,11 @@ def _false_word(given: Attack, code: int, output: str) -> str:
         found = json.loads(output)
     except ValueError:
         return "output is no JSON"
-    if code == 0 and not found["ticks"]:
+    done = found.get("recordings", [found])  # of a folder that holds several
+    if code == 0 and not any(item["ticks"] for item in done):
         return "silence"
     if given.names is None or code == 0:
         return ""
-    wrong = found["shares"].keys() - FAULTLESS - {UNKNOWN.name} - given.names
+    named = {name for item in done for name in item["shares"]}
+    wrong = named - FAULTLESS - {UNKNOWN.name} - given.names
     return f"false word: {', '.join(sorted(wrong))}" if wrong else ""

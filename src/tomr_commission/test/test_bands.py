@@ -23,7 +23,7 @@ def test_margin_multiplies_the_bands(steady: Steady) -> None:
 
 def test_bands_hold_the_share_that_was_asked_for(steady: Steady) -> None:
     drive = steady(ticks=8000)
-    shares = outside(drive, bands_of([drive], BandChoice(0.99, 1.0, 1.0)))
+    shares = outside([drive], bands_of([drive], BandChoice(0.99, 1.0, 1.0)))
     assert all(0.002 < share < 0.03 for share in shares.values())
 
 

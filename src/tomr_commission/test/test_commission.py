@@ -12,6 +12,7 @@ import yaml
 
 from tomr_commission.cli import main
 from tomr_commission.commission import _observe
+from tomr_commission.explained import Split
 from tomr_commission.rehearsal import Shoved
 from tomr_commission.trials import Trial
 from tomr_fault_diag.classifier.commissioned import commissioned_words, stamp_of
@@ -252,3 +253,28 @@ def test_plan_is_a_mission_of_some_minutes(
     assert 120.0 < plan.duration < 240.0
     assert str(mission) in capsys.readouterr().out
     assert main(["plan", "--robot", "reference", "--out", str(mission), "--speed", "50"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("durations", "fitted"),
+    [
+        ((600.0, 200.0), 1),
+        ((200.0, 200.0, 60.0), 2),
+        ((200.0, 200.0, 30.0, 25.0), 2),  # 55 s of the last two
+        ((200.0, 20.0, 20.0, 20.0), 1),
+        ((20.0, 20.0), 1),  # one is needed to fit to
+    ],
+)
+def test_as_many_of_the_last_drives_are_held_out_as_last_a_minute(
+    durations: tuple[float, ...], fitted: int
+) -> None:
+    bags = [Path(f"tour{k}") for k in range(len(durations))]
+    split = Split.of(bags, durations, 52.8)
+    assert split.fitted == tuple(bags[:fitted])
+    assert split.held == tuple(bags[fitted:])
+    assert split.cut is None
+
+
+def test_of_a_single_drive_the_last_third_is_held_out() -> None:
+    split = Split.of([Path("tour")], [300.0], 52.8)
+    assert (split.fitted, split.held, split.cut) == ((Path("tour"),), (Path("tour"),), 200.0)

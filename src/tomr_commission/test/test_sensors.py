@@ -112,8 +112,9 @@ def test_a_rate_that_is_not_known_is_not_told(is_known: bool) -> None:
     outcome = SimpleNamespace(
         level=level,
         explained={"report": REPORT},
-        held=SimpleNamespace(name="tour", hours=0.1),
-        held_said=said,
+        held_name="tour",
+        held_hours=0.1,
+        held_together=said,
     )
     request = SimpleNamespace(false_alarms_per_hour=0.05)
     found = SimpleNamespace(

@@ -30,10 +30,10 @@ def outcome(steady: Steady) -> Outcome:
         CommissionRequest("reference", (), Path()),
         {"report": report, "levels": levels},
         fitted,
-        steady("held", seed=4),
+        (steady("held", seed=4),),
         bands_of(fitted, BandChoice()),
         LEVEL,
-        QUIET,
+        (QUIET,),
         (QUIET,) * 3,
     )
 
@@ -75,6 +75,62 @@ def test_drive_that_scatters_more_than_the_rest(outcome: Outcome, steady: Steady
     assert any("tour3 needs bands" in line for line in said(wild))
 
 
+def idle(drive: Observed, wheel: int) -> Observed:
+    """A drive in which a wheel stands and its motor draws next to nothing."""
+    modelled, residual = drive.modelled.copy(), drive.residual.copy()
+    modelled[:, [1 + wheel, 4 + wheel, 7 + wheel]] = 1e-9
+    residual[:, 4 + wheel] = 0.0
+    return evolve(drive, modelled=modelled, residual=residual)
+
+
+def test_a_wheel_that_idles_in_a_drive_does_not_drag_there(outcome: Outcome) -> None:
+    first, second, third = outcome.fitted
+    assert said(evolve(outcome, fitted=(idle(first, 2), idle(second, 1), third))) == []
+    everywhere = tuple(idle(drive, 2) for drive in (first, second, third))
+    held = tuple(idle(drive, 2) for drive in outcome.held)
+    assert said(evolve(outcome, fitted=everywhere, held=held)) == []
+
+
+def among_many(outcome: Outcome, steady: Steady, apart: float) -> list[str]:
+    """Of ten drives that scatter by a fifth of the usual torque each way, and one of its own."""
+    drives = [steady(f"tour{k}", seed=k) for k in range(11)]
+    for k, drive in enumerate(drives):
+        power = 0.8 * (-1.0) ** k if k < 10 else apart
+        for channel in (1, 2, 3):
+            drive = added(drive, channel, power)
+        drives[k] = drive
+    found = said(
+        evolve(
+            outcome,
+            fitted=tuple(drives),
+            fitted_said=(QUIET,) * 11,
+            bands=bands_of(drives, BandChoice()),
+        )
+    )
+    return [line for line in found if "of the usual torque" in line]
+
+
+def test_of_many_drives_one_is_apart_that_lies_out_of_their_scatter(
+    outcome: Outcome, steady: Steady
+) -> None:
+    assert among_many(outcome, steady, 1.6) == []
+    (line,) = among_many(outcome, steady, 7.2)
+    assert line.startswith("tour10: every wheel needs +1")
+
+
+def test_of_many_drives_some_need_wider_bands(outcome: Outcome, steady: Steady) -> None:
+    def wider(sigmas: list[float]) -> list[str]:
+        drives = tuple(steady(f"tour{k}", sigma=s, seed=k) for k, s in enumerate(sigmas))
+        quiet = (QUIET,) * len(drives)
+        found = said(evolve(outcome, fitted=drives, fitted_said=quiet))
+        return [line.partition(" needs bands")[0] for line in found if "needs bands" in line]
+
+    even = [0.1 * 1.25**k for k in range(9)]
+    assert wider(even) == []
+    assert wider([*[0.1] * 8, 0.6]) == ["tour8"]
+    assert wider([0.1, 0.1, 0.1, 0.6]) == ["tour3"]
+
+
 def test_alarm_in_a_healthy_drive(outcome: Outcome) -> None:
     alarmed = Decided(1000, 0, (Episode("slip", None, 12.0, 13.5),))
     found = said(evolve(outcome, fitted_said=(QUIET, alarmed, QUIET)))
@@ -84,7 +140,7 @@ def test_alarm_in_a_healthy_drive(outcome: Outcome) -> None:
 
 
 def test_held_out_drive_outside_of_the_bands(outcome: Outcome, steady: Steady) -> None:
-    wild = evolve(outcome, held=steady("held", sigma=0.25, seed=9))
+    wild = evolve(outcome, held=(steady("held", sigma=0.25, seed=9),))
     assert any("of the held-out residuals of" in line for line in said(wild))
 
 

@@ -18,6 +18,7 @@ Mask = NDArray[np.bool_]
 _REST = 0.1  # rad/s: a slower wheel stands
 _STEADY = 0.3  # rad/s over three ticks
 _LATELY = 10  # ticks
+_LEAST_STEADY = 40  # ticks, from which a torque is told
 KINDS: Mapping[str, Sequence[int]] = {
     "total power": [TOTAL],
     "motor power, command path": list(MOTORS),
@@ -113,9 +114,9 @@ def _any_or_all(mask: Mapping[str, Mask], regime: str) -> Mask:
     return np.asarray(mask[regime].all(axis=1) if quiet else mask[regime].any(axis=1))[:, None]
 
 
-def outside(drive: Observed, bands: BandSettings) -> dict[str, float]:
-    """Share of a drive's residuals outside of the bands, by kind."""
-    ratio = np.abs(drive.residual) / band_of(drive, bands)
+def outside(drives: Sequence[Observed], bands: BandSettings) -> dict[str, float]:
+    """Share of the drives' residuals outside of the bands, by kind."""
+    ratio = np.concatenate([np.abs(drive.residual) / band_of(drive, bands) for drive in drives])
     shares = {}
     for kind, channels in KINDS.items():
         known = ratio[:, list(channels)][np.isfinite(ratio[:, list(channels)])]
@@ -140,21 +141,21 @@ class Drag:
     """Torque that wheels need in steady motion, as their power tells it."""
 
     added: Array  # N m beyond the modelled, (3,)
-    usual: Array  # N m, (3,)
+    usual: Array  # N m, as modelled, (3,)
 
 
 def steady_drag(drive: Observed) -> Drag:
     """What the residuals of power amount to as a torque that resists each wheel.
 
-    Where no wheel is ever steady it is nothing. Currents count as powers: shares are the same.
+    NaN for a wheel that is hardly ever steady. Currents count as powers: shares are the same.
     """
     speed = np.abs(np.nan_to_num(drive.modelled[:, list(SPEEDS)]))
     residual, modelled = drive.residual[:, list(MOTORS)], drive.modelled[:, list(MOTORS)]
     rows = regimes(drive)["steady"] & np.isfinite(residual) & np.isfinite(modelled)
     weight = np.where(rows, speed, 0.0)
-    total = np.maximum((weight**2).sum(axis=0), 1e-9)
+    total = np.where(rows.sum(axis=0) < _LEAST_STEADY, np.nan, (weight**2).sum(axis=0))
 
     def torque(power: Array) -> Array:
         return np.asarray((weight * np.where(rows, power, 0.0)).sum(axis=0) / total)
 
-    return Drag(torque(residual), np.maximum(np.abs(torque(modelled)), 1e-9))
+    return Drag(torque(residual), np.abs(torque(modelled)))

@@ -24,7 +24,8 @@ examples:
 
 Record at least four minutes of healthy driving on the floors that count, in two drives or more, as
 the robot is used: starts and stops, several headings and speeds, spins, both directions, and ten
-seconds of standing. The last drive is held out (of a single one the last third).
+seconds of standing. The last drive is held out (the last ones until they are a minute long; of a
+single one the last third).
 
 written to --out:
   commissioned.yaml   in place of robot.yaml, for --robot and --params-file

@@ -52,9 +52,10 @@ Progress = Callable[[str, float], None]
 
 STEPS = "steps"
 _CURRENTS = (
-    "neither shoves nor faults were simulated: the robot tells currents, not powers; so the alarm "
-    "level is the shipped one at least, and how many false alarms shoves raise is not known"
+    "shoves were not simulated: the robot tells currents, not powers; so the alarm level is the "
+    "shipped one at least, and how many false alarms shoves raise is not known"
 )
+_MORE = 1.1  # of the least that is held out: ends of recordings are not compared
 _HOPELESS = 1.5  # times the caution that may be needed: more shoves will not bring it down
 
 
@@ -104,24 +105,25 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     drives = work.observed(described)
     fitted, held = work.divided(drives)
     silent = set.intersection(*(set(drive.silent) for drive in fitted))
+    longest = max(held, key=lambda drive: drive.hours)
     classifier, plan = work.classifier(described), Rehearsal(silent=tuple(sorted(silent)))
     tuned = work.tuned(described, fitted, classifier, plan)
     bands, level = tuned.bands, tuned.level
     chosen = evolve(classifier, caution=level.caution)
     progress("validating", 0.85)
-    said = [decisions(frames_of(drive, bands), chosen) for drive in (*fitted, held)]
-    trials = try_injected(held, bands, chosen, kinds_for(held))
-    notes = [note for drive in work.drives for note in drive.notes]
-    if tells_currents(held):
-        notes.append(_CURRENTS)
-    else:
-        simulated, note = work.simulated(described, bands, chosen)
-        trials += simulated
-        notes += [note] if note else []
-    floors = floors_of(trials)
-    outcome = Outcome(
-        request, explained, tuple(fitted), held, bands, level, said[-1], tuple(said[:-1])
+    held_said, fitted_said = (
+        tuple(decisions(frames_of(drive, bands), chosen) for drive in part)
+        for part in (held, fitted)
     )
+    trials = try_injected(longest, bands, chosen, kinds_for(longest))
+    notes = [note for drive in work.drives for note in drive.notes]
+    if tells_currents(longest):
+        notes.append(_CURRENTS)
+    simulated, note = work.simulated(described, bands, chosen)
+    trials += simulated
+    notes += [note] if note else []
+    floors = floors_of(trials)
+    outcome = Outcome(request, explained, fitted, held, bands, level, held_said, fitted_said)
     against = tuple(reasons(outcome))
     date = datetime.datetime.now(datetime.UTC).date().isoformat()
     text = _text(work, described, outcome, (against, floors, date))
@@ -168,7 +170,8 @@ class _Work:
                 raise InputError(f"{bag}: no cmd_vel: record it too, the simulation needs it")
         check_wheels(drives, robot, str(request.robot))
         check_values(drives[0], values, str(request.robot))
-        split = Split.of(request.bags, drives[0].duration)
+        durations = [drive.duration for drive in drives]
+        split = Split.of(request.bags, durations, _MORE * 60.0 * request.limits.held_minutes)
         names = tuple(names_of(request.bags))
         store = Store(request.out / STEPS)
         return cls(request, progress, store, key, split, names, drives)
@@ -184,7 +187,7 @@ class _Work:
                 lambda stage, part: self.progress(f"explaining: {stage}", 0.02 + 0.4 * part),
             )
 
-        key = digest([self.key, repr(request.tolerance)])
+        key = digest([self.key, repr(request.tolerance), repr(len(self.split.held))])
         found = self.store.values("explained", key, make)
         folder = request.out / FOLDER
         make_folder(folder)
@@ -223,15 +226,16 @@ class _Work:
         skips = self.request.skips
         return [drive.without(skips.get(drive.name, ())) for drive in kept if drive is not None]
 
-    def divided(self, drives: Sequence[Observed]) -> tuple[list[Observed], Observed]:
-        """Fitted drives, and the one held out."""
+    def divided(
+        self, drives: Sequence[Observed]
+    ) -> tuple[tuple[Observed, ...], tuple[Observed, ...]]:
+        """Fitted drives, and those held out."""
         if self.split.cut is None:
-            return list(drives[:-1]), drives[-1]
+            count = len(self.split.fitted)
+            return tuple(drives[:count]), tuple(drives[count:])
         at = int(np.searchsorted(drives[0].seconds, self.split.cut))
-        name = drives[0].name
-        return [drives[0].part(slice(0, at), f"{name} (first two thirds)")], drives[0].part(
-            slice(at, None), f"{name} (last third)"
-        )
+        first = drives[0].part(slice(0, at), f"{drives[0].name} (first two thirds)")
+        return (first,), (drives[0].part(slice(at, None), f"{drives[0].name} (last third)"),)
 
     def classifier(self, described: Path | None) -> ClassifierSettings:
         """Settings of the classifier as the description has them."""
@@ -364,7 +368,7 @@ def _text(
     record = Record(
         date=date,
         drives=tuple(drive.name for drive in outcome.fitted),
-        held_out=outcome.held.name,
+        held_out=outcome.held_name,
         method="exponential tails of the classifier's evidence, real driving and simulated shoves",
         level=outcome.level,
         floors={floor.kind: floor.words for floor in floors},

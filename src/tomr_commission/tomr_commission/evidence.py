@@ -5,7 +5,7 @@ decades of `caution` a tick would have overcome. It is read off the classifier i
 most caution there is, so that it follows whatever the classifier becomes.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from attrs import evolve, frozen
@@ -70,6 +70,15 @@ class Decided:
     ticks: int
     undecided: int  # ticks that are stale or not observable
     alarms: tuple[Episode, ...]
+
+
+def together(said: Sequence[Decided]) -> Decided:
+    """What is said of several drives; each alarm keeps the times of its own."""
+    return Decided(
+        sum(one.ticks for one in said),
+        sum(one.undecided for one in said),
+        tuple(alarm for one in said for alarm in one.alarms),
+    )
 
 
 def decisions(frames: list[ResidualFrame], settings: ClassifierSettings) -> Decided:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from attrs import frozen
 
 from tomr_commission.request import CommissionRequest
@@ -23,18 +24,23 @@ _REST = 1e9  # s: to the end of a recording
 
 @frozen
 class Split:
-    """Which drives are fitted and which is held out; of a single drive the last third is."""
+    """Which drives are fitted and which are held out; of a single drive the last third is."""
 
     fitted: tuple[Path, ...]
-    held: Path
+    held: tuple[Path, ...]
     cut: float | None = None  # s of the single drive from which on it is held out
 
     @classmethod
-    def of(cls, bags: Sequence[Path], single_duration: float) -> "Split":
-        """The last drive is held out; of a single one of a duration [s] the last third."""
+    def of(cls, bags: Sequence[Path], durations: Sequence[float], least: float) -> "Split":
+        """The last drive is held out, or as many of the last as last so long [s] together.
+
+        Of a single one of a duration [s] the last third.
+        """
         if len(bags) == 1:
-            return cls((bags[0],), bags[0], 2.0 / 3.0 * single_duration)
-        return cls(tuple(bags[:-1]), bags[-1])
+            return cls((bags[0],), (bags[0],), 2.0 / 3.0 * durations[0])
+        from_last = np.cumsum(durations[:0:-1])  # without the first
+        count = min(int(np.searchsorted(from_last, least)) + 1, len(bags) - 1)
+        return cls(tuple(bags[:-count]), tuple(bags[-count:]))
 
 
 def explain_drives(asked: CommissionRequest, split: Split, progress: Progress) -> Any:
@@ -49,7 +55,7 @@ def explain_drives(asked: CommissionRequest, split: Split, progress: Progress) -
     request = Request(
         robot=asked.robot,
         real=split.fitted,
-        holdout=() if split.cut is not None else (split.held,),
+        holdout=() if split.cut is not None else split.held,
         tolerance=asked.tolerance,
         skips=skips,
     )

@@ -43,6 +43,8 @@ class Limits:
     nrmse: float = 0.15  # of power on the held-out drive
     drives_apart: float = 2.0  # band that one drive needs over that of the others
     drag_apart: float = 0.15  # share of the usual torque by which drives may differ
+    many_drives: int = 8  # of so many one is apart that also lies far out of their scatter
+    far_out: float = 4.0  # standard deviations
     outside: float = 0.02  # share of held-out residuals outside of the bands
     minutes: float = 2.5  # of driving to fit to, at least
     held_minutes: float = 0.8

@@ -4,16 +4,20 @@ from typing import Any
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from tomr_commission.alarm import AlarmLevel
 from tomr_commission.bands import needed, outside, steady_drag
-from tomr_commission.evidence import MOST_CAUTION, Decided
+from tomr_commission.evidence import MOST_CAUTION, Decided, together
 from tomr_commission.observed import Observed
 from tomr_commission.request import CommissionRequest, Limits
 from tomr_fault_diag.residuals.settings import BandSettings
 
+Array = NDArray[np.float64]
+
 DRAWN = ("W", "A")
 _WITHIN = 0.999
+_NEXT_TO_NONE = 1e-9  # bands
 
 
 @frozen
@@ -31,11 +35,26 @@ class Outcome:
     request: CommissionRequest
     explained: Any  # of `explain_drives`
     fitted: tuple[Observed, ...]
-    held: Observed
+    held: tuple[Observed, ...]
     bands: BandSettings
     level: AlarmLevel
-    held_said: Decided
+    held_said: tuple[Decided, ...]
     fitted_said: tuple[Decided, ...]
+
+    @property
+    def held_name(self) -> str:
+        """Of all drives held out."""
+        return ", ".join(drive.name for drive in self.held)
+
+    @property
+    def held_hours(self) -> float:
+        """Of all drives held out."""
+        return sum(drive.hours for drive in self.held)
+
+    @property
+    def held_together(self) -> Decided:
+        """What is said of all drives held out."""
+        return together(self.held_said)
 
 
 def reasons(outcome: Outcome) -> list[Reason]:
@@ -53,7 +72,7 @@ def reasons(outcome: Outcome) -> list[Reason]:
 
 def _too_short(outcome: Outcome, limits: Limits) -> list[Reason]:
     minutes = 60.0 * sum(drive.hours for drive in outcome.fitted)
-    held = 60.0 * outcome.held.hours
+    held = 60.0 * outcome.held_hours
     if minutes >= limits.minutes and held >= limits.held_minutes:
         return []
     return [
@@ -99,54 +118,77 @@ def _apart(outcome: Outcome, limits: Limits) -> list[Reason]:
     drives = outcome.fitted
     if len(drives) < 2:
         return []
-    wide = [max(needed(drive, outcome.bands, _WITHIN).values()) for drive in drives]
-    found = []
-    for index, drive in enumerate(drives):
-        others = float(np.median([value for k, value in enumerate(wide) if k != index]))
-        if wide[index] > limits.drives_apart * others and wide[index] > 1.0:
-            found.append(
-                Reason(
-                    f"{drive.name} needs bands {wide[index] / others:.1f} times as wide as the "
-                    "other drives: a fault, another floor or another load in it",
-                    "look at it with tomr_diagnose and leave it out, or record it again",
-                )
-            )
-    return found
+    wide = np.array([max(needed(drive, outcome.bands, _WITHIN).values()) for drive in drives])
+    beyond = _beyond(
+        np.log(np.maximum(wide, _NEXT_TO_NONE))[:, None], float(np.log(limits.drives_apart)), limits
+    )[:, 0]
+    return [
+        Reason(
+            f"{drive.name} needs bands {np.exp(size):.1f} times as wide as the "
+            "other drives: a fault, another floor or another load in it",
+            "look at it with tomr_diagnose and leave it out, or record it again",
+        )
+        for drive, size, needs in zip(drives, beyond, wide, strict=True)
+        if size > 0.0 and needs > 1.0
+    ]
+
+
+def _beyond(values: Array, least: float, limits: Limits) -> Array:
+    """By how much values of drives, (n, k), differ from the others' median; 0: not noteworthy.
+
+    By more than `least`, and of many drives, which show how far they scatter, far out of that.
+    """
+    others = [_median(np.delete(values, row, axis=0)) for row in range(len(values))]
+    apart = np.nan_to_num(values - others)
+    most = np.full(values.shape[1], least)
+    if len(values) >= limits.many_drives:
+        scatter = 1.4826 * _median(np.abs(values - _median(values)))
+        most = np.maximum(most, limits.far_out * np.nan_to_num(scatter))
+    return np.where(np.abs(apart) > most, apart, 0.0)
+
+
+def _median(values: Array) -> Array:
+    """Of the rows that are known, (k,); NaN where none is."""
+    known = [column[np.isfinite(column)] for column in values.T]
+    return np.array([np.median(column) if len(column) else np.nan for column in known])
 
 
 def _floors(outcome: Outcome, limits: Limits) -> list[Reason]:
     """A drive in which the wheels need another torque than in the rest."""
-    drives = (*outcome.fitted, outcome.held)
+    drives = (*outcome.fitted, *outcome.held)
     if len(drives) < 2:
         return []
     drags = [steady_drag(drive) for drive in drives]
-    found = []
-    for index, drive in enumerate(drives):
-        rest = np.median([drag.added for k, drag in enumerate(drags) if k != index], axis=0)
-        share = (drags[index].added - rest) / drags[index].usual
-        if np.abs(share).max() > limits.drag_apart:
-            alike = np.ptp(share) < 0.5 * np.abs(share).max()
-            wheel = int(np.argmax(np.abs(share)))
-            what = "every wheel needs" if alike else f"wheel {wheel + 1} needs"
-            size = float(np.mean(share)) if alike else float(share[wheel])
-            found.append(
-                Reason(
-                    f"{drive.name}: {what} {100 * size:+.0f} % of the usual torque beside the "
-                    f"other drives: {'another floor or load' if alike else 'a wheel that drags'}",
-                    "commission each floor by itself, or give drives of both to fit"
-                    if alike
-                    else "look after that wheel, and leave the drive out",
-                )
-            )
-    return found
+    # A wheel that idles in one drive is measured by what it usually does.
+    usual = _median(np.array([drag.usual for drag in drags]))
+    shares = np.array([drag.added / usual for drag in drags])
+    return [
+        _another_floor(drive.name, row)
+        for drive, row in zip(drives, _beyond(shares, limits.drag_apart, limits), strict=True)
+        if row.any()
+    ]
+
+
+def _another_floor(drive: str, share: Array) -> Reason:
+    """`share` by which the torque at each wheel differs from the usual, (3,); 0: as usual."""
+    alike = np.ptp(share) < 0.5 * np.abs(share).max()
+    wheel = int(np.argmax(np.abs(share)))
+    what = "every wheel needs" if alike else f"wheel {wheel + 1} needs"
+    size = float(np.mean(share)) if alike else float(share[wheel])
+    return Reason(
+        f"{drive}: {what} {100 * size:+.0f} % of the usual torque beside the "
+        f"other drives: {'another floor or load' if alike else 'a wheel that drags'}",
+        "commission each floor by itself, or give drives of both to fit"
+        if alike
+        else "look after that wheel, and leave the drive out",
+    )
 
 
 def _held_out(outcome: Outcome, limits: Limits) -> list[Reason]:
     found = []
-    for said, drive in [
-        (outcome.held_said, outcome.held),
-        *zip(outcome.fitted_said, outcome.fitted, strict=True),
-    ]:
+    for said, drive in zip(
+        (*outcome.held_said, *outcome.fitted_said), (*outcome.held, *outcome.fitted), strict=True
+    ):
         if said.alarms:
             alarm = said.alarms[0]
             found.append(

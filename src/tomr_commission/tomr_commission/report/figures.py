@@ -11,6 +11,7 @@ from tomr_power_model.canvas import AFTER, BEFORE, MEASURED, png, sheet
 
 _COLOURS = (AFTER, BEFORE)
 _SMOOTH = 200
+_PAUSE = 1.0  # s between drives that are drawn one after the other
 
 
 def alarm_picture(found: Commissioned) -> str:
@@ -55,13 +56,16 @@ def _tail(panel: object, tail: Tail, colour: str) -> None:
 
 
 def held_picture(found: Commissioned) -> str:
-    """Residuals of the held-out drive over their bands."""
-    drive = found.outcome.held
-    ratio = drive.residual / band_of(drive, found.outcome.bands)
+    """Residuals of the drives held out over their bands, one drive after the other."""
+    drives = found.outcome.held
+    ends = np.cumsum([drive.seconds[-1] + _PAUSE for drive in drives])
     with sheet(len(KINDS), 1, 1.3) as (drawing, panels):
         for panel, (kind, channels) in zip(panels, KINDS.items(), strict=True):
-            for channel in channels:
-                panel.plot(drive.seconds, ratio[:, channel], lw=0.6)
+            for drive, end in zip(drives, ends, strict=True):
+                ratio = drive.residual / band_of(drive, found.outcome.bands)
+                time = end - _PAUSE - drive.seconds[-1] + drive.seconds
+                for number, channel in enumerate(channels):
+                    panel.plot(time, ratio[:, channel], lw=0.6, color=f"C{number}")
             panel.axhspan(-1.0, 1.0, color="#dcfce7", zorder=0)
             panel.set_ylim(-2.5, 2.5)
             panel.set_ylabel(kind.replace(", ", ",\n") + "\nbands", fontsize=6)

@@ -21,7 +21,7 @@ def page(found: Commissioned) -> str:
         level=found.outcome.level,
         report=found.outcome.explained["report"],
         headline=headline(found),
-        decided=decided_share(found.outcome.held_said),
+        decided=decided_share(found.outcome.held_together),
         alarm_picture=alarm_picture(found),
         held_picture=held_picture(found),
         kinds=list(dict.fromkeys(line.kind for line in found.regimes)),

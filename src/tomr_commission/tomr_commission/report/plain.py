@@ -21,9 +21,9 @@ def lines(found: Commissioned) -> list[str]:
     said += [
         f"robot: {outcome.explained['report']['sentence']}",
         f"alarm level: {level.caution:g} decades; {_expected(level)}",
-        f"held out ({outcome.held.name}, {60 * outcome.held.hours:.1f} min): "
-        f"{len(outcome.held_said.alarms)} false alarms, "
-        f"{100 * decided_share(outcome.held_said):.0f} % of the time decided",
+        f"held out ({outcome.held_name}, {60 * outcome.held_hours:.1f} min): "
+        f"{len(outcome.held_together.alarms)} false alarms, "
+        f"{100 * decided_share(outcome.held_together):.0f} % of the time decided",
     ]
     said.append("smallest size found:")
     for floor in found.floors:
@@ -86,10 +86,14 @@ def fields(found: Commissioned) -> dict[str, Any]:
             "simulated_hours": found.shoved.hours,
         },
         "held_out": {
-            "name": outcome.held.name,
-            "hours": outcome.held.hours,
-            "false_alarms": [asdict(alarm) for alarm in outcome.held_said.alarms],
-            "decided": decided_share(outcome.held_said),
+            "name": outcome.held_name,
+            "hours": outcome.held_hours,
+            "false_alarms": [
+                {"drive": drive.name, **asdict(alarm)}
+                for drive, said in zip(outcome.held, outcome.held_said, strict=True)
+                for alarm in said.alarms
+            ],
+            "decided": decided_share(outcome.held_together),
             "outside_bands": outside(outcome.held, outcome.bands),
         },
         "fitted": [
