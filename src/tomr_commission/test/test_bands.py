@@ -9,6 +9,7 @@ from attrs import evolve
 from tomr_commission.bands import bands_of, outside, regime_table, regimes, steady_drag
 from tomr_commission.observed import Observed
 from tomr_commission.request import BandChoice
+from tomr_fault_diag.residuals.frame import SPEEDS
 
 Steady = Callable[..., Observed]
 
@@ -55,3 +56,19 @@ def test_drag_is_power_over_speed(steady: Steady) -> None:
     drag = steady_drag(evolve(drive, residual=residual))
     assert np.allclose(drag.added, [0.0, 0.2, 0.0])
     assert np.allclose(drag.usual, 0.8)
+
+
+def test_drag_of_currents_does_not_hang_on_the_speed(steady: Steady) -> None:
+    drive = steady(sigma=0.0)
+    residual, modelled, units = drive.residual.copy(), drive.modelled.copy(), drive.units.copy()
+    residual[:, 2] = 1.0
+    modelled[:, list(SPEEDS)] = [5.0, 0.5, 2.0]
+    units[[0, 1, 2, 3, 7, 8, 9]] = "A"
+    drag = steady_drag(evolve(drive, residual=residual, modelled=modelled, units=units))
+    assert np.allclose(drag.added, [0.0, 1.0, 0.0])  # A
+    assert np.allclose(drag.usual, 4.0)
+
+
+def test_drag_of_a_wheel_that_is_seldom_steady_is_not_known(steady: Steady) -> None:
+    assert np.isnan(steady_drag(steady(ticks=39)).added).all()
+    assert np.isfinite(steady_drag(steady(ticks=50)).added).all()

@@ -6,7 +6,7 @@ import numpy as np
 from attrs import asdict, frozen
 from numpy.typing import NDArray
 
-from tomr_commission.observed import Observed, band_of
+from tomr_commission.observed import Observed, band_of, tells_currents
 from tomr_commission.request import BandChoice
 from tomr_fault_diag.residuals.calibrated import fit_bands, widened
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL
@@ -138,24 +138,26 @@ def needed(drive: Observed, bands: BandSettings, within: float) -> dict[str, flo
 
 @frozen
 class Drag:
-    """Torque that wheels need in steady motion, as their power tells it."""
+    """Torque that wheels need in steady motion, as their power or current tells it."""
 
-    added: Array  # N m beyond the modelled, (3,)
-    usual: Array  # N m, as modelled, (3,)
+    added: Array  # beyond the modelled; N m, or A where currents are compared; (3,)
+    usual: Array  # as modelled, the same
 
 
 def steady_drag(drive: Observed) -> Drag:
     """What the residuals of power amount to as a torque that resists each wheel.
 
-    NaN for a wheel that is hardly ever steady. Currents count as powers: shares are the same.
+    NaN for a wheel that is hardly ever steady.
     """
     speed = np.abs(np.nan_to_num(drive.modelled[:, list(SPEEDS)]))
     residual, modelled = drive.residual[:, list(MOTORS)], drive.modelled[:, list(MOTORS)]
     rows = regimes(drive)["steady"] & np.isfinite(residual) & np.isfinite(modelled)
     weight = np.where(rows, speed, 0.0)
-    total = np.where(rows.sum(axis=0) < _LEAST_STEADY, np.nan, (weight**2).sum(axis=0))
+    # A current is a torque already, power one times the speed.
+    per_torque = np.ones_like(weight) if tells_currents(drive) else weight
+    total = np.where(rows.sum(axis=0) < _LEAST_STEADY, np.nan, (weight * per_torque).sum(axis=0))
 
-    def torque(power: Array) -> Array:
-        return np.asarray((weight * np.where(rows, power, 0.0)).sum(axis=0) / total)
+    def torque(drawn: Array) -> Array:
+        return np.asarray((weight * np.where(rows, drawn, 0.0)).sum(axis=0) / total)
 
     return Drag(torque(residual), np.abs(torque(modelled)))
