@@ -131,6 +131,18 @@ def test_of_many_drives_some_need_wider_bands(outcome: Outcome, steady: Steady) 
     assert wider([0.1, 0.1, 0.1, 0.6]) == ["tour3"]
 
 
+def test_a_short_drive_that_starts_late_is_not_apart(outcome: Outcome, steady: Steady) -> None:
+    def short(ticks: int) -> list[str]:
+        drive = steady("tour4", ticks=120)
+        drive.residual[5 : 5 + ticks, 0] = 2.0
+        fitted, said_ = (*outcome.fitted, drive), (QUIET,) * 4
+        found = said(evolve(outcome, fitted=fitted, fitted_said=said_))
+        return [line.partition(" needs bands")[0] for line in found if "needs bands" in line]
+
+    assert short(2) == []
+    assert short(6) == ["tour4"]
+
+
 def test_alarm_in_a_healthy_drive(outcome: Outcome) -> None:
     alarmed = Decided(1000, 0, (Episode("slip", None, 12.0, 13.5),))
     found = said(evolve(outcome, fitted_said=(QUIET, alarmed, QUIET)))

@@ -18,6 +18,7 @@ Mask = NDArray[np.bool_]
 _REST = 0.1  # rad/s: a slower wheel stands
 _STEADY = 0.3  # rad/s over three ticks
 _LATELY = 10  # ticks
+_FEW = 3  # residuals
 _LEAST_STEADY = 40  # ticks, from which a torque is told
 KINDS: Mapping[str, Sequence[int]] = {
     "total power": [TOTAL],
@@ -126,13 +127,13 @@ def outside(drives: Sequence[Observed], bands: BandSettings) -> dict[str, float]
 
 
 def needed(drive: Observed, bands: BandSettings, within: float) -> dict[str, float]:
-    """How wide bands a drive's residuals ask for, in bands, by kind."""
+    """How wide bands a drive's residuals ask for, in bands, by kind; one or two alone do not."""
     ratio = np.abs(drive.residual) / band_of(drive, bands)
     found = {}
     for kind, channels in KINDS.items():
         known = ratio[:, list(channels)][np.isfinite(ratio[:, list(channels)])]
         if len(known):
-            found[kind] = float(np.quantile(known, within))
+            found[kind] = float(np.quantile(known, min(within, max(1.0 - _FEW / len(known), 0.0))))
     return found
 
 
