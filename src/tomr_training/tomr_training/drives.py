@@ -102,9 +102,12 @@ def random_drive(reference: Robot, seed: int, kind: str | None = "any") -> Drive
     )
 
 
-def another_drive(robot: Drive, seed: int) -> Drive:
-    """A healthy drive of the same robot: another mission, payload, floor, other sensor noise."""
-    mission = _mission(robot.believed, seed, None, np.random.default_rng([seed, 4]))
+def another_drive(robot: Drive, seed: int, kind: str | None = None) -> Drive:
+    """A drive of the same robot: another mission, payload, floor, other sensor noise.
+
+    `kind` of fault as in `random_drive`; healthy by default.
+    """
+    mission = _mission(robot.believed, seed, kind, np.random.default_rng([seed, 4]))
     return evolve(robot, seed=seed, mission=mission, bumps=())
 
 
