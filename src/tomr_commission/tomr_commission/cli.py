@@ -10,7 +10,7 @@ from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK, run_main
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import shipped_robots
 
-PLAN = "plan"  # the other thing that the command does
+PLAN, DRIVE = "plan", "drive"  # the other thing that the command does
 
 _DESCRIPTION = """\
 Commission the diagnosis on one robot: find what its description leaves out, fit the bands of its
@@ -20,6 +20,7 @@ out and on faults put into it."""
 _EPILOG = """\
 examples:
   tomr_commission plan --robot my_robot.yaml --out mission.yaml    # the drive to record
+  tomr_commission drive --robot my_robot.yaml --out tour1          # or have it driven and recorded
   tomr_commission tour1 tour2 tour3 --robot my_robot.yaml --out commissioned
 
 Record at least four minutes of healthy driving on the floors that count, in two drives or more, as
@@ -140,6 +141,11 @@ def _run(arguments: Sequence[str] | None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     if given[:1] == [PLAN]:
         return _plan(given[1:])
+    if given[:1] == [DRIVE]:
+        # What listens to ROS takes a second to import.
+        from tomr_commission.drive_cli import drive_main
+
+        return drive_main(given[1:])
     return _commission(_parser().parse_args(given))
 
 

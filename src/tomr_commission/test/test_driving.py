@@ -1,0 +1,119 @@
+"""A robot that is driven: slowly first, and stopped where it does otherwise than told."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tomr_commission.driving import (
+    STILL,
+    Command,
+    DriveChoice,
+    DriveWatch,
+    Twist,
+    reach,
+    schedule,
+)
+from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.robot import shipped_robot
+from tomr_sim_bridge.missions.mission import Plan
+from tomr_sim_bridge.missions.schema import TwistPhase
+
+ROBOT = shipped_robot("reference")
+NAN3 = (math.nan,) * 3
+AHEAD, TURNING = (0.4, 0.0, 0.0), (0.0, 0.3, 0.3)
+PLAN = Plan((TwistPhase(AHEAD, 2.0), TwistPhase(TURNING, 3.0)), 10.0)
+
+
+def test_the_first_part_is_driven_slowly_between_pauses() -> None:
+    commands, slow_end = schedule(PLAN, DriveChoice(slowly=0.25, slow_seconds=3.0, pause=1.0))
+    twists = [command.twist for command in commands]
+    assert np.allclose(np.diff([command.time for command in commands]), 0.1)
+    assert slow_end == 4.0
+    assert twists[:10] == [STILL] * 10
+    assert twists[10] == (0.1, 0.0, 0.0)
+    assert twists[39] == (0.0, 0.25 * 0.3, 0.25 * 0.3)
+    assert twists[40:50] == [STILL] * 10
+    assert twists[50:100] == [AHEAD] * 20 + [TURNING] * 30
+    assert twists[100:] == [STILL] * 11
+
+
+def test_a_plan_shorter_than_the_slow_part_is_driven_slowly_as_a_whole() -> None:
+    _, slow_end = schedule(PLAN, DriveChoice(slow_seconds=60.0, pause=1.0))
+    assert slow_end == 6.0
+
+
+def test_how_far_it_gets() -> None:
+    quarter = math.pi / 2.0
+    commands = [
+        Command(0.0, (1.0, 0.0, 0.0)),
+        Command(2.0, (0.0, 0.0, quarter)),
+        Command(3.0, (1.0, 0.0, 0.0)),  # to the left now
+        Command(4.0, STILL),
+    ]
+    assert reach(commands) == pytest.approx(math.hypot(2.0, 1.0))
+
+
+def driven(
+    gain: np.ndarray, twist: Twist = AHEAD, until: float = 4.0, tells_speed: bool = True
+) -> DriveWatch:
+    """Still for 1 s, then commanded; the wheels turn so many times as fast, at 100 Hz."""
+    watch = DriveWatch(ROBOT, DriveChoice())
+    speed = twist_to_wheels(ROBOT) @ twist * gain
+    angle = np.zeros(3)
+    for number in range(round(100 * until)):
+        time = 0.01 * number
+        if number % 5 == 0:
+            watch.command(time, STILL if time < 1.0 else twist)
+        now = speed if time >= 1.1 else np.zeros(3)
+        angle = angle + 0.01 * now
+        one, two, three = angle.tolist()
+        a, b, c = now.tolist() if tells_speed else NAN3
+        watch.encoders(time, (one, two, three), (a, b, c))
+        assert watch.problem(time, 0.01) == ""
+    return watch
+
+
+@pytest.mark.parametrize("tells_speed", [True, False])
+@pytest.mark.parametrize("twist", [AHEAD, TURNING])
+def test_a_robot_that_does_as_told(twist: Twist, tells_speed: bool) -> None:
+    watch = driven(np.array([0.9, 1.1, 1.0]), twist, tells_speed=tells_speed)
+    assert list(watch.mistakes()) == []
+
+
+def test_a_wheel_that_turns_the_other_way_is_named() -> None:
+    (mistake,) = driven(np.array([1.0, 1.0, -1.0]), TURNING).mistakes()
+    assert mistake == "wheel_3_joint turns -1.00 times as fast as commanded"
+
+
+def test_a_wheel_that_hardly_had_to_turn_is_not_judged() -> None:
+    assert list(driven(np.array([1.0, -1.0, 1.0]), until=1.45).mistakes()) == []
+
+
+def test_encoders_that_fall_silent() -> None:
+    watch = driven(np.ones(3))
+    assert watch.problem(4.0, 0.4) == ""
+    assert watch.problem(4.0, 0.6).startswith("joint_states: nothing for 0.6 s")
+
+
+def test_a_robot_that_stands_though_commanded() -> None:
+    with pytest.raises(AssertionError, match="does not follow cmd_vel: see to e-stop"):
+        driven(np.full(3, 0.1))
+    assert driven(np.full(3, 0.1), until=2.4).problem(2.4, 0.01) == ""
+    assert driven(np.array([0.0, 1.0, 1.0]), TURNING) is not None  # one wheel is for the diagnosis
+
+
+def test_a_robot_that_runs_away() -> None:
+    with pytest.raises(AssertionError, match="wheels turn faster than commanded"):
+        driven(np.full(3, 2.0))
+
+
+def test_slowing_down_is_not_running_away() -> None:
+    watch = driven(np.ones(3))
+    speed = twist_to_wheels(ROBOT) @ AHEAD
+    for number in range(200):
+        time = 4.0 + 0.01 * number
+        watch.command(time, STILL)
+        one, two, three = (speed * max(0.0, 1.0 - number / 100.0)).tolist()
+        watch.encoders(time, NAN3, (one, two, three))
+        assert watch.problem(time, 0.01) == ""

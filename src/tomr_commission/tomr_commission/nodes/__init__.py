@@ -1,0 +1,1 @@
+"""What of commissioning needs ROS."""
