@@ -3,7 +3,8 @@
     .venv/bin/python bench/robotino_commissioned.py --out commissioned [--surface gray]
 
 Commissions the shipped description, which knows the bench only, on every third heading of a floor,
-and plays all other headings of that floor, and all of the others, through the three stages.
+and plays all other headings of that floor, and all of the others, through the three stages. The
+brown floor is a data set of its own, robotino_brown beside the other; it is played if it is there.
 """
 
 import argparse
@@ -90,6 +91,12 @@ def _main(arguments: Sequence[str] | None) -> int:
             third, rest = divided(bags, surface)
             unseen = rest if surface == options.surface else [*third, *rest]
             found[surface] = alarmed(unseen, robot)
+        beside = options.dataset.with_name("robotino_brown")
+        if beside.exists():
+            more = Path(folder) / "beside"
+            with redirect_stdout(sys.stderr):
+                import_robotino([str(beside), "--out", str(more)])
+            found["brown"] = alarmed(sorted((more / "brown").iterdir()), robot)
     print(json.dumps(found, indent=2))
     return 0
 
