@@ -81,8 +81,9 @@ def test_a_robot_that_does_as_told(twist: Twist, tells_speed: bool) -> None:
     assert list(watch.mistakes()) == []
 
 
-def test_a_wheel_that_turns_the_other_way_is_named() -> None:
-    (mistake,) = driven(np.array([1.0, 1.0, -1.0]), TURNING).mistakes()
+@pytest.mark.parametrize("tells_speed", [True, False])
+def test_a_wheel_that_turns_the_other_way_is_named(tells_speed: bool) -> None:
+    (mistake,) = driven(np.array([1.0, 1.0, -1.0]), TURNING, tells_speed=tells_speed).mistakes()
     assert mistake == "wheel_3_joint turns -1.00 times as fast as commanded"
 
 
@@ -106,6 +107,27 @@ def test_a_robot_that_stands_though_commanded() -> None:
 def test_a_robot_that_runs_away() -> None:
     with pytest.raises(AssertionError, match="wheels turn faster than commanded"):
         driven(np.full(3, 2.0))
+
+
+def test_one_wild_sample_is_not_running_away() -> None:
+    watch = driven(np.ones(3))
+    one, two, three = (twist_to_wheels(ROBOT) @ AHEAD).tolist()
+    for number in range(100):
+        time = 4.0 + 0.01 * number
+        watch.encoders(time, NAN3, (one, 90.0 if number == 1 else two, three))
+        assert watch.problem(time, 0.01) == ""
+
+
+def test_what_was_fast_long_ago_excuses_nothing() -> None:
+    watch = driven(np.ones(3))
+    one, two, three = (twist_to_wheels(ROBOT) @ AHEAD).tolist()
+    found = set()
+    for number in range(300):
+        time = 4.0 + 0.01 * number
+        watch.command(time, (0.1 + 1e-4 * number, 0.0, 0.0))
+        watch.encoders(time, NAN3, (one, two, three))
+        found.add(watch.problem(time, 0.01)[:11])
+    assert found == {"", "wheels turn"}
 
 
 def test_slowing_down_is_not_running_away() -> None:

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_commission.evidence import MOST_CAUTION, SURE, decisions, evidence_in
+from tomr_commission.evidence import (
+    MOST_CAUTION,
+    SURE,
+    Decided,
+    Episode,
+    decisions,
+    evidence_in,
+    together,
+)
 from tomr_commission.injected import KINDS, InjectedKind, injected
 from tomr_commission.observed import Observed, frames_of
 from tomr_fault_diag.classifier.settings import ClassifierSettings
@@ -77,3 +85,9 @@ def test_ticks_without_data_in_a_fault_are_no_evidence(faulty: Observed) -> None
 def test_evidence_before_the_fault_is_none(faulty: Observed) -> None:
     evidence = evidence_in(frames_of(faulty, BandSettings()), SETTINGS)
     assert evidence[faulty.seconds < 7.5].max() < SETTINGS.caution
+
+
+def test_what_is_said_of_drives_adds_up() -> None:
+    one, other = Episode("slip", None, 1.0, 2.0), Episode("unknown", None, 3.0, 4.0)
+    said = [Decided(100, 10, (one,)), Decided(50, 5, (other,))]
+    assert together(said) == Decided(150, 15, (one, other))

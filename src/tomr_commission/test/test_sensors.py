@@ -21,6 +21,7 @@ from tomr_commission.observed import Observed
 from tomr_commission.rehearsal import Shoved
 from tomr_commission.report.plain import lines
 from tomr_commission.request import AlarmChoice
+from tomr_commission.trials import Trial
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS
 from tomr_power_model.recordings import RecordingWriter, open_recording
@@ -30,6 +31,7 @@ BAGS = Path(__file__).resolve().parents[3] / "bags"
 HERE = "tomr_commission.commission"
 REPORT = {"sentence": "", "findings": [], "unexplained_share": 0.0, "holdout": None}
 SILENT = (*MOTORS, *ENCODERS)
+SIMULATED = "wheel stuck (simulated)"
 TAILS = {"driving": 50, "simulated shoves": 0}  # peaks of each
 
 
@@ -41,7 +43,7 @@ def rehearse() -> Iterator[Mock]:
         patch.dict(os.environ, OMP_NUM_THREADS="1"),
         patch("tomr_fault_diag.residuals.calibrated._LEAST", 100),
         patch(f"{HERE}.explain_drives", return_value=explained),
-        patch(f"{HERE}.try_simulated", return_value=[]),
+        patch(f"{HERE}.try_simulated", return_value=[Trial(SIMULATED, 1.0, "", 0, 0.3, "x")]),
         patch(f"{HERE}.rehearse", return_value=Shoved((0.0,) * 60, (0.0,) * 20, 0.1)) as rehearse,
     ):
         yield rehearse
@@ -73,6 +75,7 @@ def test_currents_leave_the_alarm_level_where_it_is(tmp_path: Path, rehearse: Mo
 
     found = commissioned(derived(tmp_path / "bag", without_voltage), "reference", tmp_path / "out")
     assert not rehearse.called
+    assert SIMULATED in [floor["kind"] for floor in found["floors"]]
     assert found["alarm"]["caution"] >= ClassifierSettings().caution
     assert found["alarm"]["expected_per_hour"] is found["alarm"]["ci95_per_hour"] is None
     assert "expected_false_alarms" not in (tmp_path / "out" / "commissioned.yaml").read_text()
@@ -99,7 +102,7 @@ def test_total_alone_is_all_that_is_rehearsed(tmp_path: Path, rehearse: Mock) ->
     )
     found = commissioned(bag, str(robot), tmp_path / "out")
     assert all(call.args[4].silent == SILENT for call in rehearse.call_args_list)
-    assert found["trials"] == []  # no motor's sensor to fail
+    assert [trial["kind"] for trial in found["trials"]] == [SIMULATED]  # no motor's sensor to fail
     kinds = {line["kind"] for line in found["regimes"]}
     assert kinds == {"total power", "wheel speed"}
 

@@ -21,7 +21,7 @@ from tomr_commission.commissioned import (
 from tomr_commission.evidence import decisions, evidence_in
 from tomr_commission.explained import EXPLAINED, FOLDER, Split, explain_drives
 from tomr_commission.injected import kinds_for, try_injected
-from tomr_commission.observed import Observed, frames_of, observe, tells_currents
+from tomr_commission.observed import Observed, frames_of, observe, tells_currents, unit_of_motors
 from tomr_commission.parallel import on_all_cores
 from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse
 from tomr_commission.request import CommissionRequest
@@ -119,7 +119,7 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     notes = [note for drive in work.drives for note in drive.notes]
     if tells_currents(longest):
         notes.append(_CURRENTS)
-    simulated, note = work.simulated(described, bands, chosen)
+    simulated, note = work.simulated(described, bands, chosen, unit_of_motors(longest))
     trials += simulated
     notes += [note] if note else []
     floors = floors_of(trials)
@@ -298,7 +298,7 @@ class _Work:
         return Usage.of(np.concatenate([drive.command for drive in self.drives]))
 
     def simulated(
-        self, described: Path | None, bands: BandSettings, settings: ClassifierSettings
+        self, described: Path | None, bands: BandSettings, settings: ClassifierSettings, unit: str
     ) -> tuple[list[Trial], str]:
         """Simulated faults, and a note where the simulator cannot do the robot."""
         self.progress("simulating faults", 0.9)
@@ -306,7 +306,7 @@ class _Work:
 
         def make() -> dict[str, Any]:
             try:
-                trials = try_simulated(source, bands, settings, usage)
+                trials = try_simulated(source, bands, settings, usage, unit)
             except InputError as error:
                 return {"trials": [], "note": f"no faults were simulated: {error}"}
             return {"trials": [asdict(trial) for trial in trials], "note": ""}

@@ -108,7 +108,7 @@ class DriveWatch:
         wanted = self._commanded[-1][1]
         must = np.abs(wanted) > self._choice.moves
         stands = np.abs(speed) < self._choice.stands * np.abs(wanted)
-        if not must.any() or not stands[must].all() or time - self._changed < self._late:
+        if not must.any() or not stands[must].all():
             self._follows_at = time
         fastest = np.max([np.abs(asked) for _, asked in self._commanded], axis=0)
         runs = np.abs(speed) > self._choice.away * fastest + self._choice.moves

@@ -133,9 +133,14 @@ def observe(bag: Path, name: str, robot: Robot, settings: DiagnosisSettings) -> 
     return Observed.of(name, frames)
 
 
+def unit_of_motors(drive: Observed) -> str:
+    """In which motors are compared: W or A."""
+    return str(drive.units[MOTORS.start])
+
+
 def tells_currents(drive: Observed) -> bool:
     """Whether motors are compared by their currents."""
-    return str(drive.units[MOTORS.start]) == "A"
+    return unit_of_motors(drive) == "A"
 
 
 def band_of(observed: Observed, bands: BandSettings) -> Array:

@@ -3,12 +3,13 @@
 from attrs import frozen
 
 from tomr_commission.evidence import decisions
-from tomr_commission.observed import Observed, frames_of
+from tomr_commission.observed import Observed, frames_of, unit_of_motors
 from tomr_commission.parallel import on_all_cores
 from tomr_commission.rehearsal import Usage, robot_of
 from tomr_commission.trials import Trial, first_alarm, smallest_found
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_power_model.errors import InputError
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_sim_bridge.faults import all_parameters
 from tomr_sim_bridge.missions.mission import Mission
@@ -86,25 +87,29 @@ def cases() -> list[SimulatedCase]:
 
 
 def try_simulated(
-    robot: str, bands: BandSettings, settings: ClassifierSettings, usage: Usage
+    robot: str, bands: BandSettings, settings: ClassifierSettings, usage: Usage, unit: str
 ) -> list[Trial]:
     """Each fault at each wheel, downwards until it is not found, on all cores.
 
-    Raises InputError for a robot that MuJoCo cannot do.
+    Raises InputError for a robot that MuJoCo cannot do, or whose motors are not told in `unit`.
     """
-    jobs = [(robot, bands, settings, usage, case) for case in cases()]
+    jobs = [(robot, bands, settings, usage, unit, case) for case in cases()]
     return [trial for trials in on_all_cores(_tried, jobs) for trial in trials]
 
 
-_Job = tuple[str, BandSettings, ClassifierSettings, Usage, SimulatedCase]
+_Job = tuple[str, BandSettings, ClassifierSettings, Usage, str, SimulatedCase]
 
 
 def _tried(job: _Job) -> list[Trial]:
-    robot, bands, settings, usage, case = job
+    robot, bands, settings, usage, unit, case = job
     kind, wheel = case.kind, 0 if case.wheel is None else case.wheel - 1
 
     def attempt(size: float) -> Trial:
         seen = observed_simulation(simulated_fault(robot, usage, case, size))
+        if unit_of_motors(seen) != unit:
+            raise InputError(
+                f"the recordings tell {unit} of the motors, the simulator {unit_of_motors(seen)}"
+            )
         said = decisions(frames_of(seen, bands), settings)
         begin = _ONSET - (int(seen.stamp_ns[0]) - START_NS) / NANOSECONDS
         found = first_alarm(said.alarms, begin)
