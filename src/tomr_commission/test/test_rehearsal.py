@@ -1,15 +1,20 @@
 """Simulated healthy hours and simulated faults of a robot."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
+import pytest
 from attrs import evolve
 
+from tomr_commission import simulated
+from tomr_commission.observed import Observed
 from tomr_commission.rehearsal import Rehearsal, Usage, observed_of, rehearse, shoved_drive
-from tomr_commission.simulated import KINDS, cases, simulated_fault
+from tomr_commission.simulated import KINDS, cases, simulated_fault, try_simulated
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.frame import MOTORS
 from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_power_model.errors import InputError
 from tomr_power_model.robot import shipped_robot
 
 ROBOT = shipped_robot("reference")
@@ -70,3 +75,14 @@ def test_rehearsal_sees_no_more_than_the_robot_tells() -> None:
     args = (BandSettings(power=0.1, relative=0.01, speed=0.01), ClassifierSettings(), USAGE)
     assert max(rehearse("reference", *args, deaf).peaks) == 0.0
     assert max(rehearse("reference", *args, evolve(deaf, silent=())).peaks) > 0.0
+
+
+def test_faults_are_simulated_only_where_the_simulator_tells_what_was_recorded(
+    monkeypatch: pytest.MonkeyPatch, steady: Callable[..., Observed]
+) -> None:
+    monkeypatch.setattr(simulated, "on_all_cores", lambda work, jobs: [work(jobs[0])])
+    monkeypatch.setattr(simulated, "observed_simulation", lambda drive: steady())
+    bands, settings = BandSettings(), ClassifierSettings()
+    assert try_simulated("reference", bands, settings, USAGE, "W")
+    with pytest.raises(InputError, match="the recordings tell A of the motors, the simulator W"):
+        try_simulated("reference", bands, settings, USAGE, "A")
