@@ -194,6 +194,18 @@ def test_what_is_left_over(outcome: Outcome, level: float, nrmse: float, is_name
     assert not found or "9.0 times the sensors' noise" in found[0]
 
 
+@pytest.mark.parametrize(("level", "is_named"), [(1.6, False), (3.4, True)])
+def test_what_is_not_explained_counts_where_it_exceeds_the_noise(
+    outcome: Outcome, level: float, is_named: bool
+) -> None:
+    explained: dict[str, Any] = {
+        "report": {"holdout": {"nrmse_after": 0.02}, "unexplained_share": 0.6},
+        "levels": [{**outcome.explained["levels"][0], "level": level}],
+    }
+    found = said(evolve(outcome, explained=explained))
+    assert found == (["60 % of the mismatch of robot.yaml is not explained"] if is_named else [])
+
+
 def test_rate_that_no_caution_reaches(outcome: Outcome) -> None:
     level = evolve(LEVEL, needed=44.0, caution=30.0, expected=0.4, low=0.2, high=0.8)
     (reason,) = reasons(evolve(outcome, level=level))
