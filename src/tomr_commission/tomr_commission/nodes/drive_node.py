@@ -32,6 +32,7 @@ _COMMAND = "cmd_vel"
 _WAIT = 10.0  # s for the first sample of the encoders
 _SETTLE = 1.0  # s in which the graph tells who else is there
 _SPIN = 0.01  # s
+_BACK, _ON = -0.2, 2.0  # s that a clock may go between two looks
 _HALT = 0.5  # s of standing commanded at the end, whatever ended it
 _BESIDE = (("imu/data", IMU), ("odom", ODOMETRY))  # recorded where they are published
 
@@ -113,15 +114,16 @@ class DriveNode(Node):
     @property
     def rivals(self) -> str:
         """Who else commands, and what to do; empty: nobody."""
-        own = self.get_name(), self.get_namespace()
-        others = {
-            f"{info.node_namespace.rstrip('/')}/{info.node_name}"
-            for info in self.get_publishers_info_by_topic(_COMMAND)
-            if (info.node_name, info.node_namespace) != own
-        }
-        if not others:
+        infos = self.get_publishers_info_by_topic(_COMMAND)
+        names = [f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos]
+        own = self.get_fully_qualified_name()
+        if self._outlet is not None and own in names:
+            names.remove(own)  # once: another may drive with the same command
+        if not names:
             return ""
-        return f"cmd_vel is published by {', '.join(sorted(others))}: stop that, two cannot drive"
+        return (
+            f"cmd_vel is published by {', '.join(sorted(set(names)))}: stop that, two cannot drive"
+        )
 
     def spin(self, seconds: float = _SPIN) -> None:
         """Take what comes, for a time of this computer's clock [s]."""
@@ -223,9 +225,13 @@ def _wait_for(node: DriveNode) -> None:
 def _follow(node: DriveNode, request: DriveRequest, progress: Progress) -> None:
     length, is_slow = request.commands[-1].time, True
     waiting = list(reversed(request.commands))
+    before = 0.0
     while waiting:
         node.spin()
         now = node.seconds
+        if not _BACK < now - before < _ON:
+            raise InputError(f"stopped: the clock leaps by {now - before:.1f} s: see to it")
+        before = now
         if now >= waiting[-1].time:
             due = waiting.pop()
             while waiting and now >= waiting[-1].time:
