@@ -102,6 +102,7 @@ class DriveNode(Node):
     def begin(self, writer: RecordingWriter) -> None:
         """Record from now on."""
         self._writer = writer
+        self._last = time.monotonic()
         self._start_ns = self.get_clock().now().nanoseconds
 
     def take_over(self) -> None:
