@@ -8,7 +8,6 @@ from typing import Any
 
 import rclpy
 from attrs import field, frozen
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message, serialize_message
@@ -19,7 +18,7 @@ from tomr_power_model.errors import InputError
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.messages.types import IMU, ODOMETRY, TWIST, TWIST_TYPES
 from tomr_power_model.nodes.command_type import chosen_type
-from tomr_power_model.nodes.stage_node import SENSOR_QOS, message_class, to_ros
+from tomr_power_model.nodes.stage_node import SENSOR_QOS, make_executor, message_class, to_ros
 from tomr_power_model.recordings import RecordingWriter
 from tomr_power_model.robot import Robot
 from tomr_power_model.topics.inputs import Input, measured_inputs
@@ -74,7 +73,7 @@ class DriveNode(Node):
             self._listen(item.topic, item.type_name, item)
         for topic, type_name in _BESIDE:
             self._listen(topic, type_name)
-        self._executor = SingleThreadedExecutor()
+        self._executor = make_executor()
         self._executor.add_node(self)
 
     @property
