@@ -111,3 +111,12 @@ def test_nodes_that_end_badly_or_leave_something_are_misses(
     crew.start("node")
     wait_until(lambda: crew.is_up("node") or crew.ended(), "the node")
     assert {item.what: item.found for item in crew.end() if not item.passed} == found
+
+
+def test_clocks_that_jump_stay_where_stamps_can_follow() -> None:
+    shift, farthest = 0.0, 0.0
+    for _, act in zip(range(2000), acts(6, 20.0), strict=False):
+        for one in act.interruptions:
+            shift += one.by if isinstance(one, Jump) else 0.0
+            farthest = max(farthest, abs(shift))
+    assert 3e7 <= farthest < 6e7

@@ -97,6 +97,8 @@ class Rest:
     words: str = "at rest"
 
 
+_FAR = 3e7  # s, that a clock jumps once in a while
+
 Interruption = Pause | Jump | Kill | Flood | Rest
 
 
@@ -114,14 +116,17 @@ def _interruptions(dice: random.Random, flood: float) -> Iterator[Interruption]:
     Which of a kind goes around as well, so that a short soak has many and a long one all.
     """
     streams = dice.sample(sorted(STREAMS), len(STREAMS))
-    count = 0
+    count, far = 0, -_FAR
     yield Flood(flood)
     while True:
+        by = dice.choice((-3600.0, -1.5, -0.3, 0.3, 1.5, 60.0, _FAR))
+        if by == _FAR:  # there and back: stamps hold 68 years
+            by = far = -far
         turn: list[Interruption] = [
             Kill(),
             Pause(streams[count % len(streams)], dice.choice((0.3, 1.0, 3.0))),
             Pause(streams[(count + 2) % len(streams)], dice.choice((0.6, 5.0))),
-            Jump(dice.choice((-3600.0, -1.5, -0.3, 0.3, 1.5, 60.0, 3e7))),
+            Jump(by),
             Rest(dice.choice((1.0, 4.0))),
         ]
         yield from dice.sample(turn, len(turn))

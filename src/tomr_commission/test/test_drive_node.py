@@ -1,5 +1,6 @@
 """`tomr_commission drive` with sim_bridge over DDS."""
 
+import signal
 from collections.abc import Callable, Iterator
 from importlib.resources import files
 from pathlib import Path
@@ -8,10 +9,11 @@ import pytest
 import rclpy
 from geometry_msgs.msg import TwistStamped
 from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from tomr_commission.cli import main
-from tomr_power_model.cli import EXIT_BAD_INPUT
+from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_INTERRUPTED
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.robot import shipped_robot
 
@@ -70,12 +72,33 @@ def test_it_stops_when_the_driver_dies(
     assert tour.exists()  # what was recorded is kept
 
 
+def test_ctrl_c_leaves_it_standing(
+    bridge: object, operator: Node, spawn: Callable, command: list[str], wait_until: Callable
+) -> None:
+    sent: list[float] = []
+    operator.create_subscription(
+        TwistStamped, "cmd_vel", lambda message: sent.append(message.twist.linear.x), 100
+    )
+    executor = SingleThreadedExecutor(context=operator.context)
+    executor.add_node(operator)
+    drive = spawn(command)
+    wait_until(lambda: executor.spin_once(0.1) or (sent and sent[-1] > 0.0), "a robot that drives")
+    drive.popen.send_signal(signal.SIGINT)
+    wait_until(
+        lambda: executor.spin_once(0.1) or drive.popen.poll() is not None, "the end of the drive"
+    )
+    executor.shutdown()
+    assert drive.popen.returncode == EXIT_INTERRUPTED
+    assert drive.output == "interrupted\n"
+    assert not any(sent[-5:])
+    assert Path(command[5]).exists()  # what was recorded is kept
+
+
 @pytest.fixture
 def operator() -> Iterator[Node]:
     context = Context()
     rclpy.init(context=context)
     node = Node("operator", context=context)
-    node.create_publisher(TwistStamped, "cmd_vel", 10)
     yield node
     node.destroy_node()
     context.shutdown()
@@ -84,6 +107,7 @@ def operator() -> Iterator[Node]:
 def test_two_do_not_drive(
     bridge: object, operator: Node, spawn: Callable, command: list[str]
 ) -> None:
+    operator.create_publisher(TwistStamped, "cmd_vel", 10)
     drive = spawn(command)
     assert drive.popen.wait(20.0) == EXIT_BAD_INPUT
     assert "cmd_vel is published by /operator: stop that, two cannot drive" in drive.output

@@ -86,7 +86,7 @@ class DriveWatch:
         self._changed = -math.inf  # s, the last change of the command
         self._before: tuple[float, Array] | None = None
         self._away_since: float | None = None
-        self._follows_at = 0.0  # the last time that some wheel did as commanded, or none had to
+        self._stands_since: float | None = None  # though commanded to move
         self._sums = np.zeros((3, WHEELS))  # of measured * commanded, commanded^2, and samples
 
     def command(self, time: float, twist: Twist) -> None:
@@ -108,8 +108,8 @@ class DriveWatch:
         wanted = self._commanded[-1][1]
         must = np.abs(wanted) > self._choice.moves
         stands = np.abs(speed) < self._choice.stands * np.abs(wanted)
-        if not must.any() or not stands[must].all():
-            self._follows_at = time
+        is_still = must.any() and stands[must].all()
+        self._stands_since = (self._stands_since or time) if is_still else None
         fastest = np.max([np.abs(asked) for _, asked in self._commanded], axis=0)
         runs = np.abs(speed) > self._choice.away * fastest + self._choice.moves
         self._away_since = (self._away_since or time) if runs.any() else None
@@ -124,7 +124,7 @@ class DriveWatch:
         choice = self._choice
         if silent > choice.silence:
             return f"joint_states: nothing for {silent:.1f} s: see to the driver"
-        if time - self._follows_at > choice.not_following:
+        if self._stands_since is not None and time - self._stands_since > choice.not_following:
             return (
                 "the robot does not follow cmd_vel: see to e-stop, contactor and brakes, and that "
                 "the driver listens to this topic and type"

@@ -4,7 +4,7 @@ import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import rclpy
 from attrs import field, frozen
@@ -191,42 +191,67 @@ def drive(request: DriveRequest, out: Path, progress: Progress) -> None:
         InputError: nobody is there, somebody else commands, or the robot does otherwise than told.
         KeyboardInterrupt: after a signal.
     """
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        node = DriveNode(request)
+    with _Signals() as signals:
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         try:
-            _wait_for(node)
-            if node.rivals:
-                raise InputError(node.rivals)
-            node.take_over()
-            with RecordingWriter(out) as writer:
-                node.begin(writer)
-                try:
-                    _follow(node, request, progress)
-                finally:
-                    for number in (signal.SIGINT, signal.SIGTERM):
-                        signal.signal(number, signal.SIG_IGN)  # a second would leave it driving
-                    node.halt()
+            node = DriveNode(request)
+            try:
+                _wait_for(node, signals)
+                if node.rivals:
+                    raise InputError(node.rivals)
+                node.take_over()
+                with RecordingWriter(out) as writer:
+                    node.begin(writer)
+                    try:
+                        _follow(node, request, signals, progress)
+                    finally:
+                        node.halt()
+            finally:
+                node.close()
         finally:
-            node.close()
-    finally:
-        rclpy.try_shutdown()
+            rclpy.try_shutdown()
 
 
-def _wait_for(node: DriveNode) -> None:
+class _Signals:
+    """Holds SIGINT and SIGTERM back until the robot stands. An executor would print what they
+    raise in a callback, and a second one would leave the robot driving."""
+
+    def __enter__(self) -> Self:
+        self._noted: list[int] = []
+        self._before = {
+            number: signal.signal(number, lambda number, _: self._noted.append(number))
+            for number in (signal.SIGINT, signal.SIGTERM)
+        }
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, before in self._before.items():
+            signal.signal(number, before)
+        if self._noted:
+            signal.raise_signal(self._noted[0])
+
+    def check(self) -> None:
+        """Raise KeyboardInterrupt after a signal."""
+        if self._noted:
+            raise KeyboardInterrupt
+
+
+def _wait_for(node: DriveNode, signals: _Signals) -> None:
     end = time.monotonic() + _WAIT
     node.spin(_SETTLE)
     while node.lacks:
         if time.monotonic() > end:
             raise InputError(node.lacks)
+        signals.check()
         node.spin()
 
 
-def _follow(node: DriveNode, request: DriveRequest, progress: Progress) -> None:
+def _follow(node: DriveNode, request: DriveRequest, signals: _Signals, progress: Progress) -> None:
     length, is_slow = request.commands[-1].time, True
     waiting = list(reversed(request.commands))
     before = 0.0
     while waiting:
+        signals.check()
         node.spin()
         now = node.seconds
         if not _BACK < now - before < _ON:
