@@ -30,6 +30,8 @@ settings.load_profile("repeatable")
 def pytest_configure(config: pytest.Config) -> None:
     """Give this pytest process, maybe one of several workers, a DDS domain of its own."""
     domain, config.stash[_DOMAIN_LOCK] = _claim_domain()
+    # Commands are tried with streams that are buffered, as users have them.
+    os.environ.pop("PYTHONUNBUFFERED", None)
     os.environ.update(
         ROS_DOMAIN_ID=str(domain),
         ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",

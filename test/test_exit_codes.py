@@ -74,6 +74,20 @@ def test_output_that_cannot_be_written(redirection: str, code: int) -> None:
     assert run.stderr.count("\n") <= 1
 
 
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        ("--help > /dev/full", 74),
+        ("--parameters > /dev/full", 74),
+        ("nowhere 2> /dev/full", EXIT_BAD_INPUT),
+        ("nowhere > /dev/full 2>&1", EXIT_BAD_INPUT),
+    ],
+)
+def test_words_that_nobody_takes(arguments: str, code: int) -> None:
+    run = subprocess.run(["bash", "-c", f"{DIAGNOSE} {arguments}"], timeout=60, env=_environment())
+    assert run.returncode == code
+
+
 def test_names_that_the_terminal_lacks_letters_for(tmp_path: Path) -> None:
     for name in (
         "Straße-\N{SNOWMAN}",

@@ -51,6 +51,7 @@ _NODES = (
     "tomr_fault_diag.nodes.fault_classifier_node",
 )
 _ANSWERS = (0, 1, 2, 3)  # 3: nothing could be decided
+_UNFLUSHED = 120  # exit code of an interpreter that cannot flush its streams
 _LISTINGS = frozenset({"--parameters", "--help"})  # options that end a command before it works
 _QUIET = ("note:", "warning:", "error:", "usage:", "interrupted")
 
@@ -133,6 +134,9 @@ def _be_the_command(given: Attack, folder: Path) -> None:
         os.dup2(nothing, 0)
         for number, name in ((1, "stdout"), (2, "stderr")):
             os.dup2(os.open(folder / name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+        # Of this process' own they would be buffered as its parent's are.
+        sys.stdout = os.fdopen(1, "w", encoding="utf-8", closefd=False)
+        sys.stderr = os.fdopen(2, "w", 1, encoding="utf-8", closefd=False)
         os.chdir(folder)
         os.environ.update(given.environment)
         resource.setrlimit(resource.RLIMIT_AS, (_ADDRESSES, _ADDRESSES))
@@ -142,14 +146,17 @@ def _be_the_command(given: Attack, folder: Path) -> None:
         sys.argv = [given.tool, *given.arguments]
         main = FURTHER.get(given.tool) or import_module(MODULES[given.tool]).main
         code = int(main(list(given.arguments)))
-        sys.stdout.flush()
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else _MADE
     except BaseException:  # noqa: BLE001 what the command would end with
         resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY,) * 2)
         traceback.print_exc()
     finally:
-        sys.stderr.flush()
+        for stream in (sys.stdout, sys.stderr):
+            try:
+                stream.flush()
+            except OSError:
+                code = _UNFLUSHED  # as the interpreter ends
         os._exit(code & 0xFF)
 
 

@@ -13,6 +13,7 @@ from tomr_commission.driving import DriveChoice, reach, schedule
 from tomr_commission.plan import mission_text
 from tomr_power_model.cli import EXIT_OK
 from tomr_power_model.errors import InputError
+from tomr_power_model.files import write_text
 from tomr_power_model.messages.types import TWIST_TYPES
 from tomr_power_model.robot import Robot, load_robot
 from tomr_sim_bridge.missions import load_mission
@@ -104,7 +105,7 @@ def _plan(robot: Robot, mission: str | None, speed: float) -> Plan:
         return load_mission(mission).plan(robot)
     with TemporaryDirectory() as folder:
         file = Path(folder) / "plan.yaml"
-        file.write_text(mission_text(robot, speed), encoding="utf-8")
+        write_text(file, mission_text(robot, speed))
         return load_mission(file).plan(robot)
 
 

@@ -17,7 +17,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from typing import NoReturn
+from typing import NoReturn, TextIO
 
 from tomr_power_model.errors import InputError, one_line
 
@@ -49,7 +49,11 @@ def run_main(main: Main, arguments: Sequence[str] | None = None) -> int:
             if not (os.environ.get(DEBUG) or sys.warnoptions):
                 # Of numpy and others, on what nobody can mend who runs a command.
                 warnings.simplefilter("ignore")
-            code = main(arguments)
+            try:
+                code = main(arguments)
+            except SystemExit:  # of --help: that all of it was taken is still to be seen
+                sys.stdout.flush()
+                raise
         sys.stdout.flush()
         return code
     except InputError as error:
@@ -58,7 +62,7 @@ def run_main(main: Main, arguments: Sequence[str] | None = None) -> int:
         return _interrupted()
     except BrokenPipeError:
         # The reader of a pipe (`| head`) left before it had all.
-        _drop_output()
+        _drop(sys.stdout)
         return EXIT_PIPE_CLOSED
     except Exception as error:  # noqa: BLE001 the outermost place: 1 must not come of it
         return _interrupted() if _signals else _fail(*_told(error))
@@ -85,7 +89,7 @@ def _interrupted() -> int:
 def _told(error: Exception) -> tuple[int, str]:
     """Exit code and line for what nobody expected."""
     if isinstance(error, OSError) and error.filename is None and error.errno in _UNWRITTEN:
-        _drop_output()
+        _drop(sys.stdout)
         return EXIT_NO_OUTPUT, f"error: the output cannot be written ({error.strerror})"
     if isinstance(error, MemoryError):
         return EXIT_BAD_INPUT, "error: the memory does not suffice: give less at a time"
@@ -103,10 +107,12 @@ def _told(error: Exception) -> tuple[int, str]:
 def _fail(code: int, line: str) -> int:
     if os.environ.get(DEBUG):
         traceback.print_exc()
-    with contextlib.suppress(OSError):
+    try:
         print(one_line(line), file=sys.stderr, flush=True)
+    except OSError:
+        _drop(sys.stderr)
     if not _can_print():
-        _drop_output()
+        _drop(sys.stdout)
     return code
 
 
@@ -118,11 +124,11 @@ def _can_print() -> bool:
     return True
 
 
-def _drop_output() -> None:
+def _drop(stream: TextIO) -> None:
     """Send what is left to nowhere: the interpreter would fail over it while it ends."""
     with contextlib.suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stdout.fileno())
+        os.dup2(nowhere, stream.fileno())
         os.close(nowhere)
 
 
