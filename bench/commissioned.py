@@ -28,20 +28,18 @@ from concealed.robots import described as described_robot
 from concealed.robots import description_text
 from diagnosis import Kind, named_by, rebanded, score_faulty, score_healthy
 from diagnosis_report import Outcome, publish, report
+from record import record_mission
 from tqdm import tqdm
 
 from tomr_commission.cli import main as commission
 from tomr_commission.plan import mission_text
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_power_model.cli import run_main
-from tomr_power_model.messages.bag import to_bag
-from tomr_power_model.recordings import RecordingWriter
 from tomr_power_model.robot import Robot, load_robot, read_node_sections, robot_from_parameters
 from tomr_sim_bridge.missions import load_mission
-from tomr_sim_bridge.missions.drive import drive, start_mission
-from tomr_sim_bridge.missions.mission import Mission
+from tomr_sim_bridge.missions.mission import Mission, parse_mission
 from tomr_training.drives import Drive, another_drive, bumps, every_value
-from tomr_training.simulated_drive import START_NS, healthy_twin, simulated_drive
+from tomr_training.simulated_drive import healthy_twin, simulated_drive
 
 _FIRST_SEED = 90_000_000
 _ROBOT = 100_000  # seeds of one robot
@@ -88,12 +86,7 @@ def made(number: int, folder: Path) -> Made:
 
 def _recorded(robot: Made, mission: Mission, seed: int, path: Path) -> Path:
     if not path.exists():
-        simulation = start_mission(mission, robot.real, seed, START_NS)
-        with RecordingWriter(path, storage="mcap") as writer:
-            for samples in drive(mission, simulation, seed):
-                for sample in samples:
-                    message = to_bag(sample.message)
-                    writer.write(sample.topic, sample.message.type_name, message, sample.stamp_ns)
+        record_mission(mission, robot.real, seed, path)
     return path
 
 
@@ -101,9 +94,8 @@ def commissioned(number: int, folder: Path) -> dict[str, object]:
     """Record what a commissioning asks for, and commission."""
     robot = made(number, folder)
     believed = load_robot(robot.described)
-    plan = folder / "plan.yaml"
-    plan.write_text(mission_text(believed, _TOP_SPEED), encoding="utf-8")
-    mission = evolve(load_mission(plan), stamp_jitter=0.0005, floor_friction=0.8)
+    plan = parse_mission(mission_text(believed, _TOP_SPEED), "plan")
+    mission = evolve(plan, stamp_jitter=0.0005, floor_friction=0.8)
     first = Drive(0, robot.real, believed, mission)
     seed = _FIRST_SEED + _ROBOT * number
     tours = [another_drive(first, seed + 10 + k).mission for k in range(4)]
@@ -142,7 +134,7 @@ def scored(task: tuple[int, int, str | None, Path]) -> Outcome:
     number, seed, fault, folder = task
     kind, believed = _kind(str(folder / "commissioned" / "commissioned.yaml"))
     robot = made(number, folder)
-    chosen = another_drive(Drive(seed, robot.real, believed, _EMPTY), seed, fault)
+    chosen = another_drive(Drive(seed, robot.real, believed, load_mission("square")), seed, fault)
     random = np.random.default_rng([seed, 5])
     chosen = evolve(
         chosen, bumps=bumps(believed, random, int(random.integers(0, 4)), chosen.length)
@@ -153,9 +145,6 @@ def scored(task: tuple[int, int, str | None, Path]) -> Outcome:
         return score_healthy(labelled, named)
     rows = labelled.first - 1 + np.arange(len(labelled.frames))
     return score_faulty(chosen, labelled, healthy_twin(chosen).of_ticks(rows), named)
-
-
-_EMPTY = Mission("", "", "", 20.0, 1, 0.0, 0.8, 0.0, 0, (), ())
 
 
 def _outcomes(title: str, tasks: Sequence[tuple[int, int, str | None, Path]]) -> list[Outcome]:

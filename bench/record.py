@@ -7,13 +7,14 @@ from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.recordings import RecordingWriter
 from tomr_power_model.robot import Robot
 from tomr_sim_bridge.missions import drive, load_mission, start_mission
+from tomr_sim_bridge.missions.mission import Mission
 
 _START_NS = 1_700_000_000 * NANOSECONDS
 
 
-def record_mission(name: str, plant: Robot, seed: int, path: Path) -> None:
+def record_mission(mission: Mission | str, plant: Robot, seed: int, path: Path) -> None:
     """Drive a mission with a seed and keep the recording."""
-    mission = load_mission(name)
+    mission = load_mission(mission) if isinstance(mission, str) else mission
     simulation = start_mission(mission, plant, seed, _START_NS)
     with RecordingWriter(path) as writer:
         for samples in drive(mission, simulation, seed):

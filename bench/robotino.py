@@ -112,14 +112,20 @@ def report(drives: Sequence[Drive]) -> dict[str, object]:
     }
 
 
+def is_absent(dataset: Path) -> bool:
+    """Whether there is nothing to play, which is said."""
+    if not dataset.exists():
+        print(f"skipped: {dataset} is absent; set TOMR_RECORDINGS", file=sys.stderr)
+    return not dataset.exists()
+
+
 def _main(arguments: Sequence[str] | None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--surface", default="gray")
     parser.add_argument("--dataset", type=Path, default=default_dataset())
     parser.add_argument("--robot", default="robotino_v2", help="shipped name or robot.yaml")
     options = parser.parse_args(arguments)
-    if not options.dataset.exists():
-        print(f"skipped: {options.dataset} is absent; set TOMR_RECORDINGS", file=sys.stderr)
+    if is_absent(options.dataset):
         return 0
     with TemporaryDirectory() as folder:
         out = Path(folder) / "bags"

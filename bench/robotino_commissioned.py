@@ -21,7 +21,7 @@ from tempfile import TemporaryDirectory
 from time import monotonic, process_time
 from typing import Any
 
-from robotino import play, report
+from robotino import is_absent, play, report
 from tqdm import tqdm
 
 from tomr_commission.cli import main as commission
@@ -68,8 +68,7 @@ def _main(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--robot", default="robotino_v2", help="shipped name or robot.yaml")
     parser.add_argument("--out", type=Path, required=True, help="of tomr_commission")
     options = parser.parse_args(arguments)
-    if not options.dataset.exists():
-        print(f"skipped: {options.dataset} is absent; set TOMR_RECORDINGS", file=sys.stderr)
+    if is_absent(options.dataset):
         return 0
     with TemporaryDirectory() as folder:
         bags = Path(folder) / "bags"

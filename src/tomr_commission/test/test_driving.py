@@ -10,14 +10,13 @@ from tomr_commission.driving import (
     Command,
     DriveChoice,
     DriveWatch,
-    Twist,
     reach,
     schedule,
 )
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import shipped_robot
 from tomr_sim_bridge.missions.mission import Plan
-from tomr_sim_bridge.missions.schema import TwistPhase
+from tomr_sim_bridge.missions.schema import Twist, TwistPhase
 
 ROBOT = shipped_robot("reference")
 NAN3 = (math.nan,) * 3

@@ -4,20 +4,16 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
-
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from tomr_commission.driving import DriveChoice, reach, schedule
 from tomr_commission.plan import mission_text
 from tomr_power_model.cli import EXIT_OK
 from tomr_power_model.errors import InputError
-from tomr_power_model.files import write_text
 from tomr_power_model.messages.types import TWIST_TYPES
 from tomr_power_model.robot import Robot, load_robot
+from tomr_reality_gap.progress import progress_bar
 from tomr_sim_bridge.missions import load_mission
-from tomr_sim_bridge.missions.mission import Plan
+from tomr_sim_bridge.missions.mission import Plan, parse_mission
 
 _DESCRIPTION = """\
 Drive the robot through cmd_vel, its first part slowly, and record what a commissioning needs. Keep
@@ -82,14 +78,8 @@ def drive_main(arguments: Sequence[str]) -> int:
         options.sim_time,
         choice,
     )
-    console = Console(stderr=True, quiet=options.quiet)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("waiting for joint_states", total=1.0)
-
-        def progress(what: str, part: float) -> None:
-            bar.update(task, description=what, completed=part)
-
+    with progress_bar(options.quiet) as progress:
+        progress("waiting for joint_states", 0.0)
         drive(request, options.out, progress)
     if not options.quiet:
         print(f"written: {options.out} ({said})")
@@ -103,10 +93,7 @@ def drive_main(arguments: Sequence[str]) -> int:
 def _plan(robot: Robot, mission: str | None, speed: float) -> Plan:
     if mission is not None:
         return load_mission(mission).plan(robot)
-    with TemporaryDirectory() as folder:
-        file = Path(folder) / "plan.yaml"
-        write_text(file, mission_text(robot, speed))
-        return load_mission(file).plan(robot)
+    return parse_mission(mission_text(robot, speed), "plan").plan(robot)
 
 
 def _ask(what: str, is_agreed: bool) -> None:

@@ -12,11 +12,11 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.messages.intake import Triple
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_sim_bridge.missions.mission import Plan
+from tomr_sim_bridge.missions.schema import Twist
 
-Twist = tuple[float, float, float]
-Triple = tuple[float, float, float]
 Array = NDArray[np.float64]
 
 STILL: Twist = (0.0, 0.0, 0.0)

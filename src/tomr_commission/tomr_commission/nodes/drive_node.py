@@ -2,7 +2,6 @@
 
 import signal
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Self
 
@@ -13,7 +12,7 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.signals import SignalHandlerOptions
 
-from tomr_commission.driving import STILL, Command, DriveChoice, DriveWatch, Twist
+from tomr_commission.driving import STILL, Command, DriveChoice, DriveWatch
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.messages.types import IMU, ODOMETRY, TWIST, TWIST_TYPES
@@ -22,9 +21,9 @@ from tomr_power_model.nodes.stage_node import SENSOR_QOS, make_executor, message
 from tomr_power_model.recordings import RecordingWriter
 from tomr_power_model.robot import Robot
 from tomr_power_model.topics.inputs import Input, measured_inputs
+from tomr_reality_gap.progress import Progress
+from tomr_sim_bridge.missions.schema import Twist
 from tomr_sim_bridge.plant.samples import command_sample
-
-Progress = Callable[[str, float], None]
 
 NAME = "tomr_commission_drive"
 _COMMAND = "cmd_vel"
