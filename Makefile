@@ -152,4 +152,5 @@ clean: ## remove all that was made: .venv, build, install, log, caches
 	    --no-build-isolation --config-settings editable_mode=compat $(PACKAGES:%=-e %)
 	@rm -rf build install log
 	@$(BIN)/colcon build --symlink-install --base-paths src
+	@$(BIN)/python -m compileall -q src
 	@touch $@

@@ -22,6 +22,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
+from compileall import compile_dir
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -118,6 +119,7 @@ def _main(arguments: Sequence[str] | None) -> int:
     if not any(options.only in name for name in GENERATORS):
         raise InputError(f"--only {options.only}: the attacks are {', '.join(sorted(GENERATORS))}")
     make_folder(options.out)
+    compile_dir(ROOT / "src", quiet=1)  # a full disk is to cut short what commands write
     base = read_base()
     load_tools(HEALTHY)
     if options.again is not None:

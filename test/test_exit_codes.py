@@ -1,6 +1,7 @@
 """Whatever happens to a command, 1 is an answer and nothing else gives it."""
 
 import os
+import py_compile
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ import pytest
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
 
-from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_DEFECT, run_main
+from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_DEFECT, run_main, run_module
 from tomr_power_model.errors import InputError
 from tomr_power_model.nodes.stage_node import run_node
 
@@ -49,6 +50,25 @@ def test_an_error_nobody_expected_is_one_line(
     line = capfd.readouterr().err
     assert words in line
     assert line.count("\n") == (1 if words else 0)
+
+
+@pytest.mark.parametrize("size", [8, 40, 200])
+def test_a_compiled_module_that_a_full_disk_cut_short(
+    size: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """CPython issue 126606: it is kept so, and every later run would fail over it."""
+    (tmp_path / "cut_short.py").write_text("def main():\n    return 0\n" + "x = 1\n" * 100)
+    compiled = Path(py_compile.compile(str(tmp_path / "cut_short.py"), doraise=True))
+    compiled.write_bytes(compiled.read_bytes()[:size])
+    monkeypatch.syspath_prepend(tmp_path)
+    code = run_module("cut_short")
+    sys.modules.pop("cut_short", None)
+    line = capsys.readouterr().err
+    if size < 16:  # of a header: Python sees that itself
+        assert (code, line) == (0, "")
+        return
+    assert code == EXIT_BAD_INPUT
+    assert line == f"error: {compiled}: cut short, as a full disk leaves it: remove it\n"
 
 
 def test_where_it_comes_from_is_shown_on_request(

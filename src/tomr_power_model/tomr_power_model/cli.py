@@ -96,12 +96,25 @@ def _told(error: Exception) -> tuple[int, str]:
     if isinstance(error, OSError):
         name = f"{error.filename}: " if error.filename else ""
         return EXIT_BAD_INPUT, f"error: {name}{error.strerror or error}"
+    if cut := _cut_bytecode(error):
+        return EXIT_BAD_INPUT, f"error: {cut}: cut short, as a full disk leaves it: remove it"
     last = traceback.extract_tb(error.__traceback__)[-1]
     return EXIT_DEFECT, (
         f"error: a defect of this program, {type(error).__name__}: {error} "
         f"({os.path.basename(last.filename)}:{last.lineno}); please report it with the output of "
         f"the same command under {DEBUG}=1"
     )
+
+
+def _cut_bytecode(error: Exception) -> str:
+    """Path of the compiled module that could not be loaded; empty: it was something else.
+
+    Python up to 3.12.7 and 3.13.0 keeps what a full disk left of one (CPython issue 126606).
+    """
+    *_, (frame, _) = traceback.walk_tb(error.__traceback__)
+    is_loading = frame.f_code.co_filename == "<frozen importlib._bootstrap_external>"
+    is_cut = is_loading and isinstance(error, EOFError | ValueError)
+    return str(frame.f_locals.get("bytecode_path") or "") if is_cut else ""
 
 
 def _fail(code: int, line: str) -> int:
