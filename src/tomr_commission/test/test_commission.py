@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock, patch
@@ -13,7 +13,9 @@ import yaml
 from tomr_commission.cli import main
 from tomr_commission.commission import _observe
 from tomr_commission.explained import Split
+from tomr_commission.observed import Observed
 from tomr_commission.rehearsal import Shoved
+from tomr_commission.report.figures import end_to_end
 from tomr_commission.trials import Trial
 from tomr_fault_diag.classifier.commissioned import commissioned_words, stamp_of
 from tomr_fault_diag.classifier.settings import ClassifierSettings
@@ -91,6 +93,14 @@ def test_short_drive_is_a_no_go_that_says_what_to_record(done: Path) -> None:
     page = (done / "commission.html").read_text()
     assert "NO-GO" in page
     assert page.count("data:image/png") == 2
+
+
+def test_drives_that_are_held_out_are_drawn_one_after_the_other(
+    steady: Callable[..., Observed],
+) -> None:
+    first, second = end_to_end([steady(ticks=200), steady(ticks=400)])
+    assert first[[0, -1]] == pytest.approx([0.0, 9.95])
+    assert second[[0, -1]] == pytest.approx([10.95, 30.9])
 
 
 def test_written_description_is_loaded_everywhere(done: Path) -> None:

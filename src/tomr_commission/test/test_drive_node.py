@@ -4,7 +4,9 @@ import signal
 from collections.abc import Callable, Iterator
 from importlib.resources import files
 from pathlib import Path
+from unittest.mock import Mock, PropertyMock
 
+import numpy as np
 import pytest
 import rclpy
 from geometry_msgs.msg import TwistStamped
@@ -13,8 +15,11 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from tomr_commission.cli import main
+from tomr_commission.driving import STILL, Command
+from tomr_commission.nodes.drive_node import DriveRequest, _follow
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_INTERRUPTED
 from tomr_power_model.drive.read import read_drive
+from tomr_power_model.errors import InputError
 from tomr_power_model.robot import shipped_robot
 
 ROBOT = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")
@@ -38,8 +43,9 @@ def command(tmp_path: Path) -> list[str]:
 
 
 @pytest.fixture
-def bridge(spawn: Callable) -> Callable:
-    parameters = ("publish_clock:=true", "real_time_factor:=2.0", "start_time:=100.0")
+def bridge(spawn: Callable, request: pytest.FixtureRequest) -> Callable:
+    more = getattr(request, "param", [])
+    parameters = ("publish_clock:=true", "real_time_factor:=2.0", "start_time:=100.0", *more)
     pairs = [part for parameter in parameters for part in ("-p", parameter)]
     return spawn(["sim_bridge", "--ros-args", "--params-file", str(ROBOT), *pairs])
 
@@ -95,10 +101,10 @@ def test_ctrl_c_leaves_it_standing(
 
 
 @pytest.fixture
-def operator() -> Iterator[Node]:
+def operator(request: pytest.FixtureRequest) -> Iterator[Node]:
     context = Context()
     rclpy.init(context=context)
-    node = Node("operator", context=context)
+    node = Node(getattr(request, "param", "operator"), context=context)
     yield node
     node.destroy_node()
     context.shutdown()
@@ -110,7 +116,74 @@ def test_two_do_not_drive(
     operator.create_publisher(TwistStamped, "cmd_vel", 10)
     drive = spawn(command)
     assert drive.popen.wait(20.0) == EXIT_BAD_INPUT
-    assert "cmd_vel is published by /operator: stop that, two cannot drive" in drive.output
+    assert drive.output == (
+        "error: cmd_vel is published by /operator: stop that, two cannot drive\n"
+    )
+    assert not Path(command[5]).exists()  # it never began
+
+
+@pytest.mark.parametrize("operator", ["tomr_commission_drive"], indirect=True)
+def test_who_begins_to_command_in_mid_drive_stops_it(
+    bridge: object, operator: Node, spawn: Callable, command: list[str], wait_until: Callable
+) -> None:
+    """Also a second one of the same command."""
+    drive = spawn(command)
+    tour = Path(command[5])
+    wait_until(lambda: list(tour.parent.glob(f".{tour.name}.*.part")), "a recording under way")
+    operator.create_publisher(TwistStamped, "cmd_vel", 10)
+    assert drive.popen.wait(20.0) == EXIT_BAD_INPUT
+    assert drive.output.startswith("error: stopped after ")
+    assert drive.output.endswith(
+        "cmd_vel is published by /tomr_commission_drive: stop that, two cannot drive\n"
+    )
+    assert tour.exists()
+
+
+@pytest.mark.parametrize("bridge", [["cmd_vel_type:=twist"]], indirect=True)
+def test_wheels_in_another_order_stop_it_after_the_slow_part(
+    bridge: object, spawn: Callable, command: list[str], tmp_path: Path
+) -> None:
+    """The robot takes plain twists; wheels 2 and 3 answer to each other's name."""
+    text = ROBOT.read_text(encoding="utf-8")
+    names = "[wheel_1_joint, wheel_2_joint, wheel_3_joint]"
+    swapped = text.replace(names, "[wheel_1_joint, wheel_3_joint, wheel_2_joint]")
+    assert swapped != text
+    description = tmp_path / "swapped.yaml"
+    description.write_text(swapped, encoding="utf-8")
+    command[3] = str(description)
+    drive = spawn(command)
+    assert drive.popen.wait(20.0) == EXIT_BAD_INPUT
+    assert "times as fast as commanded" in drive.output
+    assert "see to robot.wheel_names" in drive.output
+    seen = read_drive(Path(command[5]), shipped_robot("reference"))
+    assert 0.0 < np.abs(seen.command[:, 0]).max() < 0.1  # never more than slowly
+
+
+def leaping(leap: float) -> Mock:
+    """A node whose clock leaps once."""
+
+    class Leaping(Mock):
+        seconds = PropertyMock(side_effect=[0.1, 0.2, 0.2 + leap, 9.0])
+
+    node = Leaping(silent=0.0, rivals="")
+    node.watch.problem.return_value = ""
+    node.watch.mistakes.return_value = []
+    return node
+
+
+@pytest.mark.parametrize("leap", [-0.3, 2.5])
+def test_a_clock_that_leaps_stops_it(leap: float) -> None:
+    request = DriveRequest(shipped_robot("reference"), (Command(8.0, STILL),), 4.0)
+    with pytest.raises(InputError, match=f"stopped: the clock leaps by {leap:.1f} s: see to it"):
+        _follow(leaping(leap), request, Mock(), Mock())
+
+
+@pytest.mark.parametrize("leap", [-0.1, 1.9])
+def test_a_clock_that_is_set_a_little_does_not(leap: float) -> None:
+    request = DriveRequest(shipped_robot("reference"), (Command(0.2 + leap, STILL),), 4.0)
+    node = leaping(leap)
+    _follow(node, request, Mock(), Mock())
+    node.command.assert_called_once_with(STILL)
 
 
 @pytest.mark.parametrize(

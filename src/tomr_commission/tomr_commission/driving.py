@@ -131,8 +131,8 @@ class DriveWatch:
             )
         if self._away_since is not None and time - self._away_since > choice.silence:
             return (
-                "wheels turn faster than commanded: see to robot.wheel_radius, the gear ratio and "
-                "who else commands"
+                "wheels turn faster than commanded: see to robot.wheel_names, wheel_radius, the "
+                "gear ratio and who else commands"
             )
         return ""
 

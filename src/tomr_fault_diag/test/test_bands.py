@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.calibrated import fit_band, fit_bands
-from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_fault_diag.residuals.settings import LEAST_BAND, LEAST_FACTOR, BandSettings
 from tomr_power_model.errors import InputError
 
 COUNT = 20_000
@@ -63,3 +64,24 @@ def test_too_little_is_refused() -> None:
     residual, modelled, change = (part[:100] for part in _healthy())
     with pytest.raises(InputError, match="a minute of driving"):
         fit_bands(residual, modelled, change)
+
+
+def test_residuals_that_are_all_nothing_leave_bands_that_can_be_set() -> None:
+    """As those of a simulation compared with itself: what is written must be taken again."""
+    residual, modelled, change = _healthy()
+    residual[:, 1:] = 0.0
+    bands = fit_bands(residual, modelled, change)
+    assert bands.power == bands.speed == LEAST_BAND
+    residual[:] = 0.0
+    residual[:, 1:4] = 50.0
+    assert fit_bands(residual, modelled, change).total_factor == LEAST_FACTOR
+
+
+@pytest.mark.parametrize("name", ["power", "current", "total_factor", "speed"])
+def test_a_least_band_of_nothing_is_refused(name: str) -> None:
+    key = f"band.{name}"
+    with pytest.raises(InputError, match=key):
+        DiagnosisSettings.of({key: -0.0}, "")
+    lowest = LEAST_FACTOR if name == "total_factor" else LEAST_BAND
+    bands = DiagnosisSettings.of({key: lowest}, "").residuals.bands
+    assert getattr(bands, name) == lowest

@@ -440,6 +440,16 @@ def test_a_frame_survives_its_message() -> None:
         assert one.stale or one.unit == other.unit
 
 
+@pytest.mark.parametrize("band", ["0", "-0.0", "-1"])
+@pytest.mark.parametrize("residual", ["0.5", "nan"])
+def test_a_band_without_width_is_refused(band: str, residual: str) -> None:
+    values = {"residual": residual, "band": band, "modelled": "2.0"}
+    pairs = [Message(key=key, value=value) for key, value in values.items()]
+    status = Message(name="x", message="high by 1 W", values=pairs)
+    with pytest.raises(Unusable, match=f"x: a band of {float(band):g}, it must be above 0"):
+        frame_of(Message(status=[status] * 10), BASE)
+
+
 @pytest.mark.parametrize(
     "message",
     [

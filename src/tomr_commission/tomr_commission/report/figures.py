@@ -1,13 +1,18 @@
 """Pictures of a commissioning, as PNG for embedding in a page."""
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from tomr_commission.alarm import Tail
 from tomr_commission.bands import KINDS
 from tomr_commission.commission import Commissioned
 from tomr_commission.evidence import MOST_CAUTION, SURE
-from tomr_commission.observed import band_of
+from tomr_commission.observed import Observed, band_of
 from tomr_power_model.canvas import AFTER, BEFORE, MEASURED, png, sheet
+
+Array = NDArray[np.float64]
 
 _COLOURS = (AFTER, BEFORE)
 _SMOOTH = 200
@@ -58,12 +63,11 @@ def _tail(panel: object, tail: Tail, colour: str) -> None:
 def held_picture(found: Commissioned) -> str:
     """Residuals of the drives held out over their bands, one drive after the other."""
     drives = found.outcome.held
-    ends = np.cumsum([drive.seconds[-1] + _PAUSE for drive in drives])
+    times = end_to_end(drives)
     with sheet(len(KINDS), 1, 1.3) as (drawing, panels):
         for panel, (kind, channels) in zip(panels, KINDS.items(), strict=True):
-            for drive, end in zip(drives, ends, strict=True):
+            for drive, time in zip(drives, times, strict=True):
                 ratio = drive.residual / band_of(drive, found.outcome.bands)
-                time = end - _PAUSE - drive.seconds[-1] + drive.seconds
                 for number, channel in enumerate(channels):
                     panel.plot(time, ratio[:, channel], lw=0.6, color=f"C{number}")
             panel.axhspan(-1.0, 1.0, color="#dcfce7", zorder=0)
@@ -71,3 +75,12 @@ def held_picture(found: Commissioned) -> str:
             panel.set_ylabel(kind.replace(", ", ",\n") + "\nbands", fontsize=6)
         panels[-1].set_xlabel("s")
         return png(drawing)
+
+
+def end_to_end(drives: Sequence[Observed]) -> list[Array]:
+    """Times [s] at which drives are drawn, one after the other with a pause between."""
+    ends = np.cumsum([drive.seconds[-1] + _PAUSE for drive in drives])
+    return [
+        end - _PAUSE - drive.seconds[-1] + drive.seconds
+        for drive, end in zip(drives, ends, strict=True)
+    ]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL
-from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_fault_diag.residuals.settings import LEAST_BAND, LEAST_FACTOR, BandSettings
 from tomr_power_model.errors import InputError
 
 Array = NDArray[np.float64]
@@ -69,7 +69,8 @@ def fit_bands(
         found = evolve(found, **{"power" if unit == "W" else "current": motor.least})
     if total is not None:
         least = found.power if unit == "W" else found.current
-        found = evolve(found, total_relative=total.relative, total_factor=total.least / least)
+        factor = max(total.least / least, LEAST_FACTOR)
+        found = evolve(found, total_relative=total.relative, total_factor=factor)
     return found
 
 
@@ -99,7 +100,7 @@ def fit_band(residual: Array, modelled: Array, change: Array, within: float) -> 
         return None
     shape, _ = nnls(np.stack([np.ones(len(size)), model, moved], axis=1), size)
     # A residual is never exactly as modelled: half the mean of all is the least.
-    least = max(float(shape[0]), 0.5 * float(size.mean()))
+    least = max(float(shape[0]), 0.5 * float(size.mean()), LEAST_BAND)
     width = np.maximum(least, shape[1] * model) + shape[2] * moved
     factor = float(np.quantile(size / width, within))
-    return Band(factor * least, factor * float(shape[1]), factor * float(shape[2]))
+    return Band(max(factor * least, LEAST_BAND), factor * float(shape[1]), factor * float(shape[2]))

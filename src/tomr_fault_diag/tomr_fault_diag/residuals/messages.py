@@ -94,6 +94,8 @@ def _residual(status: Any) -> Residual:
         modelled = float(values["modelled"])
     except (KeyError, ValueError) as error:
         raise Unusable(f"{status.name}: no number for {error}") from None
+    if band <= 0.0:
+        raise Unusable(f"{status.name}: a band of {band:g}, it must be above 0")
     if math.isnan(residual):
         return Residual(residual, band, modelled, missing=str(status.message))
     # The values are bare numbers, for plots; the sentence ends with the unit.

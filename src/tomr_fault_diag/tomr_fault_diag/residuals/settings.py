@@ -10,8 +10,14 @@ from tomr_power_model.model.ticks import TickSettings, to_ns
 from tomr_power_model.robot.parameters import HARDWARE_ID, NAMELESS, ParameterSpec
 
 
-def _live(name: str, description: str, default: float, unit: str = "") -> ParameterSpec:
-    return ParameterSpec(name, description, "float", default, unit, 0.0, 1e3, read_only=False)
+LEAST_BAND = 1e-4  # W, A, rad/s: residuals are divided by their bands
+LEAST_FACTOR = 0.01
+
+
+def _live(
+    name: str, description: str, default: float, unit: str = "", lowest: float = 0.0
+) -> ParameterSpec:
+    return ParameterSpec(name, description, "float", default, unit, lowest, 1e3, read_only=False)
 
 
 RESIDUAL_PARAMETERS: tuple[ParameterSpec, ...] = (
@@ -19,12 +25,12 @@ RESIDUAL_PARAMETERS: tuple[ParameterSpec, ...] = (
     HARDWARE_ID,
     ParameterSpec("encoder_window", "span of the fit to the encoders", "float", 0.07, "s", 0.01, 1),
     _live("band.relative", "of the modelled power or current of a motor", 0.6),
-    _live("band.power", "least band of a motor's power", 1.1, "W"),
-    _live("band.current", "least band of a motor's current", 0.15, "A"),
+    _live("band.power", "least band of a motor's power", 1.1, "W", LEAST_BAND),
+    _live("band.current", "least band of a motor's current", 0.15, "A", LEAST_BAND),
     _live("band.transient", "part of the model's change over the last ticks", 0.32),
-    _live("band.total_factor", "least band of the total, in those of a motor", 1.0),
+    _live("band.total_factor", "least band of the total, in those of a motor", 1.0, "", LEAST_FACTOR),
     _live("band.total_relative", "of the modelled total", 0.12),
-    _live("band.speed", "least band of a wheel speed", 0.1, "rad/s"),
+    _live("band.speed", "least band of a wheel speed", 0.1, "rad/s", LEAST_BAND),
     _live("band.speed_relative", "of the expected wheel speed", 0.01),
     _live("band.speed_transient", "part of the expected speed's change over the last ticks", 0.1),
 )
