@@ -36,8 +36,10 @@ def test_drive_comes_back_as_it_was(tmp_path: Path, steady: Callable[..., Observ
     assert held.name == drive.name
     assert np.array_equal(held.residual, drive.residual)
     assert store.observed("drive", "b") is None
-    (tmp_path / "drive.npz").write_bytes(b"PK")
-    assert store.observed("drive", "a") is None
+    whole = (tmp_path / "drive.npz").read_bytes()
+    for damaged in (b"PK", whole[:-40], whole[:300] + b"\xff" * 50 + whole[350:]):
+        (tmp_path / "drive.npz").write_bytes(damaged)
+        assert store.observed("drive", "a") is None
 
 
 def test_digest_and_fingerprint_tell_inputs_apart(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from attrs import fields, frozen
 
 from tomr_commission.observed import Observed
 from tomr_power_model.errors import InputError
+from tomr_power_model.files.arrays import DAMAGED
 from tomr_power_model.files.write import make_folder, write_bytes, write_text
 
 _FORMAT = 1  # of the kept files: a change makes all of them anew
@@ -68,7 +69,7 @@ class Store:
                     return None
                 rest = {item.name: held[item.name] for item in fields(Observed)[1:]}
                 return Observed(str(held["name"]), **rest)
-        except (OSError, ValueError, KeyError):
+        except DAMAGED:
             return None
 
     def keep(self, name: str, key: str, drive: Observed) -> None:

@@ -249,7 +249,7 @@ def test_arrays_are_read_without_pickle_and_within_limits(tmp_path: Path) -> Non
     good = tmp_path / "good.npz"
     np.savez(good, a=np.ones(3))
     assert read_arrays(good, ["a"])["a"].tolist() == [1.0, 1.0, 1.0]
-    names = ("cut", "bare", "pickled", "bomb", "text", "words", "complex", "flags")
+    names = ("cut", "bare", "pickled", "bomb", "text", "words", "complex", "flags", "open")
     bad = {name: tmp_path / name for name in names}
     bad["cut"].write_bytes(good.read_bytes()[:-30])
     with bad["bare"].open("wb") as file:
@@ -264,6 +264,9 @@ def test_arrays_are_read_without_pickle_and_within_limits(tmp_path: Path) -> Non
         with bad[name].open("wb") as file:
             np.savez_compressed(file, a=arrays)
     bad["text"].write_text("no arrays")
+    with bad["open"].open("wb") as file:
+        np.savez(file, a=np.ones(3000))  # so long that its check sum is not seen at once
+    bad["open"].write_bytes(bad["open"].read_bytes().replace(b"(3000,)", b"(3000, "))
     for name, path in bad.items():
         with pytest.raises(InputError) as failure:
             read_arrays(path, ["a"])

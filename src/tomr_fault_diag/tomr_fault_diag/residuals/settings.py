@@ -9,7 +9,6 @@ from tomr_power_model.model.settings import TICK_PARAMETERS, tick_settings
 from tomr_power_model.model.ticks import TickSettings, to_ns
 from tomr_power_model.robot.parameters import HARDWARE_ID, NAMELESS, ParameterSpec
 
-
 LEAST_BAND = 1e-4  # W, A, rad/s: residuals are divided by their bands
 LEAST_FACTOR = 0.01
 
@@ -28,7 +27,7 @@ RESIDUAL_PARAMETERS: tuple[ParameterSpec, ...] = (
     _live("band.power", "least band of a motor's power", 1.1, "W", LEAST_BAND),
     _live("band.current", "least band of a motor's current", 0.15, "A", LEAST_BAND),
     _live("band.transient", "part of the model's change over the last ticks", 0.32),
-    _live("band.total_factor", "least band of the total, in those of a motor", 1.0, "", LEAST_FACTOR),
+    _live("band.total_factor", "least band of the total, in motors'", 1.0, "", LEAST_FACTOR),
     _live("band.total_relative", "of the modelled total", 0.12),
     _live("band.speed", "least band of a wheel speed", 0.1, "rad/s", LEAST_BAND),
     _live("band.speed_relative", "of the expected wheel speed", 0.01),

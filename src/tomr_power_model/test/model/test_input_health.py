@@ -54,6 +54,15 @@ def test_a_gap_is_a_warning_for_a_while() -> None:
     assert (stream.gaps, stream.refused) == (1, 0)
 
 
+@pytest.mark.parametrize(("samples", "is_gap"), [(5, False), (6, True), (9, True)])
+def test_what_is_a_gap_is_known_from_the_first_five_intervals_on(
+    samples: int, is_gap: bool
+) -> None:
+    silent = 20 * (samples - 1) + 150
+    assert flow(20 * samples).is_silent(BASE + silent * MS) == is_gap
+    assert flow(20 * samples).is_silent(BASE + (silent + 250) * MS)
+
+
 @pytest.mark.parametrize("every_ms", [5, 20, 100])
 def test_rates_and_ages_are_numbers(every_ms: int) -> None:
     status = InputState("wheel_1/power", flow(3000, every_ms)).status(BASE + 3000 * MS, "robot_7")

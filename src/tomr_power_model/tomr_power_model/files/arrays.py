@@ -1,5 +1,6 @@
 """Files of arrays (.npz), read within a limit and without pickled objects."""
 
+import tokenize
 import zipfile
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,7 +15,7 @@ from tomr_power_model.limits import limits, too_large
 
 # What zip, zlib and numpy raise for a damaged file. Where a flipped bit asks for a password or a
 # compression that zipfile does not have, that is a RuntimeError.
-_DAMAGED = (
+DAMAGED = (
     OSError,
     ValueError,
     KeyError,
@@ -23,6 +24,7 @@ _DAMAGED = (
     RuntimeError,
     SyntaxError,
     TypeError,
+    tokenize.TokenError,
     zipfile.BadZipFile,
     zipfile.zlib.error,  # type: ignore[attr-defined]
 )
@@ -38,7 +40,7 @@ def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[np.float6
             too_large(str(path), f"its arrays take {unpacked:,} bytes", "arrays_bytes")
         with np.load(path, allow_pickle=False) as stored:
             return {name: _numbers(stored[name]) for name in names}
-    except _DAMAGED as error:
+    except DAMAGED as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{path}: cannot be read ({error})") from None

@@ -16,7 +16,7 @@ from tomr_power_model.model.ticks import to_ns
 _USUAL = 3.0  # intervals: a longer silence is a gap
 _KEPT = 31  # intervals to take the usual one from
 _FEWEST = 5
-_EVERY = 8  # samples: how often it is taken anew
+_EVERY = 8  # samples: how often it is taken anew, after the first time
 _STRAYS = 3  # messages in a row that precede: fewer are late ones
 _RATED = to_ns(2.0)  # time over which a rate is counted
 
@@ -156,7 +156,8 @@ class Continuity:
         self._counted.append(stamp)
         while self._counted[0] <= stamp - _RATED:
             self._counted.popleft()
-        if len(self._intervals) >= _FEWEST and self._count % _EVERY == 0:
+        known = len(self._intervals)
+        if known == _FEWEST or (known > _FEWEST and self._count % _EVERY == 0):
             given = self._tolerance
             usual = round(_USUAL * median(self._intervals))
             self._tolerated = min(max(usual, given.shortest), given.longest)
