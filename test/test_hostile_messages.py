@@ -45,7 +45,7 @@ NODES: dict[str, Callable[[], Node]] = {
 }
 NUMBERS = (nan, inf, -inf, 3e38, -1.0, 0.0)
 LENGTHS = (0, 1, 3, 4, 10, 200)
-TEXTS = ("", "1e300", "-1", NAME, "inputs: \x00", "inf", "nan")
+TEXTS = ("", "1e300", "-1", "0", NAME, "inputs: \x00", "inf", "nan")
 # What the nodes look for in a status.
 KEYS = ("residual", "band", "modelled", "code", "state", "p normal", "severity", "wheel", "topic")
 SECOND = 10**9
