@@ -1,8 +1,10 @@
 """What the classifier itself holds against a healthy robot, tick by tick, in decades.
 
 The evidence is the log odds of the likeliest fault against normal without the prior: how many
-decades of `caution` a tick would have overcome. It is read off the classifier in use, run with the
-most caution there is, so that it follows whatever the classifier becomes.
+decades of `caution` a tick would have overcome, and how many of `slip_caution`: shoves look like
+slip and hardly like anything else, so that one caution for all would delay all for its sake. It is
+read off the classifier in use, run with the most caution there is, so that it follows whatever the
+classifier becomes.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,7 +25,12 @@ from tomr_power_model.model.ticks import NANOSECONDS
 Array = NDArray[np.float64]
 
 MOST_CAUTION = next(spec.maximum for spec in CLASSIFIER_PARAMETERS if spec.name == "caution")
+CAUTIONS = ("caution", "slip_caution")  # of what the columns of evidence are: others, slip
+KINDS = ("faults but slip", "slip")  # in words
 SURE = 2.0  # decades beyond the caution at which a fault is named: odds of a hundred to one
+
+
+_NONE = (0.0, 0.0)
 
 
 class _Witness(WindowJudge):
@@ -31,9 +38,10 @@ class _Witness(WindowJudge):
 
     def __init__(self, settings: ClassifierSettings) -> None:
         super().__init__(
-            WindowNetwork.load(settings.weights), evolve(settings, caution=MOST_CAUTION)
+            WindowNetwork.load(settings.weights),
+            evolve(settings, caution=MOST_CAUTION, slip_caution=MOST_CAUTION),
         )
-        self.newest = 0.0
+        self.newest = _NONE
 
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         opinion = super().judge(frame, elapsed_ns, unseen)
@@ -42,15 +50,16 @@ class _Witness(WindowJudge):
 
 
 def evidence_in(frames: Iterable[ResidualFrame], settings: ClassifierSettings) -> Array:
-    """Decades of evidence for a fault at each tick, 0 where nothing could be decided, (n,)."""
+    """Decades of evidence for a fault of each kind at each tick, 0 where nothing could be decided,
+    (n, 2)."""
     witness = _Witness(settings)
     classifier = FaultClassifier(witness)
     found = []
     for frame in frames:
-        witness.newest = 0.0
+        witness.newest = _NONE
         classifier.classify(frame)
         found.append(witness.newest)
-    return np.array(found)
+    return np.array(found).reshape(-1, len(KINDS))
 
 
 @frozen

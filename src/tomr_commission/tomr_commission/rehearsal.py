@@ -75,7 +75,7 @@ class Rehearsal:
 class Shoved:
     """Peaks of evidence after simulated shoves [decades], and between them by hours."""
 
-    peaks: tuple[float, ...]  # one for each shove
+    peaks: tuple[tuple[float, ...], ...]  # one for each shove, of each kind of fault
     between: tuple[float, ...]  # highest evidence of each drive outside of its shoves
     hours: float  # simulated
 
@@ -97,7 +97,7 @@ def rehearse(
 
 def _one(
     job: tuple[str, BandSettings, ClassifierSettings, Usage, Rehearsal, int],
-) -> tuple[list[float], float, int]:
+) -> tuple[list[tuple[float, ...]], float, int]:
     """Peaks of a drive's shoves, its highest evidence elsewhere, and its ticks."""
     described, bands, settings, usage, plan, seed = job
     drive = shoved_drive(robot_of(described), usage, plan, seed)
@@ -109,7 +109,7 @@ def _one(
         first = math.floor(bump.start * 1e9 / TICK_NS)
         last = math.ceil((bump.start + bump.duration + _SETTLING) * 1e9 / TICK_NS)
         own[first:last] = True
-        peaks.append(float(evidence[first:last].max(initial=0.0)))
+        peaks.append(tuple(evidence[first:last].max(axis=0, initial=0.0).tolist()))
     return peaks, float(evidence[~own].max(initial=0.0)), len(evidence)
 
 

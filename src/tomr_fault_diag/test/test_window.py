@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Sequence
 from importlib.resources import files
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -215,6 +216,48 @@ def test_a_decade_of_caution_is_a_decade_of_odds_for_every_fault(state: int) -> 
     assert np.diff(odds) == pytest.approx([-10.0, -10.0], abs=0.01)
 
 
+@pytest.mark.parametrize("state", [ENCODERS.start, DRAGS.start, METERS.start, OTHER])
+def test_a_caution_of_slip_hardly_delays_other_faults(state: int) -> None:
+    """Rare ones come by way of slip, too."""
+    odds = []
+    for slip_caution in (10.0, 25.0):
+        belief = Belief(0.5, 10.0, slip_caution)
+        for _ in range(5):
+            belief.update(_against_all_but(state, 10.0))
+        odds.append(np.log10(belief.shares[state] / belief.shares[NORMAL]))
+    assert odds[0] - 1.0 < odds[1] <= odds[0]
+
+
+@pytest.mark.parametrize("seen", [0, 100])
+@pytest.mark.parametrize("slip_caution", [8.0, 17.0, 25.0])
+def test_slip_takes_its_own_caution_and_no_way_round_it(slip_caution: float, seen: int) -> None:
+    """Windows of two decades at half weight; other faults, likelier by caution, lead to it too."""
+
+    def lasted(caution: float) -> int:
+        belief = Belief(0.5, caution, slip_caution)
+        for _ in range(seen):
+            belief.update(_against_all_but(NORMAL, 1.0))
+        likelihoods = _against_all_but(SLIP, 2.0 * math.log(10.0))
+        return next(k for k in range(99) if belief.update(likelihoods)[SLIP] > 0.99)
+
+    assert lasted(8.0) == lasted(slip_caution)
+    assert lasted(8.0) == pytest.approx(slip_caution - 5.0 + 2.0, abs=2)
+
+
+def test_slip_s_evidence_is_its_own() -> None:
+    network = Saying()
+    network.likelihoods[:] = -20.0
+    network.likelihoods[SLIP] = 0.0
+    settings = ClassifierSettings(caution=30.0, slip_caution=28.0)
+    judge = WindowJudge(network, settings)  # type: ignore[arg-type]
+    for tick in range(WINDOW + 1):
+        judge.judge(frame(tick), 50 * MS, Unseen())
+    other, slip = judge.evidence()
+    # Two windows of e^10 at half weight, and the five decades by which slip is likelier.
+    assert slip == pytest.approx(2 * 10.0 / math.log(10.0) + 5.0, abs=0.5)
+    assert other < slip - 5.0
+
+
 def test_probabilities_stand_beside_their_states() -> None:
     for hypothesis, state in enumerate(STATE_OF):
         shares = np.eye(len(STATE_OF))[hypothesis]
@@ -273,7 +316,9 @@ def test_evidence_is_none_where_windows_speak_against_the_fault() -> None:
     judge = WindowJudge(network, settings)  # type: ignore[arg-type]
     for tick in range(20):
         judge.judge(frame(tick), 50 * MS, Unseen())
-    assert judge.evidence() == 0.0
+    other, slip = judge.evidence()
+    assert other == 0.0
+    assert slip < 1.0  # of the five decades by which it is likelier
 
 
 def test_a_push_is_no_load_either_where_a_fault_was_believed() -> None:
@@ -332,8 +377,8 @@ def test_another_fault_that_stays_is_named_after_all(next_one: int) -> None:
 
 
 def test_no_chance_is_lost_between_states() -> None:
-    for caution in (0.0, 4.0, 11.0, 30.0):
-        moves = _transitions(10.0**-caution)
+    for caution, slip in product((0.0, 4.0, 11.0, 30.0), repeat=2):
+        moves = _transitions(10.0**-caution, 10.0**-slip)
         np.testing.assert_allclose(moves.sum(axis=1), 1.0, atol=1e-12)
         assert (moves > -1e-12).all()
 
@@ -502,7 +547,7 @@ def test_evidence_says_how_much_caution_a_fault_overcomes(state: int) -> None:
     others, sure = [judge(caution) for caution in cautions], []
     for tick in range(80):
         witness.judge(frame(tick), 50 * MS, Unseen())
-        evidence.append(witness.evidence())
+        evidence.append(witness.evidence()[state == SLIP])
         said = [other.judge(frame(tick), 50 * MS, Unseen()) for other in others]
         wanted = [STATE_OF[state]]  # or, until its cause is named, what the paper calls it
         if wanted[0] in (*DRAGGING, *DEGRADED) and wanted[0].paper is not None:
@@ -520,7 +565,7 @@ def test_what_may_be_either_of_two_faults_is_evidence_of_neither() -> None:
     network.likelihoods[[ENCODERS.start, ENCODERS.start + 1]] = 0.0
     for tick in range(40):
         judge.judge(frame(tick), 50 * MS, Unseen())
-    assert judge.evidence() == 0.0
+    assert judge.evidence() == (0.0, 0.0)
 
 
 def test_a_push_is_said_and_accuses_nobody() -> None:

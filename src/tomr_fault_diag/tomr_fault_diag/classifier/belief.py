@@ -4,8 +4,9 @@
 
 with l_k the log-likelihood of the newest window if k holds, relative to the likeliest. Windows
 overlap and so say the same several times over: `weight` < 1. That a fault comes on within a tick is
-10^-caution likely: so many decades of evidence must speak for it before it is believed. What cannot
-be told apart from normal in this motion has l = 0 and leaves the belief as it is.
+10^-caution likely: so many decades of evidence must speak for it before it is believed, for slip,
+which shoves look like, a number of its own. What cannot be told apart from normal in this motion
+has l = 0 and leaves the belief as it is.
 
 A force from outside is one hypothesis of the network and two states here: pushes are frequent and
 soon over, loads are as rare as faults and stay. What looks like one fault now and like another
@@ -72,10 +73,11 @@ _LEAST = 1e-60  # far below the rarest onset that `caution` allows, or that woul
 class Belief:
     """Probabilities of the states, tick by tick."""
 
-    def __init__(self, weight: float, caution: float) -> None:
-        """`weight` of the evidence of one window, `caution` in decades."""
+    def __init__(self, weight: float, caution: float, slip_caution: float | None = None) -> None:
+        """`weight` of the evidence of one window, cautions in decades; None: slip's is the same."""
         self._weight = weight
-        self._moves = _transitions(10.0**-caution)
+        own = caution if slip_caution is None else slip_caution
+        self._moves = _transitions(10.0**-caution, 10.0**-own)
         self.clear()
 
     def clear(self) -> None:
@@ -103,15 +105,16 @@ def of_states(likelihoods: Array) -> Array:
     return np.concatenate([found, np.tile(ended, _CATCHING_UP)])
 
 
-def _transitions(onset: float) -> Array:
-    """P(j -> k)."""
-    onset = min(onset, _PUSH)  # a fault, slip as well, is no likelier than a push
+def _transitions(onset: float, slip_onset: float) -> Array:
+    """P(j -> k); `slip_onset`: what the onset of faults would be with slip's own caution."""
+    onset, slip_onset = min(onset, _PUSH), min(slip_onset, _PUSH)  # no likelier than a push
     moves = np.full((_STATES, _STATES), _OTHER)
+    moves[:, SLIP] *= min(slip_onset / onset, 1.0)  # as rare beside a fault as it is without
     moves[:, LOADED] *= onset / _PUSH  # as rare beside a push as it is without a fault
     moves[:, NORMAL] = _ENDING
     moves[SLIP, NORMAL] = _SLIP_ENDING
     moves[[NORMAL, EXTERNAL]] = onset
-    moves[[NORMAL, EXTERNAL], SLIP] = min(_SLIPPERY * onset, _PUSH)
+    moves[[NORMAL, EXTERNAL], SLIP] = min(_SLIPPERY * slip_onset, _PUSH)
     for kind in (DRAGS, WEAKS, METERS):
         moves[[NORMAL, EXTERNAL, *_CATCHES_UP], kind] *= _SLOW
     moves[:, OTHER] *= _STRANGE

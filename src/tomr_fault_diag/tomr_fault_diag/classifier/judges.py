@@ -128,7 +128,7 @@ class WindowJudge:
     def __init__(self, network: WindowNetwork, settings: ClassifierSettings) -> None:
         self.settings = settings
         self._network = network
-        self._belief = Belief(settings.evidence_weight, settings.caution)
+        self._belief = Belief(settings.evidence_weight, settings.caution, settings.caution_of_slip)
         self.clear()
 
     def clear(self) -> None:
@@ -209,14 +209,22 @@ class WindowJudge:
         self._led = self._led + 1 if goes_on else 1
         self._accused, self._calm = group, 0
 
-    def evidence(self) -> float:
-        """Log odds of the likeliest fault against none, without the prior [decades].
+    def evidence(self) -> tuple[float, float]:
+        """Log odds of the likeliest fault but slip, and of slip, against none, without the prior
+        [decades].
 
         0 where it would not be named with however little caution: no window is striking, or
-        another fault may be it. Exact where the caution in use is far beyond.
+        another fault but slip may be it. Exact where the cautions in use are far beyond.
         """
+        others = [group for group in _GROUPS[1:] if SLIP not in group]
+        settings = self.settings
+        return (
+            self._evidence(others, settings.caution),
+            self._evidence([[SLIP]], settings.caution_of_slip),
+        )
+
+    def _evidence(self, faults: list[list[int]], caution: float) -> float:
         shares = self._belief.shares
-        faults = _GROUPS[1:]
         sums = [float(shares[group].sum()) for group in faults]
         most = max(sums)
         group = faults[sums.index(most)]
@@ -224,7 +232,7 @@ class WindowJudge:
         if not striking or most < _SURE * sum(sums):
             return 0.0
         odds = most / float(shares[_GROUPS[0]].sum())
-        return max(self.settings.caution + math.log10(odds), 0.0)
+        return max(caution + math.log10(odds), 0.0)
 
     def _is_striking(self, state: int) -> bool:
         """Whether a window of the last half second spoke for a state by itself."""

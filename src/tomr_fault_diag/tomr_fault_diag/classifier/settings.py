@@ -53,6 +53,15 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
         30.0,
     ),
     _S(
+        "slip_caution",
+        "the same for slip, which shoves look like; 0: as caution",
+        "float",
+        0.0,
+        "",
+        0.0,
+        30.0,
+    ),
+    _S(
         "striking",
         "of window: log-likelihood ratio to normal that a single window must reach besides",
         "float",
@@ -102,6 +111,7 @@ class ClassifierSettings:
     weights: str = ""
     evidence_weight: float = 0.5
     caution: float = 11.0
+    slip_caution: float = 0.0  # 0: as caution
     striking: float = 9.0
     filter_time: int = to_ns(0.15)
     confirm_time: int = to_ns(0.15)
@@ -114,6 +124,11 @@ class ClassifierSettings:
     hardware_id: str = NAMELESS
     input_order: str = "speeds_first"
     commissioned: str = ""
+
+    @property
+    def caution_of_slip(self) -> float:
+        """Decades of evidence needed before slip is named."""
+        return self.slip_caution or self.caution
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:
@@ -132,6 +147,7 @@ class ClassifierSettings:
             weights=str(values["weights"]),
             evidence_weight=number("evidence_weight"),
             caution=number("caution"),
+            slip_caution=number("slip_caution"),
             striking=number("striking"),
             filter_time=to_ns(number("filter_time")),
             confirm_time=to_ns(number("confirm_time")),
