@@ -155,14 +155,32 @@ def test_block_peaks() -> None:
 def test_what_is_expected_of_all_kinds_is_their_sum() -> None:
     tails = [Tail.of("shoves", exponential(scale, 390), 30.0, CHOICE) for scale in (2.0, 3.0)]
     low, high = (alarm_level([tail], 0.025, 0.0, CHOICE) for tail in tails)
-    both = AlarmLevels.of((low, high))
+    none = alarm_level([Tail.of("shoves", [0.0] * 390, 30.0, CHOICE)], 0.01, 11.0, CHOICE)
+    both = AlarmLevels.of((low, high, none))
     assert both.expected == pytest.approx(low.expected + high.expected)
-    assert both.wanted == 0.05
+    assert both.wanted == pytest.approx(0.06)
     assert low.low + high.low <= both.low < both.expected < both.high <= low.high + high.high
-    assert both.cautions == {"caution": low.caution, "slip_caution": high.caution}
+    assert both.cautions == {
+        "slip_caution": low.caution,
+        "control_caution": high.caution,
+        "caution": 11.0,
+    }
     assert both.needed == high.needed > low.needed
     assert both.is_enough
     assert both.is_rate_known
     hopeless = evolve(low, needed=99.0, tails=(Tail.of("shoves", [], 30.0, CHOICE),))
-    assert not AlarmLevels.of((hopeless, high)).is_enough
-    assert not AlarmLevels.of((hopeless, high)).is_rate_known
+    assert not AlarmLevels.of((hopeless, high, none)).is_enough
+    assert not AlarmLevels.of((hopeless, high, none)).is_rate_known
+
+
+def test_alarms_are_shared_out_so_that_the_highest_caution_is_least() -> None:
+    """What needs the most gets the most; of two that need as much each has the same."""
+    peaks = (exponential(1.0), exponential(4.0), [0.0] * 4000)
+    tails = [[Tail.of("shoves", one, 30.0, CHOICE)] for one in peaks]
+    found = AlarmLevels.shared(tails, (0.0, 0.0, 11.0), 0.05, CHOICE)
+    assert [level.wanted for level in found.levels] == pytest.approx([0.005, 0.04, 0.005])
+    assert found.wanted == pytest.approx(0.05)
+    assert found.expected < 0.05 < found.high
+    assert found.levels[2].caution == 11.0
+    twice = AlarmLevels.shared([tails[1], tails[1]], (0.0, 0.0), 0.05, CHOICE)
+    assert [level.wanted for level in twice.levels] == pytest.approx([0.025, 0.025])

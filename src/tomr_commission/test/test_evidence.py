@@ -31,7 +31,7 @@ def test_healthy_driving_has_no_evidence_and_no_alarm(healthy: Observed) -> None
 
 def test_alarm_comes_where_evidence_passes_the_caution(faulty: Observed) -> None:
     frames = frames_of(faulty, BandSettings())
-    evidence = evidence_in(frames, SETTINGS)[:, 0]
+    evidence = evidence_in(frames, SETTINGS)[:, 2]
     assert evidence.max() >= MOST_CAUTION
     for caution in (4.0, 8.0, 11.0, 20.0):
         alarms = decisions(frames, evolve(SETTINGS, caution=caution)).alarms
@@ -46,7 +46,7 @@ def test_evidence_of_a_fault_that_is_rarer_than_others(
     healthy: Observed, kind: InjectedKind
 ) -> None:
     frames = frames_of(injected(healthy, kind, kind.sizes[0], 1), BandSettings())
-    evidence = evidence_in(frames, SETTINGS)[:, 0]
+    evidence = evidence_in(frames, SETTINGS)[:, 2]
     for caution in (8.0, 11.0, 20.0, 27.0):
         alarms = decisions(frames, evolve(SETTINGS, caution=caution)).alarms
         first = healthy.seconds[np.argmax(evidence >= caution + SURE)]

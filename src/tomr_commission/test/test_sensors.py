@@ -32,7 +32,7 @@ HERE = "tomr_commission.commission"
 REPORT = {"sentence": "", "findings": [], "unexplained_share": 0.0, "holdout": None}
 SILENT = (*MOTORS, *ENCODERS)
 SIMULATED = "wheel stuck (simulated)"
-SHOVES = ((0.0, 0.0),) * 60
+SHOVES = ((0.0, 0.0, 0.0),) * 60
 TAILS = {"driving": 50, "simulated shoves": 0}  # peaks of each
 
 
@@ -115,7 +115,7 @@ def test_a_rate_that_is_not_known_is_not_told(is_known: bool) -> None:
     level = alarm_level(tails[: 1 + (not is_known)], 0.025, 11.0, AlarmChoice())
     said = SimpleNamespace(alarms=(), undecided=0, ticks=1)
     outcome = SimpleNamespace(
-        level=AlarmLevels.of((level, level)),
+        level=AlarmLevels.of((level, level, level)),
         explained={"report": REPORT},
         held_name="tour",
         held_hours=0.1,

@@ -18,6 +18,7 @@ it was watched. A generalised Pareto tail is fitted beside, and its shape report
 
 import math
 from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ _CAP = MOST_CAUTION + SURE  # decades: higher peaks are known to be higher, no m
 _USUAL_SCALE, _USUAL_WEIGHT = 4.0, 4  # decades of a tail, and the peaks that this counts as
 _DRAWS, _SEED = 4000, 1
 _LEAST_RATE = 1e-12
+_PARTS = 10  # of the alarms wanted, given to the kinds of faults
 _FIVE_PERCENT = 1.645  # quantile of a standard normal, one-sided
 
 
@@ -185,6 +187,31 @@ class AlarmLevels:
     high: float
 
     @classmethod
+    def shared(
+        cls,
+        tails: Sequence[Sequence[Tail]],
+        least: Sequence[float],
+        wanted: float,
+        choice: AlarmChoice,
+    ) -> "AlarmLevels":
+        """Each kind gets the share of the alarms wanted with which the highest caution is least.
+
+        tails, least: of each kind.
+        """
+        tried = [
+            {
+                part: alarm_level(of_kind, wanted * part / _PARTS, lowest, choice)
+                for part in range(1, _PARTS - len(tails) + 2)
+            }
+            for of_kind, lowest in zip(tails, least, strict=True)
+        ]
+        splits = [parts for parts in product(*tried) if sum(parts) == _PARTS]
+        chosen = [
+            [levels[part] for levels, part in zip(tried, parts, strict=True)] for parts in splits
+        ]
+        return cls.of(min(chosen, key=_least))
+
+    @classmethod
     def of(cls, levels: Sequence[AlarmLevel]) -> "AlarmLevels":
         """Of the levels of all kinds."""
         drawn = np.asarray(sum(level.drawn() for level in levels))
@@ -216,6 +243,12 @@ class AlarmLevels:
     def is_rate_known(self) -> bool:
         """Whether every source was watched: what is expected counts no other."""
         return all(level.is_rate_known for level in self.levels)
+
+
+def _least(levels: Sequence[AlarmLevel]) -> tuple[float, float]:
+    """The highest caution, then all of them."""
+    cautions = [level.caution for level in levels]
+    return max(cautions), sum(cautions)
 
 
 def block_peaks(evidence: Array, seconds: Array, block: float) -> list[tuple[float, ...]]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from attrs import asdict, evolve, frozen
 
-from tomr_commission.alarm import AlarmLevels, Tail, alarm_level, block_peaks
+from tomr_commission.alarm import AlarmLevels, Tail, block_peaks
 from tomr_commission.bands import RegimeLine, bands_of, regime_table
 from tomr_commission.commissioned import (
     CLASSIFIER,
@@ -349,21 +349,22 @@ def _real_peaks(
 
 
 def _level(request: CommissionRequest, real: _Real, shoved: Shoved, plan: Rehearsal) -> AlarmLevels:
-    """From real driving and from simulated shoves; each kind of fault has an equal share of the
-    false alarms."""
-    shipped, choice = ClassifierSettings().caution, request.alarm
-    # Some minutes of driving alone are no reason to be less careful, nor are shoves but for slip.
-    below = {"slip_caution": choice.below_shipped if shoved.peaks else 0.0}
-    levels = []
-    for number, name in enumerate(CAUTIONS):
-        driven, pushed = ([peak[number] for peak in part.peaks] for part in (real, shoved))
-        tails = (
-            Tail.of("healthy driving", driven, len(driven) / real.hours, choice),
-            Tail.of("simulated shoves", pushed, plan.shoves_per_hour, choice),
+    """From real driving and from simulated shoves."""
+    choice = request.alarm
+    tails = []
+    for kind in range(len(CAUTIONS)):
+        driven, pushed = ([peak[kind] for peak in part.peaks] for part in (real, shoved))
+        tails.append(
+            (
+                Tail.of("healthy driving", driven, len(driven) / real.hours, choice),
+                Tail.of("simulated shoves", pushed, plan.shoves_per_hour, choice),
+            )
         )
-        share = request.false_alarms_per_hour / len(CAUTIONS)
-        levels.append(alarm_level(tails, share, shipped - below.get(name, 0.0), choice))
-    return AlarmLevels.of(levels)
+    # Some minutes of driving alone are no reason to be less careful, nor are shoves but for slip.
+    shipped = ClassifierSettings().caution
+    below = {"slip_caution": choice.below_shipped if shoved.peaks else 0.0}
+    least = [shipped - below.get(name, 0.0) for name in CAUTIONS]
+    return AlarmLevels.shared(tails, least, request.false_alarms_per_hour, choice)
 
 
 def _text(

@@ -23,7 +23,7 @@ _PAUSE = 1.0  # s between drives that are drawn one after the other
 
 def alarm_picture(found: Commissioned) -> str:
     """How often an hour evidence exceeds a level: peaks, fitted tails, and the level chosen."""
-    with sheet(len(FAULTS), 1, 2.6) as (drawing, panels):
+    with sheet(len(FAULTS), 1, 2.2) as (drawing, panels):
         for panel, name, level in zip(panels, FAULTS, found.outcome.level.levels, strict=True):
             _alarm_panel(panel, name, level)
         panels[-1].set_xlabel("evidence, decades")

@@ -4,9 +4,9 @@
 
 with l_k the log-likelihood of the newest window if k holds, relative to the likeliest. Windows
 overlap and so say the same several times over: `weight` < 1. That a fault comes on within a tick is
-10^-caution likely: so many decades of evidence must speak for it before it is believed, for slip,
-which shoves look like, a number of its own. What cannot be told apart from normal in this motion
-has l = 0 and leaves the belief as it is.
+10^-caution likely: so many decades of evidence must speak for it before it is believed, another
+number of them for slip and for control system faults, which shoves may look like. What cannot be
+told apart from normal in this motion has l = 0 and leaves the belief as it is.
 
 A force from outside is one hypothesis of the network and two states here: pushes are frequent and
 soon over, loads are as rare as faults and stay. What looks like one fault now and like another
@@ -14,7 +14,10 @@ then is none that is known: `OTHER` takes each window as any of the faults. When
 again its wheel has to catch up, which for a second looks like any fault of that wheel: `ENDED`.
 """
 
+from typing import Self
+
 import numpy as np
+from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.states import (
@@ -70,14 +73,27 @@ _GUESSED = np.log(2.5)  # what a wheel that catches up looks like is not known a
 _LEAST = 1e-60  # far below the rarest onset that `caution` allows, or that would count for more
 
 
+@frozen
+class Cautions:
+    """Decades of evidence that must speak for a fault."""
+
+    others: float
+    slip: float
+    control: float
+
+    @classmethod
+    def alike(cls, caution: float) -> Self:
+        """The same for all."""
+        return cls(caution, caution, caution)
+
+
 class Belief:
     """Probabilities of the states, tick by tick."""
 
-    def __init__(self, weight: float, caution: float, slip_caution: float | None = None) -> None:
-        """`weight` of the evidence of one window, cautions in decades; None: slip's is the same."""
+    def __init__(self, weight: float, cautions: Cautions) -> None:
+        """`weight` of the evidence of one window."""
         self._weight = weight
-        own = caution if slip_caution is None else slip_caution
-        self._moves = _transitions(10.0**-caution, 10.0**-own)
+        self._moves = _transitions(cautions)
         self.clear()
 
     def clear(self) -> None:
@@ -105,16 +121,21 @@ def of_states(likelihoods: Array) -> Array:
     return np.concatenate([found, np.tile(ended, _CATCHING_UP)])
 
 
-def _transitions(onset: float, slip_onset: float) -> Array:
-    """P(j -> k); `slip_onset`: what the onset of faults would be with slip's own caution."""
-    onset, slip_onset = min(onset, _PUSH), min(slip_onset, _PUSH)  # no likelier than a push
+def _transitions(cautions: Cautions) -> Array:
+    """P(j -> k)."""
+    # A fault, slip as well, is no likelier than a push.
+    onset, slip, control = (
+        min(10.0**-caution, _PUSH) for caution in (cautions.others, cautions.slip, cautions.control)
+    )
     moves = np.full((_STATES, _STATES), _OTHER)
-    moves[:, SLIP] *= min(slip_onset / onset, 1.0)  # as rare beside a fault as it is without
+    moves[:, SLIP] *= min(slip / onset, 1.0)  # as rare beside a fault as it is without
+    moves[:, CONTROLS] *= min(control / onset, 1.0)
     moves[:, LOADED] *= onset / _PUSH  # as rare beside a push as it is without a fault
     moves[:, NORMAL] = _ENDING
     moves[SLIP, NORMAL] = _SLIP_ENDING
     moves[[NORMAL, EXTERNAL]] = onset
-    moves[[NORMAL, EXTERNAL], SLIP] = min(_SLIPPERY * slip_onset, _PUSH)
+    moves[[NORMAL, EXTERNAL], SLIP] = min(_SLIPPERY * slip, _PUSH)
+    moves[NORMAL, CONTROLS] = moves[EXTERNAL, CONTROLS] = control
     for kind in (DRAGS, WEAKS, METERS):
         moves[[NORMAL, EXTERNAL, *_CATCHES_UP], kind] *= _SLOW
     moves[:, OTHER] *= _STRANGE

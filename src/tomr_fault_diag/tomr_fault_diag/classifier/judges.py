@@ -128,7 +128,7 @@ class WindowJudge:
     def __init__(self, network: WindowNetwork, settings: ClassifierSettings) -> None:
         self.settings = settings
         self._network = network
-        self._belief = Belief(settings.evidence_weight, settings.caution, settings.caution_of_slip)
+        self._belief = Belief(settings.evidence_weight, settings.cautions)
         self.clear()
 
     def clear(self) -> None:
@@ -209,18 +209,20 @@ class WindowJudge:
         self._led = self._led + 1 if goes_on else 1
         self._accused, self._calm = group, 0
 
-    def evidence(self) -> tuple[float, float]:
-        """Log odds of the likeliest fault but slip, and of slip, against none, without the prior
-        [decades].
+    def evidence(self) -> tuple[float, float, float]:
+        """Log odds against none, without the prior [decades], of slip, of a control system fault,
+        and of the likeliest other fault: those with a caution of their own.
 
         0 where it would not be named with however little caution: no window is striking, or
-        another fault but slip may be it. Exact where the cautions in use are far beyond.
+        another fault with the same caution may be it. Exact where the cautions in use are far
+        beyond.
         """
-        others = [group for group in _GROUPS[1:] if SLIP not in group]
-        settings = self.settings
+        slip, control, *others = _GROUPS[1:]
+        cautions = self.settings.cautions
         return (
-            self._evidence(others, settings.caution),
-            self._evidence([[SLIP]], settings.caution_of_slip),
+            self._evidence([slip], cautions.slip),
+            self._evidence([control], cautions.control),
+            self._evidence(others, cautions.others),
         )
 
     def _evidence(self, faults: list[list[int]], caution: float) -> float:
