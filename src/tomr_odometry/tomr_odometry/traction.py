@@ -50,6 +50,8 @@ class Tractions:
 
     def __init__(self, robot: Robot) -> None:
         self._numbers = laid_out(vehicle_of(robot)).tolist()
+        # Of each wheel as if it were the only one: what does not hang on the others costs a third.
+        self._alone = [_of_wheel(self._numbers, wheel) for wheel in range(WHEELS)]
         self._laws = plain(tuple(robot.physics))
         self._delay = round(1e9 * robot.controller.delay)
         self._period = round(1e9 * self._numbers[at.PERIOD])
@@ -140,17 +142,15 @@ class Tractions:
         if stamp_ns - self._samples[-1][0] > _STALE_NS:
             return None
         current, noise, is_sure = self._current(wheel, drawn, motion)
-        currents = [0.0] * WHEELS
-        currents[wheel] = current
-        forces = [0.0] * (2 * WHEELS)
-        self._laws.tractions(self._numbers, motion, currents, forces, WHEELS)
-        speed = motion[at.MOTION_HEADER + wheel * at.MOTION_WHEEL + at.MOTION_SPEED]
+        forces, own = [0.0, 0.0], _motion_of(motion, wheel)
+        self._laws.tractions(self._alone[wheel], own, [current], forces, 1)
+        speed = own[at.MOTION_HEADER + at.MOTION_SPEED]
         if is_sure and abs(speed) > _MOVING:
             self._follow(wheel, current, speed)
-        force = forces[2 * wheel]
+        force = forces[0]
         rough = self._roughness(wheel, force)
         newtons = self._constant[wheel] / self._radius
-        std = math.hypot(newtons * noise, forces[2 * wheel + 1], rough)
+        std = math.hypot(newtons * noise, forces[1], rough)
         return Traction(stamp_ns, wheel, force, std, speed)
 
     def _roughness(self, wheel: int, force: float) -> float:
@@ -175,10 +175,8 @@ class Tractions:
         if self._is_current:  # a magnitude: a motor that brakes is taken for one that drives
             way = math.tanh(motion[place + at.MOTION_SPEED] / _RESTING)
             return abs(drawn) * way, self._noise, False
-        readings, both = [0.0] * WHEELS, [0.0] * (2 * WHEELS)
-        readings[wheel] = drawn
-        self._laws.motor_currents(self._numbers, motion, readings, both, WHEELS)
-        found = both[2 * wheel : 2 * wheel + 2]
+        found = [0.0, 0.0]
+        self._laws.motor_currents(self._alone[wheel], _motion_of(motion, wheel), [drawn], found, 1)
         rolling = [0.0] * (WHEELS * at.POWER_WHEEL)
         self._laws.drive_power(self._numbers, motion, rolling, WHEELS)
         expected = rolling[wheel * at.POWER_WHEEL + at.POWER_CURRENT]
@@ -199,3 +197,15 @@ class Tractions:
             volts = self._resistance[wheel] * current + self._constant[wheel] * speed
             volts -= self._state[place + at.VOLTS]
             self._state[place + at.INTEGRAL] += _FOLLOW * volts / gain
+
+
+def _of_wheel(numbers: list[float], wheel: int) -> list[float]:
+    """Numbers of a robot with one of the wheels alone."""
+    stride = int(numbers[at.STRIDE])
+    start = at.HEADER + wheel * stride
+    return numbers[: at.HEADER] + numbers[start : start + stride]
+
+
+def _motion_of(motion: list[float], wheel: int) -> list[float]:
+    start = at.MOTION_HEADER + wheel * at.MOTION_WHEEL
+    return motion[: at.MOTION_HEADER] + motion[start : start + at.MOTION_WHEEL]
