@@ -60,7 +60,7 @@ def steps() -> Iterator[dict[str, Mock]]:
         patch.dict(os.environ, OMP_NUM_THREADS="1"),  # nor do processes have to be started
         patch("tomr_fault_diag.residuals.calibrated._LEAST", 100),
         patch(f"{HERE}.explain_drives", return_value=explained()) as explain,
-        patch(f"{HERE}.rehearse", return_value=Shoved(SHOVES, (0.0,) * 20, 0.1)) as rehearse,
+        patch(f"{HERE}.rehearse", return_value=Shoved(SHOVES, 0.1)) as rehearse,
         patch(f"{HERE}.try_simulated", side_effect=InputError("no rollers")) as simulate,
         patch(f"{HERE}.try_injected", return_value=[FOUND]) as inject,
     ):

@@ -45,7 +45,7 @@ def rehearse() -> Iterator[Mock]:
         patch("tomr_fault_diag.residuals.calibrated._LEAST", 100),
         patch(f"{HERE}.explain_drives", return_value=explained),
         patch(f"{HERE}.try_simulated", return_value=[Trial(SIMULATED, 1.0, "", 0, 0.3, "x")]),
-        patch(f"{HERE}.rehearse", return_value=Shoved(SHOVES, (0.0,) * 20, 0.1)) as rehearse,
+        patch(f"{HERE}.rehearse", return_value=Shoved(SHOVES, 0.1)) as rehearse,
     ):
         yield rehearse
 

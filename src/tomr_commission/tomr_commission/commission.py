@@ -266,7 +266,7 @@ class _Work:
                 (plan, choice.most_caution),
             ):
                 shoved = (
-                    Shoved((), (), 0.0)
+                    Shoved((), 0.0)
                     if tells_currents(fitted[0])
                     else self.rehearsed(described, bands, settings, asked)
                 )
@@ -294,7 +294,7 @@ class _Work:
             lambda: asdict(rehearse(source, bands, settings, usage, plan)),
         )
         peaks = tuple(tuple(one) for one in held["peaks"])
-        return Shoved(peaks, tuple(held["between"]), held["hours"])
+        return Shoved(peaks, held["hours"])
 
     def usage(self) -> Usage:
         """How the robot is driven."""

@@ -16,7 +16,6 @@ from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import (
-    ENCODERS,
     MOTORS,
     NOT_MEASURED,
     RESIDUALS,
@@ -35,7 +34,6 @@ from tomr_power_model.robot import Robot
 Array = NDArray[np.float64]
 
 _TRANSIENT_TICKS = 3  # over which a band grows with the model's change: as in the residual stage
-POWERS = [*MOTORS, *ENCODERS]
 
 
 @frozen

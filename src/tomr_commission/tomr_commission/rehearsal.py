@@ -73,10 +73,9 @@ class Rehearsal:
 
 @frozen
 class Shoved:
-    """Peaks of evidence after simulated shoves [decades], and between them by hours."""
+    """Peaks of evidence after simulated shoves [decades]."""
 
     peaks: tuple[tuple[float, ...], ...]  # one for each shove, of each kind of fault
-    between: tuple[float, ...]  # highest evidence of each drive outside of its shoves
     hours: float  # simulated
 
 
@@ -89,28 +88,25 @@ def rehearse(
     _one(jobs[0])  # compiled before processes start
     parts = on_all_cores(_one, jobs, _CHUNK)
     return Shoved(
-        tuple(peak for peaks, _, _ in parts for peak in peaks),
-        tuple(between for _, between, _ in parts),
-        sum(ticks for _, _, ticks in parts) * TICK_NS * 1e-9 / 3600.0,
+        tuple(peak for peaks, _ in parts for peak in peaks),
+        sum(ticks for _, ticks in parts) * TICK_NS * 1e-9 / 3600.0,
     )
 
 
 def _one(
     job: tuple[str, BandSettings, ClassifierSettings, Usage, Rehearsal, int],
-) -> tuple[list[tuple[float, ...]], float, int]:
-    """Peaks of a drive's shoves, its highest evidence elsewhere, and its ticks."""
+) -> tuple[list[tuple[float, ...]], int]:
+    """Peaks of a drive's shoves, and its ticks."""
     described, bands, settings, usage, plan, seed = job
     drive = shoved_drive(robot_of(described), usage, plan, seed)
     seen = observed_of(drive).silenced(plan.silent)
     evidence = evidence_in(frames_of(seen, bands), settings)
-    own = np.zeros(len(evidence), dtype=bool)
     peaks = []
     for bump in drive.bumps:
         first = math.floor(bump.start * 1e9 / TICK_NS)
         last = math.ceil((bump.start + bump.duration + _SETTLING) * 1e9 / TICK_NS)
-        own[first:last] = True
         peaks.append(tuple(evidence[first:last].max(axis=0, initial=0.0).tolist()))
-    return peaks, float(evidence[~own].max(initial=0.0)), len(evidence)
+    return peaks, len(evidence)
 
 
 @cache
