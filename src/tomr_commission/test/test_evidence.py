@@ -41,6 +41,12 @@ def test_alarm_comes_where_evidence_passes_the_caution(faulty: Observed) -> None
         assert alarms[0].wheel == 2
 
 
+def test_evidence_does_not_hang_on_the_cautions_in_use(faulty: Observed) -> None:
+    frames = frames_of(faulty, BandSettings())
+    other = evolve(SETTINGS, caution=5.0, slip_caution=6.0, control_caution=7.0)
+    assert np.array_equal(evidence_in(frames, other), evidence_in(frames, SETTINGS))
+
+
 @pytest.mark.parametrize("kind", KINDS[2:4], ids=lambda kind: kind.name)
 def test_evidence_of_a_fault_that_is_rarer_than_others(
     healthy: Observed, kind: InjectedKind

@@ -107,13 +107,12 @@ def _told(error: Exception) -> tuple[int, str]:
 
 
 def _cut_bytecode(error: Exception) -> str:
-    """Path of the compiled module that could not be loaded; empty: it was something else.
+    """Path of the compiled module that importlib could not load; empty: it was something else.
 
     Python up to 3.12.7 and 3.13.0 keeps what a full disk left of one (CPython issue 126606).
     """
     *_, (frame, _) = traceback.walk_tb(error.__traceback__)
-    is_loading = frame.f_code.co_filename == "<frozen importlib._bootstrap_external>"
-    is_cut = is_loading and isinstance(error, EOFError | ValueError)
+    is_cut = isinstance(error, EOFError | ValueError)
     return str(frame.f_locals.get("bytecode_path") or "") if is_cut else ""
 
 
