@@ -17,7 +17,6 @@ from tomr_commission.observed import Observed
 from tomr_commission.rehearsal import Shoved
 from tomr_commission.report.figures import end_to_end
 from tomr_commission.trials import Trial
-from tomr_fault_diag.classifier.belief import Cautions
 from tomr_fault_diag.classifier.commissioned import commissioned_words, stamp_of
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.cli.diagnose import main as diagnose
@@ -29,7 +28,6 @@ from tomr_sim_bridge.missions import load_mission
 BAGS = Path(__file__).resolve().parents[3] / "bags"
 HERE = "tomr_commission.commission"
 FOUND = Trial("power sensor scaled", 0.2, "of the power", 0, 0.5, "motor system fault 1")
-SHOVES = ((0.0, 0.0, 0.0),) * 60
 NODES = ("power_model", "power_residuals", "fault_classifier")
 
 
@@ -60,7 +58,7 @@ def steps() -> Iterator[dict[str, Mock]]:
         patch.dict(os.environ, OMP_NUM_THREADS="1"),  # nor do processes have to be started
         patch("tomr_fault_diag.residuals.calibrated._LEAST", 100),
         patch(f"{HERE}.explain_drives", return_value=explained()) as explain,
-        patch(f"{HERE}.rehearse", return_value=Shoved(SHOVES, 0.1)) as rehearse,
+        patch(f"{HERE}.rehearse", return_value=Shoved((0.0,) * 60, 0.1)) as rehearse,
         patch(f"{HERE}.try_simulated", side_effect=InputError("no rollers")) as simulate,
         patch(f"{HERE}.try_injected", return_value=[FOUND]) as inject,
     ):
@@ -111,10 +109,7 @@ def test_written_description_is_loaded_everywhere(done: Path) -> None:
     settings = DiagnosisSettings.of(read_node_sections(written, NODES), str(written))
     bands = report(done)["bands"]
     assert settings.residuals.bands.power == pytest.approx(bands["power"])
-    slip, control, others = (kind["caution"] for kind in report(done)["alarm"]["kinds"])
-    assert settings.classifier.cautions == Cautions(others, slip, control)
-    # Without evidence: shoves say something of slip alone.
-    assert (slip, control, others) == (8.0, 11.0, 11.0)
+    assert settings.classifier.caution == report(done)["alarm"]["caution"]
     # A no-go is no commissioning.
     assert commissioned_words(settings.classifier, load_robot(written)) == "no: run tomr_commission"
     assert settings.classifier.hardware_id == ClassifierSettings().hardware_id

@@ -29,8 +29,7 @@ def test_bands_widen_until_shoves_pass(steady: Callable[..., Observed]) -> None:
         settings: ClassifierSettings,
         plan: Rehearsal,
     ) -> Shoved:
-        peaks = narrow if bands.relative < 0.15 else np.zeros(300)
-        return Shoved(tuple((peak, 0.0, 0.0) for peak in peaks.tolist()), 1.0)
+        return Shoved(tuple(narrow) if bands.relative < 0.15 else (0.0,) * 300, 1.0)
 
     with patch.object(_Work, "rehearsed", rehearsed):
         tuned = work.tuned(None, [steady(sigma=0.1, ticks=2500)], ClassifierSettings(), Rehearsal())

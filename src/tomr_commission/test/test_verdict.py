@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_commission.alarm import AlarmLevel, AlarmLevels
+from tomr_commission.alarm import AlarmLevel
 from tomr_commission.bands import bands_of
 from tomr_commission.evidence import Decided, Episode
 from tomr_commission.observed import Observed
@@ -17,8 +17,7 @@ from tomr_commission.verdict import Outcome, reasons
 
 Steady = Callable[..., Observed]
 QUIET = Decided(1000, 0, ())
-ONE = AlarmLevel(11.0, 0.025, 9.0, 0.01, 0.005, 0.02, ())
-LEVEL = AlarmLevels((ONE, ONE, ONE), 0.03, 0.01, 0.04)
+LEVEL = AlarmLevel(11.0, 0.05, 9.0, 0.02, 0.01, 0.04, ())
 
 
 @pytest.fixture
@@ -208,8 +207,7 @@ def test_what_is_not_explained_counts_where_it_exceeds_the_noise(
 
 
 def test_rate_that_no_caution_reaches(outcome: Outcome) -> None:
-    slip = evolve(ONE, needed=44.0, caution=30.0)
-    level = AlarmLevels((slip, ONE, ONE), expected=0.4, low=0.2, high=0.8)
+    level = evolve(LEVEL, needed=44.0, caution=30.0, expected=0.4, low=0.2, high=0.8)
     (reason,) = reasons(evolve(outcome, level=level))
     assert "0.4 false alarms per hour are expected" in reason.what
     assert "--false-alarms-per-hour 0.8" in reason.remedy

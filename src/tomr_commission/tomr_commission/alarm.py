@@ -18,8 +18,6 @@ it was watched. A generalised Pareto tail is fitted beside, and its shape report
 
 import math
 from collections.abc import Sequence
-from itertools import product
-from typing import Any
 
 import numpy as np
 from attrs import frozen
@@ -27,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import genpareto
 
-from tomr_commission.evidence import CAUTIONS, MOST_CAUTION, SURE
+from tomr_commission.evidence import MOST_CAUTION, SURE
 from tomr_commission.request import AlarmChoice
 
 Array = NDArray[np.float64]
@@ -36,7 +34,6 @@ _CAP = MOST_CAUTION + SURE  # decades: higher peaks are known to be higher, no m
 _USUAL_SCALE, _USUAL_WEIGHT = 4.0, 4  # decades of a tail, and the peaks that this counts as
 _DRAWS, _SEED = 4000, 1
 _LEAST_RATE = 1e-12
-_PARTS = 10  # of the alarms wanted, given to the kinds of faults
 _FIVE_PERCENT = 1.645  # quantile of a standard normal, one-sided
 
 
@@ -132,10 +129,6 @@ class AlarmLevel:
     high: float
     tails: tuple[Tail, ...]
 
-    def drawn(self) -> Array:
-        """Rates that the peaks are compatible with, at the caution chosen."""
-        return np.asarray(sum(tail.draws(self.caution + SURE) for tail in self.tails))
-
     @property
     def is_enough(self) -> bool:
         """Whether the caution that there is reaches what was asked for."""
@@ -148,14 +141,14 @@ class AlarmLevel:
 
 
 def alarm_level(
-    tails: Sequence[Tail], wanted: float, least: float, choice: AlarmChoice
+    tails: Sequence[Tail], wanted: float, shipped: float, choice: AlarmChoice
 ) -> AlarmLevel:
     """The caution at which false alarms are as rare as wanted, with the confidence chosen.
 
     Args:
         tails: of all sources.
         wanted: false alarms per hour.
-        least: caution that it has at least.
+        shipped: caution of the classifier as it comes.
         choice: how to choose.
     """
 
@@ -170,89 +163,14 @@ def alarm_level(
     needed = 0.0
     if excess(0.0) > 0.0:
         needed = highest if excess(highest) > 0.0 else float(brentq(excess, 0.0, highest))
-    caution = min(max(needed, least), MOST_CAUTION)
+    caution = min(max(needed, shipped - choice.below_shipped), MOST_CAUTION)
     caution = math.ceil(10.0 * caution) / 10.0
     low, high = np.quantile(drawn(caution), (0.025, 0.975))
     expected = sum(tail.rate(caution + SURE) for tail in tails)
     return AlarmLevel(caution, wanted, needed, expected, float(low), float(high), tuple(tails))
 
 
-@frozen
-class AlarmLevels:
-    """The caution of each kind of fault, and what is expected of all together."""
-
-    levels: tuple[AlarmLevel, ...]  # by evidence.KINDS
-    expected: float  # false alarms per hour
-    low: float  # 95 % interval of that
-    high: float
-
-    @classmethod
-    def shared(
-        cls,
-        tails: Sequence[Sequence[Tail]],
-        least: Sequence[float],
-        wanted: float,
-        choice: AlarmChoice,
-    ) -> "AlarmLevels":
-        """Each kind gets the share of the alarms wanted with which the highest caution is least.
-
-        tails, least: of each kind.
-        """
-        tried = [
-            {
-                part: alarm_level(of_kind, wanted * part / _PARTS, lowest, choice)
-                for part in range(1, _PARTS - len(tails) + 2)
-            }
-            for of_kind, lowest in zip(tails, least, strict=True)
-        ]
-        splits = [parts for parts in product(*tried) if sum(parts) == _PARTS]
-        chosen = [
-            [levels[part] for levels, part in zip(tried, parts, strict=True)] for parts in splits
-        ]
-        return cls.of(min(chosen, key=_least))
-
-    @classmethod
-    def of(cls, levels: Sequence[AlarmLevel]) -> "AlarmLevels":
-        """Of the levels of all kinds."""
-        drawn = np.asarray(sum(level.drawn() for level in levels))
-        low, high = np.quantile(drawn, (0.025, 0.975))
-        expected = sum(level.expected for level in levels)
-        return cls(tuple(levels), expected, float(low), float(high))
-
-    @property
-    def cautions(self) -> dict[str, Any]:
-        """Parameters of the classifier."""
-        return {name: one.caution for name, one in zip(CAUTIONS, self.levels, strict=True)}
-
-    @property
-    def wanted(self) -> float:
-        """False alarms per hour that were asked for."""
-        return sum(level.wanted for level in self.levels)
-
-    @property
-    def needed(self) -> float:
-        """Decades of caution that these need, of the kind that needs the most."""
-        return max(level.needed for level in self.levels)
-
-    @property
-    def is_enough(self) -> bool:
-        """Whether the caution that there is reaches what was asked for."""
-        return all(level.is_enough for level in self.levels)
-
-    @property
-    def is_rate_known(self) -> bool:
-        """Whether every source was watched: what is expected counts no other."""
-        return all(level.is_rate_known for level in self.levels)
-
-
-def _least(levels: Sequence[AlarmLevel]) -> tuple[float, float]:
-    """The highest caution, then all of them."""
-    cautions = [level.caution for level in levels]
-    return max(cautions), sum(cautions)
-
-
-def block_peaks(evidence: Array, seconds: Array, block: float) -> list[tuple[float, ...]]:
-    """The highest evidence, (n, kinds), of each block of so many seconds, blocks without a tick
-    left out."""
+def block_peaks(evidence: Array, seconds: Array, block: float) -> list[float]:
+    """The highest evidence of each block of so many seconds, blocks without a tick left out."""
     number = np.floor(seconds / block)
-    return [tuple(evidence[number == one].max(axis=0).tolist()) for one in np.unique(number)]
+    return [float(evidence[number == one].max()) for one in np.unique(number)]

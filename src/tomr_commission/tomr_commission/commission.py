@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from attrs import asdict, evolve, frozen
 
-from tomr_commission.alarm import AlarmLevels, Tail, block_peaks
+from tomr_commission.alarm import AlarmLevel, Tail, alarm_level, block_peaks
 from tomr_commission.bands import RegimeLine, bands_of, regime_table
 from tomr_commission.commissioned import (
     CLASSIFIER,
@@ -18,7 +18,7 @@ from tomr_commission.commissioned import (
     base_sections,
     commissioned_text,
 )
-from tomr_commission.evidence import CAUTIONS, decisions, evidence_in
+from tomr_commission.evidence import decisions, evidence_in
 from tomr_commission.explained import EXPLAINED, FOLDER, Split, explain_drives
 from tomr_commission.injected import kinds_for, try_injected
 from tomr_commission.observed import Observed, frames_of, observe, tells_currents, unit_of_motors
@@ -94,7 +94,7 @@ class Tuned:
     margin: float
     bands: BandSettings
     shoved: Shoved
-    level: AlarmLevels
+    level: AlarmLevel
 
 
 def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
@@ -109,7 +109,7 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     classifier, plan = work.classifier(described), Rehearsal(silent=tuple(sorted(silent)))
     tuned = work.tuned(described, fitted, classifier, plan)
     bands, level = tuned.bands, tuned.level
-    chosen = evolve(classifier, **level.cautions)
+    chosen = evolve(classifier, caution=level.caution)
     progress("validating", 0.85)
     held_said, fitted_said = (
         tuple(decisions(frames_of(drive, bands), chosen) for drive in part)
@@ -241,9 +241,7 @@ class _Work:
         """Settings of the classifier as the description has them."""
         given = read_node_sections(self.source(described), (CLASSIFIER,))
         settings = DiagnosisSettings.of(given, self.request.robot).classifier
-        shipped = ClassifierSettings()
-        cautions = {name: getattr(shipped, name) for name in CAUTIONS}
-        return evolve(settings, classifier="window", **cautions)
+        return evolve(settings, classifier="window", caution=ClassifierSettings().caution)
 
     def tuned(
         self,
@@ -293,8 +291,7 @@ class _Work:
             key,
             lambda: asdict(rehearse(source, bands, settings, usage, plan)),
         )
-        peaks = tuple(tuple(one) for one in held["peaks"])
-        return Shoved(peaks, held["hours"])
+        return Shoved(tuple(held["peaks"]), held["hours"])
 
     def usage(self) -> Usage:
         """How the robot is driven."""
@@ -334,37 +331,30 @@ def _observe(job: tuple[Path, str, str]) -> Observed:
 class _Real:
     """Peaks of evidence in real driving, block by block."""
 
-    peaks: tuple[tuple[float, ...], ...]  # of each kind of fault
+    peaks: tuple[float, ...]
     hours: float
 
 
 def _real_peaks(
     fitted: Sequence[Observed], bands: BandSettings, settings: ClassifierSettings, block: float
 ) -> _Real:
-    peaks: list[tuple[float, ...]] = []
+    peaks: list[float] = []
     for drive in fitted:
         evidence = evidence_in(frames_of(drive, bands), settings)
         peaks += block_peaks(evidence, drive.seconds, block)
     return _Real(tuple(peaks), sum(drive.hours for drive in fitted))
 
 
-def _level(request: CommissionRequest, real: _Real, shoved: Shoved, plan: Rehearsal) -> AlarmLevels:
+def _level(request: CommissionRequest, real: _Real, shoved: Shoved, plan: Rehearsal) -> AlarmLevel:
     """From real driving and from simulated shoves."""
-    choice = request.alarm
-    tails = []
-    for kind in range(len(CAUTIONS)):
-        driven, pushed = ([peak[kind] for peak in part.peaks] for part in (real, shoved))
-        tails.append(
-            (
-                Tail.of("healthy driving", driven, len(driven) / real.hours, choice),
-                Tail.of("simulated shoves", pushed, plan.shoves_per_hour, choice),
-            )
-        )
-    # Some minutes of driving alone are no reason to be less careful, nor are shoves but for slip.
+    tails = (
+        Tail.of("healthy driving", real.peaks, len(real.peaks) / real.hours, request.alarm),
+        Tail.of("simulated shoves", shoved.peaks, plan.shoves_per_hour, request.alarm),
+    )
     shipped = ClassifierSettings().caution
-    below = {"slip_caution": choice.below_shipped if shoved.peaks else 0.0}
-    least = [shipped - below.get(name, 0.0) for name in CAUTIONS]
-    return AlarmLevels.shared(tails, least, request.false_alarms_per_hour, choice)
+    # Some minutes of driving alone are no reason to be less careful.
+    alarm = request.alarm if shoved.peaks else evolve(request.alarm, below_shipped=0.0)
+    return alarm_level(tails, request.false_alarms_per_hour, shipped, alarm)
 
 
 def _text(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from attrs import asdict, frozen
 
-from tomr_commission.alarm import AlarmLevels
+from tomr_commission.alarm import AlarmLevel
 from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.calibration.fitted import sections_text
 from tomr_power_model.robot import (
@@ -31,7 +31,7 @@ class Record:
     drives: tuple[str, ...]
     held_out: str
     method: str
-    level: AlarmLevels
+    level: AlarmLevel
     floors: Mapping[str, str]  # smallest size found, by fault
     verdict: str
     stamp: str  # for the status of the classifier; empty: it is not commissioned
@@ -59,7 +59,7 @@ def commissioned_text(
     )
     # Evidence in decades is the window classifier's.
     classifier = merged.setdefault(CLASSIFIER, {})
-    classifier.update(classifier="window", **record.level.cautions, commissioned=record.stamp)
+    classifier.update(classifier="window", caution=record.level.caution, commissioned=record.stamp)
     merged[COMMISSIONING] = {
         DATE: record.date,
         "version": suite_version(),
@@ -76,7 +76,7 @@ def commissioned_text(
     return sections_text(merged, _header(record, source))
 
 
-def _expected(level: AlarmLevels) -> dict[str, object]:
+def _expected(level: AlarmLevel) -> dict[str, object]:
     if not level.is_rate_known:
         return {}
     return {"expected_false_alarms_per_hour": float(f"{level.expected:.3g}")}

@@ -1,14 +1,11 @@
 """What the classifier itself holds against a healthy robot, tick by tick, in decades.
 
 The evidence is the log odds of the likeliest fault against normal without the prior: how many
-decades of `caution` a tick would have overcome, and how many of the cautions that slip and control
-system faults have of their own: shoves look like these and hardly like anything else, so that one
-caution for all would delay all for their sake. It is read off the classifier in use, run with the
+decades of `caution` a tick would have overcome. It is read off the classifier in use, run with the
 most caution there is, so that it follows whatever the classifier becomes.
 """
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 from attrs import evolve, frozen
@@ -26,22 +23,17 @@ from tomr_power_model.model.ticks import NANOSECONDS
 Array = NDArray[np.float64]
 
 MOST_CAUTION = next(spec.maximum for spec in CLASSIFIER_PARAMETERS if spec.name == "caution")
-# Of what the columns of evidence are, and in words.
-CAUTIONS = ("slip_caution", "control_caution", "caution")
-KINDS = ("slip", "control system fault", "other faults")
 SURE = 2.0  # decades beyond the caution at which a fault is named: odds of a hundred to one
-
-
-_NONE = (0.0,) * len(KINDS)
 
 
 class _Witness(WindowJudge):
     """A judge of most caution that remembers its evidence of the newest tick it was shown."""
 
     def __init__(self, settings: ClassifierSettings) -> None:
-        most: dict[str, Any] = dict.fromkeys(CAUTIONS, MOST_CAUTION)
-        super().__init__(WindowNetwork.load(settings.weights), evolve(settings, **most))
-        self.newest = _NONE
+        super().__init__(
+            WindowNetwork.load(settings.weights), evolve(settings, caution=MOST_CAUTION)
+        )
+        self.newest = 0.0
 
     def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
         opinion = super().judge(frame, elapsed_ns, unseen)
@@ -50,16 +42,15 @@ class _Witness(WindowJudge):
 
 
 def evidence_in(frames: Iterable[ResidualFrame], settings: ClassifierSettings) -> Array:
-    """Decades of evidence for a fault of each kind at each tick, 0 where nothing could be decided,
-    (n, 3)."""
+    """Decades of evidence for a fault at each tick, 0 where nothing could be decided, (n,)."""
     witness = _Witness(settings)
     classifier = FaultClassifier(witness)
     found = []
     for frame in frames:
-        witness.newest = _NONE
+        witness.newest = 0.0
         classifier.classify(frame)
         found.append(witness.newest)
-    return np.array(found).reshape(-1, len(KINDS))
+    return np.array(found)
 
 
 @frozen

@@ -75,7 +75,7 @@ class Rehearsal:
 class Shoved:
     """Peaks of evidence after simulated shoves [decades]."""
 
-    peaks: tuple[tuple[float, ...], ...]  # one for each shove, of each kind of fault
+    peaks: tuple[float, ...]  # one for each shove
     hours: float  # simulated
 
 
@@ -95,7 +95,7 @@ def rehearse(
 
 def _one(
     job: tuple[str, BandSettings, ClassifierSettings, Usage, Rehearsal, int],
-) -> tuple[list[tuple[float, ...]], int]:
+) -> tuple[list[float], int]:
     """Peaks of a drive's shoves, and its ticks."""
     described, bands, settings, usage, plan, seed = job
     drive = shoved_drive(robot_of(described), usage, plan, seed)
@@ -105,7 +105,7 @@ def _one(
     for bump in drive.bumps:
         first = math.floor(bump.start * 1e9 / TICK_NS)
         last = math.ceil((bump.start + bump.duration + _SETTLING) * 1e9 / TICK_NS)
-        peaks.append(tuple(evidence[first:last].max(axis=0, initial=0.0).tolist()))
+        peaks.append(float(evidence[first:last].max(initial=0.0)))
     return peaks, len(evidence)
 
 

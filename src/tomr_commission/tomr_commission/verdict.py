@@ -6,7 +6,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_commission.alarm import AlarmLevels
+from tomr_commission.alarm import AlarmLevel
 from tomr_commission.bands import needed, outside, steady_drag
 from tomr_commission.evidence import MOST_CAUTION, Decided, together
 from tomr_commission.observed import Observed
@@ -37,7 +37,7 @@ class Outcome:
     fitted: tuple[Observed, ...]
     held: tuple[Observed, ...]
     bands: BandSettings
-    level: AlarmLevels
+    level: AlarmLevel
     held_said: tuple[Decided, ...]
     fitted_said: tuple[Decided, ...]
 

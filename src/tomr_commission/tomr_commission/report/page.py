@@ -5,7 +5,6 @@ from importlib.resources import files
 from jinja2 import Environment, StrictUndefined
 
 from tomr_commission.commission import Commissioned
-from tomr_commission.evidence import KINDS
 from tomr_commission.report.figures import alarm_picture, held_picture
 from tomr_commission.report.plain import decided_share, headline
 
@@ -20,7 +19,6 @@ def page(found: Commissioned) -> str:
         found=found,
         outcome=found.outcome,
         level=found.outcome.level,
-        levels=list(zip(KINDS, found.outcome.level.levels, strict=True)),
         report=found.outcome.explained["report"],
         headline=headline(found),
         decided=decided_share(found.outcome.held_together),

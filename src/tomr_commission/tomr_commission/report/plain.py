@@ -6,10 +6,10 @@ from typing import Any
 
 from attrs import asdict
 
-from tomr_commission.alarm import AlarmLevels
+from tomr_commission.alarm import AlarmLevel
 from tomr_commission.bands import outside
 from tomr_commission.commission import Commissioned
-from tomr_commission.evidence import KINDS, Decided
+from tomr_commission.evidence import Decided
 
 
 def lines(found: Commissioned) -> list[str]:
@@ -20,7 +20,7 @@ def lines(found: Commissioned) -> list[str]:
         said += [f"  {reason.what}", f"    -> {reason.remedy}"]
     said += [
         f"robot: {outcome.explained['report']['sentence']}",
-        f"alarm level: {cautions(level)}; {_expected(level)}",
+        f"alarm level: {level.caution:g} decades; {_expected(level)}",
         f"held out ({outcome.held_name}, {60 * outcome.held_hours:.1f} min): "
         f"{len(outcome.held_together.alarms)} false alarms, "
         f"{100 * decided_share(outcome.held_together):.0f} % of the time decided",
@@ -46,13 +46,7 @@ def headline(found: Commissioned) -> str:
     return f"{count} thing{'s' if count > 1 else ''} to mend first"
 
 
-def cautions(level: AlarmLevels) -> str:
-    """The caution of each kind of fault."""
-    each = zip(KINDS, level.levels, strict=True)
-    return ", ".join(f"{kind} {one.caution:g} decades" for kind, one in each)
-
-
-def _expected(level: AlarmLevels) -> str:
+def _expected(level: AlarmLevel) -> str:
     if not level.is_rate_known:
         return "how many false alarms are to be expected is not known"
     return (
@@ -83,18 +77,12 @@ def fields(found: Commissioned) -> dict[str, Any]:
         "margin": found.margin,
         "regimes": [asdict(line) for line in found.regimes],
         "alarm": {
+            "caution": level.caution,
             "wanted_per_hour": level.wanted,
+            "needed": level.needed,
             "expected_per_hour": level.expected if level.is_rate_known else None,
             "ci95_per_hour": [level.low, level.high] if level.is_rate_known else None,
-            "kinds": [
-                {
-                    "name": kind,
-                    "caution": one.caution,
-                    "needed": one.needed,
-                    "tails": [asdict(tail) for tail in one.tails],
-                }
-                for kind, one in zip(KINDS, level.levels, strict=True)
-            ],
+            "tails": [asdict(tail) for tail in level.tails],
             "simulated_hours": found.shoved.hours,
         },
         "held_out": {

@@ -4,9 +4,8 @@
 
 with l_k the log-likelihood of the newest window if k holds, relative to the likeliest. Windows
 overlap and so say the same several times over: `weight` < 1. That a fault comes on within a tick is
-10^-caution likely: so many decades of evidence must speak for it before it is believed, another
-number of them for slip and for control system faults, which shoves may look like. What cannot be
-told apart from normal in this motion has l = 0 and leaves the belief as it is.
+10^-caution likely: so many decades of evidence must speak for it before it is believed. What cannot
+be told apart from normal in this motion has l = 0 and leaves the belief as it is.
 
 A force from outside is one hypothesis of the network and two states here: pushes are frequent and
 soon over, loads are as rare as faults and stay. What looks like one fault now and like another
@@ -14,10 +13,7 @@ then is none that is known: `OTHER` takes each window as any of the faults. When
 again its wheel has to catch up, which for a second looks like any fault of that wheel: `ENDED`.
 """
 
-from typing import Self
-
 import numpy as np
-from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.states import (
@@ -73,27 +69,13 @@ _GUESSED = np.log(2.5)  # what a wheel that catches up looks like is not known a
 _LEAST = 1e-60  # far below the rarest onset that `caution` allows, or that would count for more
 
 
-@frozen
-class Cautions:
-    """Decades of evidence that must speak for a fault."""
-
-    others: float
-    slip: float
-    control: float
-
-    @classmethod
-    def alike(cls, caution: float) -> Self:
-        """The same for all."""
-        return cls(caution, caution, caution)
-
-
 class Belief:
     """Probabilities of the states, tick by tick."""
 
-    def __init__(self, weight: float, cautions: Cautions) -> None:
-        """`weight` of the evidence of one window."""
+    def __init__(self, weight: float, caution: float) -> None:
+        """`weight` of the evidence of one window, `caution` in decades."""
         self._weight = weight
-        self._moves = _transitions(cautions)
+        self._moves = _transitions(10.0**-caution)
         self.clear()
 
     def clear(self) -> None:
@@ -121,21 +103,15 @@ def of_states(likelihoods: Array) -> Array:
     return np.concatenate([found, np.tile(ended, _CATCHING_UP)])
 
 
-def _transitions(cautions: Cautions) -> Array:
+def _transitions(onset: float) -> Array:
     """P(j -> k)."""
-    # A fault, slip as well, is no likelier than a push.
-    onset, slip, control = (
-        min(10.0**-caution, _PUSH) for caution in (cautions.others, cautions.slip, cautions.control)
-    )
+    onset = min(onset, _PUSH)  # a fault, slip as well, is no likelier than a push
     moves = np.full((_STATES, _STATES), _OTHER)
-    moves[:, SLIP] *= min(slip / onset, 1.0)  # as rare beside a fault as it is without
-    moves[:, CONTROLS] *= min(control / onset, 1.0)
     moves[:, LOADED] *= onset / _PUSH  # as rare beside a push as it is without a fault
     moves[:, NORMAL] = _ENDING
     moves[SLIP, NORMAL] = _SLIP_ENDING
     moves[[NORMAL, EXTERNAL]] = onset
-    moves[[NORMAL, EXTERNAL], SLIP] = min(_SLIPPERY * slip, _PUSH)
-    moves[NORMAL, CONTROLS] = moves[EXTERNAL, CONTROLS] = control
+    moves[[NORMAL, EXTERNAL], SLIP] = min(_SLIPPERY * onset, _PUSH)
     for kind in (DRAGS, WEAKS, METERS):
         moves[[NORMAL, EXTERNAL, *_CATCHES_UP], kind] *= _SLOW
     moves[:, OTHER] *= _STRANGE

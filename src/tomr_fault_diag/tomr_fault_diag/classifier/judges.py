@@ -128,7 +128,7 @@ class WindowJudge:
     def __init__(self, network: WindowNetwork, settings: ClassifierSettings) -> None:
         self.settings = settings
         self._network = network
-        self._belief = Belief(settings.evidence_weight, settings.cautions)
+        self._belief = Belief(settings.evidence_weight, settings.caution)
         self.clear()
 
     def clear(self) -> None:
@@ -209,24 +209,14 @@ class WindowJudge:
         self._led = self._led + 1 if goes_on else 1
         self._accused, self._calm = group, 0
 
-    def evidence(self) -> tuple[float, float, float]:
-        """Log odds against none, without the prior [decades], of slip, of a control system fault,
-        and of the likeliest other fault: those with a caution of their own.
+    def evidence(self) -> float:
+        """Log odds of the likeliest fault against none, without the prior [decades].
 
         0 where it would not be named with however little caution: no window is striking, or
-        another fault with the same caution may be it. Exact where the cautions in use are far
-        beyond.
+        another fault may be it. Exact where the caution in use is far beyond.
         """
-        slip, control, *others = _GROUPS[1:]
-        cautions = self.settings.cautions
-        return (
-            self._evidence([slip], cautions.slip),
-            self._evidence([control], cautions.control),
-            self._evidence(others, cautions.others),
-        )
-
-    def _evidence(self, faults: list[list[int]], caution: float) -> float:
         shares = self._belief.shares
+        faults = _GROUPS[1:]
         sums = [float(shares[group].sum()) for group in faults]
         most = max(sums)
         group = faults[sums.index(most)]
@@ -234,7 +224,7 @@ class WindowJudge:
         if not striking or most < _SURE * sum(sums):
             return 0.0
         odds = most / float(shares[_GROUPS[0]].sum())
-        return max(caution + math.log10(odds), 0.0)
+        return max(self.settings.caution + math.log10(odds), 0.0)
 
     def _is_striking(self, state: int) -> bool:
         """Whether a window of the last half second spoke for a state by itself."""

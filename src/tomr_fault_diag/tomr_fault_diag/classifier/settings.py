@@ -5,7 +5,6 @@ from typing import Self, cast
 
 from attrs import frozen
 
-from tomr_fault_diag.classifier.belief import Cautions
 from tomr_fault_diag.residuals.frame import INPUT_ORDERS
 from tomr_power_model.errors import InputError
 from tomr_power_model.model.ticks import to_ns
@@ -52,10 +51,6 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
         "",
         0.0,
         30.0,
-    ),
-    *(
-        _S(name, f"the same for {what}; 0: as caution", "float", 0.0, "", 0.0, 30.0)
-        for name, what in (("slip_caution", "slip"), ("control_caution", "control system faults"))
     ),
     _S(
         "striking",
@@ -107,8 +102,6 @@ class ClassifierSettings:
     weights: str = ""
     evidence_weight: float = 0.5
     caution: float = 11.0
-    slip_caution: float = 0.0  # 0: as caution
-    control_caution: float = 0.0
     striking: float = 9.0
     filter_time: int = to_ns(0.15)
     confirm_time: int = to_ns(0.15)
@@ -121,15 +114,6 @@ class ClassifierSettings:
     hardware_id: str = NAMELESS
     input_order: str = "speeds_first"
     commissioned: str = ""
-
-    @property
-    def cautions(self) -> Cautions:
-        """Of each kind of fault."""
-        return Cautions(
-            others=self.caution,
-            slip=self.slip_caution or self.caution,
-            control=self.control_caution or self.caution,
-        )
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:
@@ -148,8 +132,6 @@ class ClassifierSettings:
             weights=str(values["weights"]),
             evidence_weight=number("evidence_weight"),
             caution=number("caution"),
-            slip_caution=number("slip_caution"),
-            control_caution=number("control_caution"),
             striking=number("striking"),
             filter_time=to_ns(number("filter_time")),
             confirm_time=to_ns(number("confirm_time")),
