@@ -44,9 +44,9 @@ METERS = slice(14, 17)
 EXTERNAL = 17  # a push, while it is young
 OTHER = 18
 LOADED = 19  # the same force, here to stay
-# A lost signal or encoder of wheels 1-3 is back, and the wheel catches up: tick by tick.
-_CATCHING_UP = 16  # ticks at most: 0.4 s, and as long until the last is out of the window
-ENDED = slice(20, 20 + 3 * _CATCHING_UP)
+# A lost signal or encoder is back, and its wheel catches up, tick by tick: 0.4 s at most, and as
+# long until the last is out of the window.
+ENDED = slice(20, 36)
 _STATES = ENDED.stop
 _FAULTS = slice(SLIP, METERS.stop)
 _CATCHES_UP = [*range(CONTROLS.start, ENCODERS.stop)]  # after the fault, the wheel
@@ -98,9 +98,9 @@ def of_states(likelihoods: Array) -> Array:
     most = faults.max()
     any_fault = most + np.log(np.mean(np.exp(faults - most)))
     found[OTHER] = np.logaddexp(found[OTHER], any_fault) - np.log(2.0)
-    of_wheel = np.max([found[kind] for kind in (CONTROLS, ENCODERS, DRAGS, WEAKS)], axis=0)
-    ended = np.maximum(of_wheel, found[NORMAL]) - _GUESSED
-    return np.concatenate([found, np.tile(ended, _CATCHING_UP)])
+    # The other wheels feel it as well.
+    ended = max(found[CONTROLS.start : WEAKS.stop].max(), found[NORMAL]) - _GUESSED
+    return np.concatenate([found, np.full(ENDED.stop - ENDED.start, ended)])
 
 
 def _transitions(onset: float) -> Array:
@@ -125,11 +125,10 @@ def _transitions(onset: float) -> Array:
 
 def _let_catch_up(moves: Array) -> None:
     """From a lost signal or encoder back to normal by way of `ENDED`, a tick after the other."""
-    ticks = np.arange(ENDED.start, ENDED.stop).reshape(_CATCHING_UP, 3)
+    ticks = np.arange(ENDED.start, ENDED.stop)
     moves[_CATCHES_UP, NORMAL] = 0.0
     moves[:, ENDED] = 0.0
-    for kind in (CONTROLS, ENCODERS):
-        moves[range(kind.start, kind.stop), ticks[0]] = _ENDING
+    moves[_CATCHES_UP, ticks[0]] = _ENDING
     moves[ENDED] = moves[NORMAL]
     moves[ENDED, NORMAL] = _CAUGHT_UP
     moves[ticks[:-1], ticks[1:]] = 1.0 - moves[ticks[:-1]].sum(axis=-1)
