@@ -133,3 +133,26 @@ def test_what_a_driver_has_summed_up_follows_the_measured_power() -> None:
     assert motion is not None
     held = motor.resistance * 0.5 + motor.wheel_constant * 10.0
     assert motion[at.MOTION_HEADER + at.MOTION_VOLTAGE] == pytest.approx(held, rel=0.02)
+
+
+@pytest.mark.parametrize("quantity", ["power", "motor_current"])
+@pytest.mark.parametrize("wheel", range(WHEELS))
+def test_a_contact_s_force_hangs_on_its_own_wheel(wheel: int, quantity: str) -> None:
+    """Of a robot with unlike motors: that of a robot whose motors are all as the one asked for."""
+    plain_motor = ROBOT.motors[0]
+    first, second, third = (
+        evolve(plain_motor, torque_constant=scale * plain_motor.torque_constant)
+        for scale in (1.0, 1.2, 0.8)
+    )
+    found = []
+    for motors in ((first, second, third), ((first, second, third)[wheel],) * 3):
+        measurement = evolve(ROBOT.measurement, quantity=quantity)
+        tractions = Tractions(evolve(ROBOT, motors=motors, measurement=measurement))
+        tractions.command(0, (0.3, 0.0, 0.0))
+        for sample in range(1, 20):
+            tractions.encoders(10_000_000 * sample, (0.05 * sample, 0.1 * sample, -0.08 * sample))
+        found.append(tractions.power(190_000_000, wheel, 2.0))
+    one, other = found
+    assert one is not None
+    assert one == other
+    assert one.speed == pytest.approx((5.0, 10.0, -8.0)[wheel])
