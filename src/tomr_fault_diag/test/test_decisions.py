@@ -246,7 +246,7 @@ def test_a_gap_is_no_time_in_which_a_fault_recovers() -> None:
     healthy = [*ticks(4000, 4900), *ticks(8000, 10_000)]
     found = changes(classified([*FAULTY, *healthy]))
     assert [name for _, name in found] == ["normal", FAULT, "normal"]
-    assert found[-1][0] >= 8000 + 600
+    assert found[-1][0] >= 8000 + 500
 
 
 def test_every_state_that_is_wrong_says_what_to_check_and_which_of_the_six_it_is() -> None:
@@ -419,7 +419,7 @@ def test_slip_shows_now_and_then_and_is_let_go_later_than_a_fault() -> None:
                 named, gone[state.name] = diagnosis.state.name, at
         assert named == "normal"
     late = dict.fromkeys(("slip", BURDENED.name, UNKNOWN.name), 2000)
-    assert gone == {**late, "control system fault": 1600, DRAGGING[0].name: 1600}
+    assert gone == {**late, "control system fault": 1500, DRAGGING[0].name: 1500}
 
 
 def test_which_fault_of_a_motor_it_is_may_be_settled_while_its_time_passes() -> None:

@@ -74,7 +74,7 @@ def test_a_robot_that_stands_when_told_to_drive_does_not_follow(period: int) -> 
     changes = named(driving + stopped + again)
     assert [state for _, state in changes] == ["normal", "does not follow its commands", "normal"]
     assert 300 <= changes[1][0] - 2000 <= 300 + period
-    assert 600 <= changes[2][0] - 4000 <= 600 + period
+    assert 500 <= changes[2][0] - 4000 <= 500 + period
 
 
 def test_no_wheel_is_accused_meanwhile() -> None:
@@ -209,7 +209,7 @@ def test_a_supply_that_stays_low_is_said_until_it_has_risen_again() -> None:
     assert named(_supplied({0: 1.0, 1000: 0.87, 3000: 0.89, 4000: 0.91})) == [
         (50, "normal"),
         (2000, "low supply"),
-        (4600, "normal"),
+        (4500, "normal"),
     ]
 
 
@@ -237,7 +237,7 @@ def test_other_faults_are_named_beside_a_low_supply_and_leave_it_behind() -> Non
         (50, "normal"),
         (1050, "low supply"),
         (3000, "control system fault"),
-        (4600, "low supply"),
+        (4500, "low supply"),
     ]
 
 

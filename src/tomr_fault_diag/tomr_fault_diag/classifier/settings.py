@@ -67,7 +67,7 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
     _live(
         "recovery_time",
         "normal must lead this long before it is named again after a fault",
-        0.6,
+        0.5,
         "s",
         0.0,
         60.0,
@@ -106,7 +106,7 @@ class ClassifierSettings:
     filter_time: int = to_ns(0.15)
     confirm_time: int = to_ns(0.15)
     raise_time: int = 0
-    recovery_time: int = to_ns(0.6)
+    recovery_time: int = to_ns(0.5)
     slip_recovery_time: int = to_ns(1.0)
     latch: bool = False
     low_supply: float = 0.88
