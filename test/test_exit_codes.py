@@ -108,6 +108,47 @@ def test_words_that_nobody_takes(arguments: str, code: int) -> None:
     assert run.returncode == code
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "tomr_diagnose circle",
+        "tomr_diagnose circle --robot circle",
+        "tomr_diagnose {bag} --html circle",
+        "tomr_calibrate circle --robot reference --out fitted.yaml",
+        "tomr_gap check --robot reference --real circle",
+        "tomr_commission circle --robot reference --out commissioned",
+        "tomr_odometry circle --robot reference --out corrected",
+        "tomr_simulate circle/mission --out bag",
+        "tomr_view circle",
+    ],
+)
+def test_links_that_lead_in_a_circle(arguments: str, tmp_path: Path) -> None:
+    (tmp_path / "circle").symlink_to("circle")
+    command, *rest = arguments.format(bag=SQUARE).split()
+    run = subprocess.run(
+        [DIAGNOSE.with_name(command), *rest],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        cwd=tmp_path,
+        env=_environment(),
+    )
+    assert run.returncode == EXIT_BAD_INPUT, run.stderr
+    assert run.stderr.splitlines()[-1].startswith("error: ")
+    assert "circle" in run.stderr
+
+
+def test_a_folder_that_is_gone_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    assert run_main(lambda _: len(Path.cwd().name)) == EXIT_BAD_INPUT
+    assert "the current folder is gone" in capsys.readouterr().err
+
+
 def test_names_that_the_terminal_lacks_letters_for(tmp_path: Path) -> None:
     for name in (
         "Straße-\N{SNOWMAN}",

@@ -28,6 +28,7 @@ from tomr_demo.topics import PROCESSES, all_topics
 from tomr_demo.view import Scene, act_table, make_console, view_on
 from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK, run_main
 from tomr_power_model.errors import InputError
+from tomr_power_model.files.paths import real_path
 from tomr_power_model.files.write import write_text
 from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import load_robot
@@ -175,7 +176,7 @@ def write_robot(path: Path) -> None:
 
 def start_nodes(children: Children, robot: Path, weights: Path | None = None) -> None:
     """Start the robot and the three nodes of the diagnosis."""
-    more = {"fault_classifier": ["-p", f"weights:={weights.resolve()}"]} if weights else {}
+    more = {"fault_classifier": ["-p", f"weights:={real_path(weights)}"]} if weights else {}
     for name in PROCESSES:
         # sim_bridge makes the time that the others follow.
         time = ["-p", f"{'publish_clock' if name == 'sim_bridge' else 'use_sim_time'}:=true"]

@@ -93,6 +93,8 @@ def _told(error: Exception) -> tuple[int, str]:
         return EXIT_NO_OUTPUT, f"error: the output cannot be written ({error.strerror})"
     if isinstance(error, MemoryError):
         return EXIT_BAD_INPUT, "error: the memory does not suffice: give less at a time"
+    if isinstance(error, FileNotFoundError) and error.filename is None:  # of os.getcwd alone
+        return EXIT_BAD_INPUT, "error: the current folder is gone: change to one that is there"
     if isinstance(error, OSError):
         name = f"{error.filename}: " if error.filename else ""
         return EXIT_BAD_INPUT, f"error: {name}{error.strerror or error}"

@@ -7,6 +7,7 @@ from pathlib import Path
 from attrs import evolve
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.files.paths import real_path
 from tomr_power_model.robot import shipped_robots
 from tomr_reality_gap.request import DEFAULT_TOLERANCE, Request
 
@@ -85,7 +86,7 @@ def inputs_of(options: argparse.Namespace) -> Request:
     for option, path in given:
         if not path.exists():
             raise InputError(f"{option} {path}: no such recording: give a folder or file of a bag")
-        first = seen.setdefault(path.resolve(), option)
+        first = seen.setdefault(real_path(path), option)
         if first != option:
             raise InputError(f"{option} {path}: it is given as {first}, too: give it once")
     request = Request(

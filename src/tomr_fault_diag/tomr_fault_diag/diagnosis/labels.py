@@ -25,7 +25,7 @@ from attrs import evolve, field, frozen
 from tomr_fault_diag.classifier import states
 from tomr_fault_diag.classifier.states import FAULTLESS, NORMAL, STATES, State
 from tomr_power_model.errors import InputError
-from tomr_power_model.files import load_yaml, read_text
+from tomr_power_model.files import load_yaml, read_text, real_path
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.recordings import open_recording, resolve_topic
 from tomr_power_model.robot.description import closest
@@ -142,7 +142,7 @@ class Labels:
 
     def of(self, bag: Path) -> tuple[Label, ...] | None:
         """The labels of a recording, none for a healthy one; None where nothing is said of it."""
-        whole = bag.resolve()
+        whole = real_path(bag)
         parts = (*whole.parts[:-1], whole.stem if whole.suffix in (".mcap", ".db3") else whole.name)
         found = [label for label in self._labels if _ends_with(parts, label.bag)]
         return tuple(found) if found else None

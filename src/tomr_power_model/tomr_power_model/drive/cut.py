@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
+from tomr_power_model.files.paths import real_path
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -17,9 +18,9 @@ Skips = Mapping[str, Sequence[tuple[float, float]]]
 
 def names_of(paths: Sequence[Path]) -> list[str]:
     """What to call each recording: its last part, with its folder where two are called alike."""
-    short = [path.resolve().name for path in paths]
+    short = [real_path(path).name for path in paths]
     names = [
-        "/".join(path.resolve().parts[-2:]) if short.count(name) > 1 else name
+        "/".join(real_path(path).parts[-2:]) if short.count(name) > 1 else name
         for path, name in zip(paths, short, strict=True)
     ]
     twice = {name for name in names if names.count(name) > 1}

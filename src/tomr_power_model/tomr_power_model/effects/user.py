@@ -12,6 +12,7 @@ from pathlib import Path
 
 from tomr_power_model.effects.base import EFFECTS, LAWS
 from tomr_power_model.errors import InputError
+from tomr_power_model.files.paths import real_path
 
 VARIABLE = "TOMR_EFFECTS"
 _MOST_PARAMETERS = 3  # of an effect with laws
@@ -27,7 +28,7 @@ def load_effects(folder: Path) -> list[str]:
     files = _files(folder)
     if not files:
         raise InputError(f"{folder}: holds no effects: give a folder of Python files")
-    found = [effect_id for file in files for effect_id in _load(file.resolve())]
+    found = [effect_id for file in files for effect_id in _load(real_path(file))]
     if not found:
         raise InputError(f"{folder}: no file registers an effect: see tomr_gap promote")
     return found
@@ -75,7 +76,7 @@ def _check(effect_id: str, before: dict[str, type], file: Path) -> None:
     """Raise InputError, and take the effect out again, where it cannot be one of the vocabulary."""
     known, made = before.get(effect_id), EFFECTS[effect_id]
     why = ""
-    if known is not None and Path(inspect.getfile(known)).resolve() != file:
+    if known is not None and real_path(Path(inspect.getfile(known))) != file:
         why = "that effect is there already: give it another id"
     has_law = any(getattr(made, law) is not None for law in LAWS)
     if has_law and not 0 < len(made.parameters) <= _MOST_PARAMETERS:

@@ -15,6 +15,7 @@ from pathlib import Path
 from tempfile import mkstemp
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.files.paths import real_path
 
 
 def make_folder(folder: Path) -> None:
@@ -73,7 +74,7 @@ def _encoded(text: str) -> bytes:
 
 
 def _write_beside(path: Path, data: bytes, moves: dict[Path, Path]) -> None:
-    place = path.resolve()
+    place = real_path(path)
     mode = _mode(place)
     if mode is None:  # nothing can be renamed over a device
         with place.open("wb") as device:
@@ -118,7 +119,7 @@ def _rename(temporary: Path, place: Path) -> None:
 def _locked(folders: Iterable[Path]) -> Iterator[None]:
     """Hold the folders for this process, in an order that is the same for all."""
     with contextlib.ExitStack() as stack:
-        for folder in sorted({folder.resolve() for folder in folders}):
+        for folder in sorted({real_path(folder) for folder in folders}):
             try:
                 handle = os.open(folder, os.O_RDONLY)
             except OSError:  # may be written to but not read: then without

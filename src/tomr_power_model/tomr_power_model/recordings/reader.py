@@ -295,5 +295,7 @@ def _enter(files: Sequence[Path], stack: ExitStack) -> tuple[Reader, ...]:
 
 
 def _reason(error: BaseException) -> str:
+    if isinstance(error, MemoryError):
+        return "the memory does not suffice"
     text = one_line(error)[:200]
     return f"{type(error).__name__}: {text}" if text else type(error).__name__

@@ -13,6 +13,7 @@ from rosbags.interfaces import Connection
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer, WriterError
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.files.paths import real_path
 from tomr_power_model.messages.bag import jazzy_typestore
 from tomr_power_model.recordings.topics import absolute_topic
 
@@ -73,7 +74,7 @@ class RecordingWriter:
             raise self._failed(error) from error
 
     def __enter__(self) -> Self:
-        place = self.path.resolve()
+        place = real_path(self.path)
         try:
             place.parent.mkdir(parents=True, exist_ok=True)
             beside = self._stack.enter_context(
@@ -103,7 +104,7 @@ class RecordingWriter:
     def _move(self) -> None:
         """Take the place, unless something has taken it: a folder cannot be renamed onto files."""
         try:
-            self._made.rename(self.path.resolve())
+            self._made.rename(real_path(self.path))
         except OSError as error:
             taken = error.errno in (ENOTEMPTY, EEXIST, ENOTDIR)
             raise (self._exists() if taken else self._failed(error)) from None

@@ -7,6 +7,7 @@ from pathlib import Path
 from attrs import evolve, frozen
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.files.paths import real_path
 from tomr_reality_gap.request import Request
 
 ROBOT, REAL, SIM, HOLDOUT = "robot.yaml", "real", "sim", "real_holdout"
@@ -38,7 +39,7 @@ def cases_of(given: Sequence[Path], defaults: Defaults) -> tuple[Case, ...]:
     found = [case for folder in given for case in _cases_in(folder, defaults)]
     taken = Counter(case.name for case in found)
     named = [
-        evolve(case, name=f"{case.inputs.real[0].resolve().parent.parent.name}_{case.name}")
+        evolve(case, name=f"{real_path(case.inputs.real[0]).parent.parent.name}_{case.name}")
         if taken[case.name] > 1
         else case
         for case in found
@@ -81,4 +82,4 @@ def _case(folder: Path, defaults: Defaults) -> Case:
         tolerance=defaults.tolerance,
         tolerances=defaults.tolerances,
     )
-    return Case(folder.resolve().name, inputs)
+    return Case(real_path(folder).name, inputs)
