@@ -28,6 +28,7 @@ _TINY = 1e-9
 _NOTHING = 1e-300  # variance of a parameter that the data do not tell
 _NEGLIGIBLE = 1e-6  # of the largest eigenvalue
 _POSITIVE = ("slack", "radius", "decay")
+_WHOLE = ("order",)  # parameters that are whole numbers
 _BEYOND = 1.0  # of the range, on either side, that a law is trusted beyond the table
 SMOOTH = 0.25  # of the distance between knots, of a step
 _FINER = {1: 4, 2: 2}  # knots of a law's table for each of the learnt one, by its axes
@@ -300,6 +301,8 @@ def _fitted(law: Law, table: Table, learnt: LearntTerm, evidence: Evidence) -> L
         return None
     best = min(tried, key=lambda item: float(item.cost))
     p = np.asarray(best.x, dtype=np.float64)
+    # Only the whole part of these counts, so that nothing kept the fit from drifting within it.
+    p = np.where([name in _WHOLE for name in law.units], np.round(p), p)
     whole = _explained((learnt.values @ inverse.T).ravel(), evidence)
     share = _explained(units_at(p), evidence) / max(whole, _TINY)
     covariance = np.linalg.pinv(best.jac.T @ best.jac) * evidence.inflation
