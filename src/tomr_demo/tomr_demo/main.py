@@ -28,7 +28,7 @@ from tomr_demo.topics import PROCESSES, all_topics
 from tomr_demo.view import Scene, act_table, make_console, view_on
 from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK, run_main
 from tomr_power_model.errors import InputError
-from tomr_power_model.files.paths import real_path
+from tomr_power_model.files import real_path
 from tomr_power_model.files.write import write_text
 from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import load_robot

@@ -8,7 +8,7 @@ from attrs import field, frozen
 from tomr_odometry.creep import CREEP_PARAMETERS, Creep
 from tomr_odometry.kernel import Noise
 from tomr_power_model.errors import InputError
-from tomr_power_model.model.settings import tick_settings
+from tomr_power_model.model.settings import GAP, tick_settings
 from tomr_power_model.model.ticks import TickSettings, to_ns
 from tomr_power_model.robot.parameters import ParameterSpec, check_all
 
@@ -17,7 +17,7 @@ PARAMETERS: tuple[ParameterSpec, ...] = (
     _S("decision_rate", "estimates on the grid of data stamps", "float", 50.0, "Hz", 1.0, 100.0),
     _S("settle_time", "data time to wait for late messages", "float", 0.02, "s", 0.0, 1.0),
     _S("patience", "silence after which a stream is not waited for", "float", 0.25, "s", 0.0, 5.0),
-    _S("gap", "a silence or jump of stamps that starts afresh", "float", 1.0, "s", 0.1, 60.0),
+    GAP,
     _S("use_imu", "take imu/data where it is there", "bool", True),
     _S("use_power", "take the motors' power where it is there", "bool", True),
     *CREEP_PARAMETERS,

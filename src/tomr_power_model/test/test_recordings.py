@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap_records import chunk, header, indexed, message
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from tomr_power_model.errors import InputError
@@ -398,3 +398,21 @@ def test_messages_whose_topics_are_lost(tmp_path: Path) -> None:
     with pytest.raises(InputError) as failure, open_recording(path):
         pass
     clear_line(failure, str(path), "no topic that they belong to")
+
+
+@pytest.mark.parametrize("part", ["__init__", "messages"])
+def test_memory_that_does_not_suffice_has_words(
+    part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A MemoryError has none of its own, and the libraries that read a recording raise it."""
+    bag = write_recording(tmp_path / "bag")
+
+    def fails(*_: object, **__: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(Reader, part, fails)
+    with (
+        pytest.raises(InputError, match=r"cannot be read .*\(the memory does not suffice\)"),
+        open_recording(bag) as recording,
+    ):
+        list(recording.messages())

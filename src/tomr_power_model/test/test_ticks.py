@@ -44,6 +44,14 @@ def test_a_silent_stream_is_not_waited_for() -> None:
     assert _ms(clock) == [50, 100, 150, 200, 250]
 
 
+def test_what_is_waited_for_may_be_later_than_a_gap() -> None:
+    """A stream that two stages of `patience` 5 s wait for comes up to 10 s late."""
+    for late, arrival in ((9_900, Arrival.TAKEN), (10_100, Arrival.RESTARTED)):
+        clock = TickClock(TickSettings(patience=5_000 * MS, gap=1_000 * MS))
+        clock.arrive("a", BASE + 20_000 * MS)
+        assert clock.arrive("b", BASE + (20_000 - late) * MS) is arrival
+
+
 def test_an_expected_stream_is_waited_for_before_its_first_message() -> None:
     clock = TickClock(SETTINGS, expected=("b",))
     for at in range(10, 300, 10):

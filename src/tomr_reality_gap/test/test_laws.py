@@ -80,6 +80,19 @@ def test_curves_are_told_as_the_laws_that_they_are(
         assert told[name] == pytest.approx(value, rel=0.03, abs=0.02)
 
 
+def test_the_order_of_a_periodic_law_is_a_whole_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing keeps the fit from drifting within it: a start beside it stays there."""
+    beside = [
+        evolve(law, starts=lambda at, values: [[0.1, 3.3, 0.8]])
+        for law in LAWS
+        if law.name == "periodic"
+    ]
+    monkeypatch.setattr(laws, "LAWS", beside)
+    knots = np.linspace(0.0, 2.0 * np.pi, 36, endpoint=False)
+    told, _ = _laws(_table("torque.angle", knots), 0.2 * np.sin(3.0 * knots + 1.0))["periodic"]
+    assert told["order"] == 3.0
+
+
 @pytest.mark.parametrize(
     ("family", "law", "parameters"),
     [

@@ -7,7 +7,7 @@ from pathlib import Path
 from attrs import evolve
 
 from tomr_power_model.errors import InputError
-from tomr_power_model.files.paths import real_path
+from tomr_power_model.files import real_path
 from tomr_power_model.robot import shipped_robots
 from tomr_reality_gap.request import DEFAULT_TOLERANCE, Request
 

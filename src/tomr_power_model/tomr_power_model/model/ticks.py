@@ -31,7 +31,7 @@ class TickSettings:
     period: int = to_ns(0.05)
     settle: int = to_ns(0.02)
     patience: int = to_ns(0.25)
-    gap: int = to_ns(1.0)  # a longer silence or a jump starts the stage afresh
+    gap: int = to_ns(1.0)  # a longer silence or jump starts afresh; at least 2 * patience counts
     phase: int = 0  # by which the grid is shifted
 
 
@@ -66,7 +66,8 @@ class TickClock:
         """`expected` streams are waited for up to `patience` even before their first message."""
         self.settings = settings
         self._expected = expected
-        self._gap = settings.gap
+        # What is waited for is late and no jump, and so is what waited in the stage before.
+        self._gap = max(settings.gap, 2 * settings.patience)
         self._settle = settings.settle
         self._newest: dict[str, int] = {}
         self._periodic: set[str] = set()
