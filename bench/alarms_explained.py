@@ -71,7 +71,7 @@ def play(task: Task) -> Played:
         read_node_sections(task.settings_of, STAGE_NODES), str(task.settings_of)
     )
     pipeline = Pipeline(load_robot(task.robot), settings)
-    summariser, alarms = Summariser(), 0
+    summariser, alarms = Summariser(pipeline.robot.wheel_names), 0
     with open_recording(task.bag) as recording:
         for _, step in diagnose(recording, pipeline):
             for diagnosis in step.diagnoses:

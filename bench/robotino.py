@@ -50,8 +50,9 @@ class Drive:
 
 def play(bag: Path, robot: str) -> Drive:
     """Play one recording through the stages."""
-    summariser, frames = Summariser(), []
-    for _, step in steps_of(bag, pipeline_of(robot)):
+    pipeline = pipeline_of(robot)
+    summariser, frames = Summariser(pipeline.robot.wheel_names), []
+    for _, step in steps_of(bag, pipeline):
         for diagnosis in step.diagnoses:
             summariser.diagnosis(diagnosis, [])
         for frame in step.frames:

@@ -37,6 +37,18 @@ def test_floor_everywhere_is_that_of_the_worst_wheel() -> None:
     assert floor.somewhere == 0.2
 
 
+def test_floors_in_words() -> None:
+    found = [Trial("f", 0.5, "W", 0, 0.5, "b"), Trial("f", 0.2, "W", 1, 0.3, "a")]
+    (floor,) = floors_of(found)
+    assert (floor.words, floor.best) == ("0.5 W", "0.2 W, wheel 2")
+    (floor,) = floors_of([*found, Trial("f", 1.0, "W", 2, None, "")])
+    assert (floor.words, floor.best) == ("not found at every wheel up to 1 W", "0.2 W, wheel 2")
+    (floor,) = floors_of([Trial("f", 1.0, "W", 0, None, "")])
+    assert (floor.words, floor.best) == ("not found up to 1 W", "not found")
+    (floor,) = floors_of([Trial("f", 1.0, "", wheel, 0.1, "a") for wheel in range(3)])
+    assert (floor.words, floor.best) == ("found", "found")
+
+
 def test_scaled_motor_shows_in_its_own_and_the_total(steady: Callable[..., Observed]) -> None:
     drive = steady(sigma=0.0, ticks=300)
     change = injected(drive, BY_NAME["motor draws more"], 0.5, 1).residual - drive.residual

@@ -77,6 +77,11 @@ class Commissioned:
     notes: tuple[str, ...] = ()
 
     @property
+    def unfound(self) -> tuple[str, ...]:
+        """Kinds of fault that no size tried shows at every wheel."""
+        return tuple(floor.kind for floor in self.floors if floor.everywhere is None)
+
+    @property
     def is_go(self) -> bool:
         """Whether nothing speaks against switching the diagnosis on."""
         return not self.reasons

@@ -45,7 +45,7 @@ KINDS: tuple[SimulatedKind, ...] = (
     SimulatedKind(
         "bearing_dragging",
         "bearing drags",
-        "of the robot's own friction",
+        "times the robot's own friction",
         (3.0, 1.0, 0.5, 0.33, 0.2),
         "torque",
         per_friction=True,

@@ -47,6 +47,8 @@ class Floor:
     unit: str
     everywhere: float | None
     somewhere: float | None
+    wheel: int | None  # 1..3, at which `somewhere` was found
+    largest: float  # that was tried
     delay: float | None  # s, median of all that were found
     called: str
 
@@ -54,7 +56,8 @@ class Floor:
     def words(self) -> str:
         """The smallest size that is found at every wheel; one that has no size is just found."""
         if self.everywhere is None:
-            return "not found at every wheel" if self.somewhere is not None else "not found"
+            where = "not found at every wheel" if self.somewhere is not None else "not found"
+            return f"{where} up to {self.largest:g} {self.unit}" if self.unit else where
         return f"{self.everywhere:g} {self.unit}" if self.unit else "found"
 
     @property
@@ -62,7 +65,8 @@ class Floor:
         """That at the wheel where it is seen best."""
         if self.somewhere is None:
             return "not found"
-        return f"{self.somewhere:g} {self.unit}" if self.unit else "found"
+        size = f"{self.somewhere:g} {self.unit}" if self.unit else "found"
+        return size if self.somewhere == self.everywhere else f"{size}, wheel {self.wheel}"
 
 
 def floors_of(trials: Sequence[Trial]) -> list[Floor]:
@@ -74,18 +78,23 @@ def floors_of(trials: Sequence[Trial]) -> list[Floor]:
 
 
 def _floor(kind: str, rows: Sequence[Trial]) -> Floor:
-    smallest = []
-    for wheel in sorted({row.wheel for row in rows}):
-        found = [row.size for row in rows if row.wheel == wheel and row.delay is not None]
-        smallest.append(min(found) if found else None)
-    known = [size for size in smallest if size is not None]
+    wheels = sorted({row.wheel for row in rows})
+    found = [row for row in rows if row.delay is not None]
+    smallest = {
+        wheel: min(row.size for row in found if row.wheel == wheel)
+        for wheel in wheels
+        if any(row.wheel == wheel for row in found)
+    }
+    best = min(smallest, key=lambda wheel: smallest[wheel], default=None)
     delays = [row.delay for row in rows if row.delay is not None]
     names = [name for row in rows for name in row.called.split(", ") if name]
     return Floor(
         kind,
         rows[0].unit,
-        max(known) if len(known) == len(smallest) else None,
-        min(known) if known else None,
+        max(smallest.values()) if len(smallest) == len(wheels) else None,
+        None if best is None else smallest[best],
+        None if best is None else best + 1,
+        max(row.size for row in rows),
         float(np.median(delays)) if delays else None,
         ", ".join(dict.fromkeys(sorted(names, key=lambda name: -names.count(name)))),
     )

@@ -32,6 +32,7 @@ from tomr_power_model.messages.plain import Level, Status
 S = 1_000_000_000
 START = 1_700_000_000 * S
 WHEELS = ("wheel_1", "wheel_2", "wheel_3")
+JOINTS = ("right_joint", "left_joint", "back_joint")
 TASK = Task(Path("a <b>drive.mcap"), "reference", DiagnosisSettings.of({}, "test"))
 
 
@@ -134,7 +135,7 @@ def test_what_has_changed_slowly_stands_there_too() -> None:
 
 
 def test_the_conditions_told_last_stand() -> None:
-    summariser, frame = Summariser(), ResidualFrame(START, (Residual(0.0, 1.0, 0.0),) * 10)
+    summariser, frame = Summariser(JOINTS), ResidualFrame(START, (Residual(0.0, 1.0, 0.0),) * 10)
     changes = [(Severity("x", "kg", value, 0.0, 9.0),) for value in (1.0, 2.0)]
     for conditions in changes:
         diagnosis = Diagnosis(START, STATES[1], START, (), frame, False, conditions=conditions)
@@ -143,8 +144,26 @@ def test_the_conditions_told_last_stand() -> None:
     assert summariser.summary().conditions == changes[1]
 
 
+def test_a_fault_is_told_with_the_joint_that_it_concerns() -> None:
+    """Of a control system fault nothing else says where it is."""
+    summariser, frame = Summariser(JOINTS), ResidualFrame(START, (Residual(0.0, 1.0, 0.0),) * 10)
+    for stamp, state, wheel in ((START, STATES[0], None), (START + S, STATES[2], 1)):
+        diagnosis = Diagnosis(stamp, state, stamp, (), frame, True, wheel=wheel)
+        summariser.diagnosis(diagnosis, [])
+        summariser.frame(frame)
+    found = replayed(summariser.summary())
+    normal, fault = as_json(found)["episodes"]
+    assert (normal["joint"], fault["joint"], fault["wheel"]) == ("", "left_joint", 2)
+    assert fault["state"] == "control system fault"
+    assert verdict(found) == "control system fault (left_joint) at 1.00 s"
+    words = "control system fault (left_joint)"
+    assert any(line.endswith(words) for line in summary_lines(found.phases[0].summary, START))
+    page = time_line(found, [track()], [], WHEELS)
+    assert words in page.partition("What was said")[2]
+
+
 def test_an_episode_keeps_the_severity_told_last() -> None:
-    summariser = Summariser()
+    summariser = Summariser(JOINTS)
     frame = ResidualFrame(START, (Residual(0.0, 1.0, 0.0),) * 10)
     severities = [Severity("x", "N", value, 0.0, 9.0) for value in (1.0, 2.0)]
     for severity in (None, *severities, None):

@@ -164,3 +164,8 @@ def test_wheels_are_held_against_any_expectation(make_drive: MakeDrive) -> None:
     assert {item.where for item in found} == {"wheel_2_joint"}
     unknown = np.full_like(expected, np.nan)
     assert list(not_following(drive, ROBOT, time, unknown)) == []
+    two = list(not_following(drive, ROBOT, time, expected * np.array([1.0, 0.2, 0.2])))
+    assert {item.where for item in two} == {"wheel_2_joint", "wheel_3_joint"}
+    (every,) = not_following(drive, ROBOT, time, 0.2 * expected)
+    assert every.where == "all wheels"
+    assert "controller.proportional" in every.remedy

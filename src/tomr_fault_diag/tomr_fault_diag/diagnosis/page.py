@@ -206,7 +206,7 @@ def _said_briefly(item: Replayed) -> list[dict[str, object]]:
             "left": round(100 * (episode.start_ns - item.start_ns) / length, 3),
             "width": round(100 * max(episode.end_ns - episode.start_ns, 5e7) / length, 3),
             "colour": colour_of(episode.state),
-            "title": episode.state,
+            "title": episode.words,
         }
         for episode in item.phases[0].summary.episodes
     ]
@@ -303,7 +303,7 @@ def _numbers(values: Array) -> list[float | None]:
 
 def _episode(episode: Any, start_ns: int) -> dict[str, object]:
     return {
-        "state": episode.state,
+        "state": episode.words,
         "begin": seconds(episode.start_ns, start_ns),
         "end": seconds(episode.end_ns, start_ns),
         "since": seconds(episode.since_ns, start_ns),

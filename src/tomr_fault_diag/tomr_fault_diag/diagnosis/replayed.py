@@ -89,7 +89,7 @@ class _Listener:
 
     def __init__(self, pipeline: Pipeline, detail: bool) -> None:
         self.pipeline = pipeline
-        self._summariser = Summariser()
+        self._summariser = Summariser(pipeline.robot.wheel_names)
         self._tracker = Tracker(detail)
         self._detail = detail
 

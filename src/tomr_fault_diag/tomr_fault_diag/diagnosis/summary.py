@@ -28,8 +28,14 @@ class Episode:
     end_ns: int
     since_ns: int  # when its evidence began, mostly before it was named
     wheel: int | None = None  # 1..3
+    joint: str = ""  # of that wheel
     evidence: tuple[str, ...] = ()
     severity: Severity | None = None  # as last known
+
+    @property
+    def words(self) -> str:
+        """The state, and which wheel's joint it concerns, as the status on /diagnostics says it."""
+        return f"{self.state} ({self.joint})" if self.joint else self.state
 
     @property
     def is_fault(self) -> bool:
@@ -67,6 +73,7 @@ class Summary:
 class Summariser:
     """Gathers frames and diagnoses as they come."""
 
+    joints: tuple[str, ...]  # of the wheels
     _counts: Counter[str] = field(factory=Counter)
     _stale: Counter[int] = field(factory=Counter)
     _missing: Counter[str] = field(factory=Counter)
@@ -87,13 +94,15 @@ class Summariser:
     def diagnosis(self, diagnosis: Diagnosis, evidence: list[str]) -> None:
         """Note a diagnosis; only a change starts a new episode."""
         if not self._episodes or diagnosis.changed:
+            wheel = diagnosis.wheel
             self._episodes.append(
                 Episode(
                     diagnosis.state.name,
                     diagnosis.stamp_ns,
                     diagnosis.stamp_ns,
                     diagnosis.since_ns,
-                    None if diagnosis.wheel is None else diagnosis.wheel + 1,
+                    None if wheel is None else wheel + 1,
+                    "" if wheel is None else self.joints[wheel],
                     tuple(evidence),
                 )
             )

@@ -32,7 +32,7 @@ def summary_lines(summary: Summary, start_ns: int) -> Iterator[str]:
             for stamp in (episode.since_ns, episode.start_ns, episode.end_ns)
         )
         earlier = f", since {since:.2f} s" if episode.is_fault and since < begin else ""
-        yield f"{begin:8.2f} s to {end:8.2f} s  {episode.state}{earlier}"
+        yield f"{begin:8.2f} s to {end:8.2f} s  {episode.words}{earlier}"
         if episode.severity is not None:
             yield f"{'':26}{episode.severity.words}"
         for line in episode.evidence:
@@ -46,7 +46,7 @@ def phases_line(replayed: Replayed) -> str:
     firsts = [seconds(faults[0].start_ns, start) for faults in named if faults]
     if not firsts:
         return f"{len(phases)} phases: no fault in any"
-    states = sorted({episode.state for faults in named for episode in faults})
+    states = sorted({episode.words for faults in named for episode in faults})
     return (
         f"{len(phases)} phases: {', '.join(states)} in {len(firsts)}, "
         f"first named at {min(firsts):.2f} to {max(firsts):.2f} s"
@@ -73,7 +73,7 @@ def _named(replayed: Replayed) -> Iterator[str]:
     for phase in replayed.phases:
         begun: dict[str, int] = {}
         for episode in phase.summary.faults:
-            begun.setdefault(episode.state, episode.start_ns)
+            begun.setdefault(episode.words, episode.start_ns)
         for state, start_ns in begun.items():
             first.setdefault(state, []).append(start_ns)
     for state, starts in first.items():
@@ -175,6 +175,7 @@ def _episode(episode: Episode) -> dict[str, Any]:
     return {
         "state": episode.state,
         "wheel": episode.wheel,
+        "joint": episode.joint,
         "start_ns": episode.start_ns,
         "end_ns": episode.end_ns,
         "since_ns": episode.since_ns,

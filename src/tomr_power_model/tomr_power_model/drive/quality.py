@@ -29,6 +29,7 @@ _COMPARED = 0.4  # s, width of the bell over which a wheel's speed is held again
 _LOST = 1.5  # s: a wheel that does not follow for a shorter time may be slow
 _ASTRAY = 0.65  # rms difference over rms of what is expected or measured
 _NOTABLE = 1.5  # rad/s, rms of what is expected or measured
+_MOSTLY = 0.5  # of the time in which wheels turn: no fault, the description
 _CUT = "leave it out with --skip {name}={start:.1f}:{end:.1f}"
 
 
@@ -92,7 +93,11 @@ def not_following(drive: Drive, robot: Robot, time: Array, expected: Array) -> I
     width = _COMPARED / float(np.median(np.diff(time)))
     error = gaussian_filter1d((speed - expected) ** 2, width, axis=0)
     level = gaussian_filter1d(np.maximum(expected**2, speed**2), width, axis=0)
-    off = (error > _ASTRAY**2 * level) & (level > _NOTABLE**2)
+    notable = level > _NOTABLE**2
+    off = (error > _ASTRAY**2 * level) & notable
+    if (off.sum(axis=0) > _MOSTLY * np.maximum(notable.sum(axis=0), 1)).all():
+        yield _other_controller(drive, time)
+        return
     for wheel, name in enumerate(robot.wheel_names):
         for first, last in runs(off[:, wheel], time, _LOST, bridge=_COMPARED):
             rows = slice(first, last + 1)
@@ -104,6 +109,19 @@ def not_following(drive: Drive, robot: Robot, time: Array, expected: Array) -> I
                 "rad/s is expected: a fault, lost commands or another robot's description"
             )
             yield _found(drive, name, rows, time, what)
+
+
+def _other_controller(drive: Drive, time: Array) -> Finding:
+    return Finding(
+        drive.name,
+        "all wheels",
+        float(time[0]),
+        float(time[-1]),
+        "they turn otherwise than commanded for most of the drive",
+        "mend controller.proportional and controller.integral, which are per rad/s and rad of the "
+        "wheel (a gain at the motor times motor.gear_ratio), or motor.gear_ratio and "
+        "robot.wheel_radius; or it is another robot's description, or most commands are lost",
+    )
 
 
 def _geometry(item: Drive, robot: Robot) -> Iterator[Finding]:
