@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from attrs import define, field, frozen
 
 WITHIN = 2.0  # s in which a verdict must be found again
-HEARS_WITHIN = 6.0  # s in which DDS must find a restarted node its messages
+HEARS_WITHIN = 2.0  # s in which DDS must find a restarted node its messages
 FLAT = 0.05  # of the memory after warm-up
 _BASE = 0.1  # share of a process's samples that its memory is held against
 

@@ -194,14 +194,18 @@ class Soak:
                 raise InputError(f"{condition.fault}: {answer.result().result.reason}")
 
     def _await_verdict(
-        self, what: str, suites: Iterable[str] = SUITES, besides: Iterable[str] = ()
+        self,
+        what: str,
+        suites: Iterable[str] = SUITES,
+        besides: Iterable[str] = (),
+        since_ns: int | None = None,
     ) -> None:
-        """Note how long it takes from now on until suites say what is so.
+        """Note how long it takes from a stamp, or from now on, until suites say what is so.
 
         `besides`: what may be said as well, and for a moment more.
         """
         self._note(f"expecting {' or '.join(self._condition.states)} after: {what}")
-        since_ns = self._relay.now_ns
+        since_ns = self._relay.now_ns if since_ns is None else since_ns
         wanted, taken = self._condition.states, dict.fromkeys(suites, 0.0)
         missing = set(taken)
 
@@ -280,7 +284,8 @@ class Soak:
             self._set_fault(self._condition, self._condition.severity)
             self._await_verdict(self._doing, besides=(DISOBEYS.name,))
         else:
-            self._await_verdict(self._doing, [suite for suite in SUITES if name in SUITES[suite]])
+            mine = [suite for suite in SUITES if name in SUITES[suite]]
+            self._await_verdict(self._doing, mine, since_ns=since)
 
 
 def _true_words(condition: Condition) -> set[str]:
