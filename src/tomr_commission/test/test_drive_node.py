@@ -4,6 +4,7 @@ import signal
 from collections.abc import Callable, Iterator
 from importlib.resources import files
 from pathlib import Path
+from types import SimpleNamespace
 from unittest.mock import Mock, PropertyMock
 
 import numpy as np
@@ -16,7 +17,7 @@ from rclpy.node import Node
 
 from tomr_commission.cli import main
 from tomr_commission.driving import STILL, Command
-from tomr_commission.nodes.drive_node import DriveRequest, _follow
+from tomr_commission.nodes.drive_node import DriveNode, DriveRequest, _follow
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_INTERRUPTED
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.errors import InputError
@@ -208,3 +209,16 @@ def test_bad_input(
     assert reason in error
     assert error.count("\n") == 1
     assert not (tmp_path / "tour").exists()
+
+
+def test_a_rival_whose_name_has_not_come_yet_is_one() -> None:
+    info = SimpleNamespace(
+        node_namespace="_NODE_NAMESPACE_UNKNOWN_", node_name="_NODE_NAME_UNKNOWN_"
+    )
+    node = SimpleNamespace(
+        get_publishers_info_by_topic=lambda topic: [info],
+        get_fully_qualified_name=lambda: "/tomr_commission_drive",
+        _outlet=object(),
+    )
+    rivals = DriveNode.rivals.fget(node)  # type: ignore[attr-defined]
+    assert rivals == "cmd_vel is published by a node without a name: stop that, two cannot drive"

@@ -53,7 +53,7 @@ KINDS: tuple[SimulatedKind, ...] = (
     SimulatedKind(
         "motor_resistance_high",
         "resistance of a motor up",
-        "of it",
+        "times its own on top",
         (2.0, 1.0, 0.5, 0.3, 0.15),
         "rise",
     ),

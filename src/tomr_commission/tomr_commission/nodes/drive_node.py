@@ -28,6 +28,7 @@ from tomr_sim_bridge.plant.samples import command_sample
 NAME = "tomr_commission_drive"
 _COMMAND = "cmd_vel"
 _WAIT = 10.0  # s for the first sample of the encoders
+_NAMELESS = "_NODE_NAME_UNKNOWN_"  # rmw's word, until a node's name has come after its publisher
 _SETTLE = 1.0  # s in which the graph tells who else is there
 _SPIN = 0.01  # s
 _BACK, _ON = -0.2, 2.0  # s that a clock may go between two looks
@@ -114,7 +115,12 @@ class DriveNode(Node):
     def rivals(self) -> str:
         """Who else commands, and what to do; empty: nobody."""
         infos = self.get_publishers_info_by_topic(_COMMAND)
-        names = [f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos]
+        names = [
+            "a node without a name"
+            if info.node_name == _NAMELESS
+            else f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+            for info in infos
+        ]
         own = self.get_fully_qualified_name()
         if self._outlet is not None and own in names:
             names.remove(own)  # once: another may drive with the same command
@@ -261,7 +267,11 @@ def _follow(node: DriveNode, request: DriveRequest, signals: _Signals, progress:
             while waiting and now >= waiting[-1].time:
                 due = waiting.pop()
             node.command(due.twist)
-        problem = node.watch.problem(now, node.silent) or node.rivals
+        problem = node.watch.problem(now, node.silent)
+        if not problem and node.rivals:
+            first = node.rivals
+            node.halt()  # first of all; meanwhile a node that just came tells its name
+            problem = node.rivals or first
         if is_slow and now >= request.slow_end:
             is_slow = False
             problem = problem or _answers(node.watch)
