@@ -166,6 +166,8 @@ def test_wheels_are_held_against_any_expectation(make_drive: MakeDrive) -> None:
     assert list(not_following(drive, ROBOT, time, unknown)) == []
     two = list(not_following(drive, ROBOT, time, expected * np.array([1.0, 0.2, 0.2])))
     assert {item.where for item in two} == {"wheel_2_joint", "wheel_3_joint"}
+    late_now_and_then = np.where((time % 2.0 < 0.9)[:, None], 0.0, expected)
+    assert list(not_following(drive, ROBOT, time, late_now_and_then)) == []
     (every,) = not_following(drive, ROBOT, time, 0.2 * expected)
     assert every.where == "all wheels"
     assert "controller.proportional" in every.remedy

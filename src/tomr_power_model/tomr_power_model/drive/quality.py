@@ -95,15 +95,21 @@ def not_following(drive: Drive, robot: Robot, time: Array, expected: Array) -> I
     level = gaussian_filter1d(np.maximum(expected**2, speed**2), width, axis=0)
     notable = level > _NOTABLE**2
     off = (error > _ASTRAY**2 * level) & notable
-    if (off.sum(axis=0) > _MOSTLY * np.maximum(notable.sum(axis=0), 1)).all():
-        yield _other_controller(drive, time)
-        return
+    mostly = (off.sum(axis=0) > _MOSTLY * notable.sum(axis=0)).all()
+    found = list(_astray(drive, robot, time, off, (speed, expected)))
+    if mostly and {item.where for item in found} == set(robot.wheel_names):
+        found = [_other_controller(drive, time)]
+    yield from found
+
+
+def _astray(
+    drive: Drive, robot: Robot, time: Array, off: Mask, speeds: tuple[Array, Array]
+) -> Iterator[Finding]:
+    """Each time that a wheel is `off` (n, 3); speeds: as measured and as expected, (n, 3)."""
     for wheel, name in enumerate(robot.wheel_names):
         for first, last in runs(off[:, wheel], time, _LOST, bridge=_COMPARED):
             rows = slice(first, last + 1)
-            seen, wanted = (
-                float(np.sqrt(np.mean(values[rows, wheel] ** 2))) for values in (speed, expected)
-            )
+            seen, wanted = (float(np.sqrt(np.mean(values[rows, wheel] ** 2))) for values in speeds)
             what = (
                 f"it does not follow its command: it turns at {seen:.1f} rad/s rms, {wanted:.1f} "
                 "rad/s is expected: a fault, lost commands or another robot's description"
