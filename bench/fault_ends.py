@@ -29,9 +29,8 @@ from tomr_sim_bridge.plant.simulation import Simulation
 
 FAULTS = ("control_signal_lost", "encoder_lost", "floor_slippery")
 WELL = (STATES[NORMAL].name, NOT_OBSERVABLE.name)
-Said = list[
-    tuple[float, str]
-]  # s from the start of the drive, and what the robot's state was called
+# Time from the start of the drive [s], and what the robot's state was called.
+Said = list[tuple[float, str]]
 
 _TICK = NANOSECONDS // 20
 _AHEAD = NANOSECONDS // 5  # by which commands are early, as the soak's are

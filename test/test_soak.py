@@ -4,16 +4,20 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
 BENCH = Path(__file__).parents[1] / "bench"
+SECOND = 1_000_000_000
 sys.path.insert(0, str(BENCH))
 
 from soak.acts import FAULTS, Flood, Jump, Kill, Pause, Rest, acts  # noqa: E402
 from soak.crew import Crew  # noqa: E402
 from soak.judge import Delays, Process, memory_items, table  # noqa: E402
+from soak.stage import Soak  # noqa: E402
 
 
 @pytest.mark.serial
@@ -120,3 +124,30 @@ def test_clocks_that_jump_stay_where_stamps_can_follow() -> None:
             shift += one.by if isinstance(one, Jump) else 0.0
             farthest = max(farthest, abs(shift))
     assert 3e7 <= farthest < 6e7
+
+
+def test_a_killed_node_s_time_begins_when_it_is_up_again() -> None:
+    """It was up at 5 s, heard its peers at 6.5 s and was right at 7 s: 2 s."""
+    now = SimpleNamespace(now_ns=5 * SECOND)
+    delays, hearing = Delays(), Delays("messages after", 2.0)
+
+    def until(condition: Callable[[], object], what: str) -> None:
+        assert condition()
+        if what.endswith("hears again"):
+            now.now_ns = 13 * SECOND // 2
+
+    stage = SimpleNamespace(
+        _relay=now, _crew=Mock(), _half=60 * SECOND, _kills=0, _note=Mock(), _until=until,
+        _hearing=hearing, _delays=delays, _allowed=set(), _drive=Mock(),
+        _condition=SimpleNamespace(states=("normal",), fault=""),
+        _verdicts={"three": ("normal", 7 * SECOND)},
+    )  # fmt: skip
+
+    def await_verdict(*arguments: Any, **more: Any) -> None:
+        now.now_ns = 7 * SECOND
+        Soak._await_verdict(stage, *arguments, **more)  # type: ignore[arg-type]
+
+    stage._await_verdict = await_verdict
+    Soak._kill(stage)  # type: ignore[arg-type]
+    assert ["most 2.00 s" in item.found for item in delays.items()] == [True]
+    assert ["most 1.50 s" in item.found for item in hearing.items()] == [True]

@@ -211,6 +211,16 @@ def test_bad_input(
     assert not (tmp_path / "tour").exists()
 
 
+def test_it_stands_before_it_names_a_rival() -> None:
+    """A publisher is known a moment before the name of its node."""
+    node = leaping(0.1)
+    node.rivals = "published by a node without a name"
+    node.halt.side_effect = lambda: setattr(node, "rivals", "published by /teleop")
+    request = DriveRequest(shipped_robot("reference"), (Command(8.0, STILL),), 4.0)
+    with pytest.raises(InputError, match=r"stopped after 0.1 s: published by /teleop"):
+        _follow(node, request, Mock(), Mock())
+
+
 def test_a_rival_whose_name_has_not_come_yet_is_one() -> None:
     info = SimpleNamespace(
         node_namespace="_NODE_NAMESPACE_UNKNOWN_", node_name="_NODE_NAME_UNKNOWN_"

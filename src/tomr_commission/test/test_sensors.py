@@ -85,7 +85,11 @@ def test_currents_leave_the_alarm_level_where_it_is(tmp_path: Path, rehearse: Mo
     assert floors["power sensor biased"]["unit"] == "A"
     assert floors["power sensor biased"]["everywhere"] <= 0.5
     assert "motor draws more" not in floors
-    assert "<b>not known</b>" in (tmp_path / "out" / "commission.html").read_text()
+    page = (tmp_path / "out" / "commission.html").read_text()
+    assert "<b>not known</b>" in page
+    unfound = [kind for kind, floor in floors.items() if floor["everywhere"] is None]
+    assert unfound
+    assert f"Not found at every wheel: {', '.join(unfound)}. " in page
 
 
 def test_total_alone_is_all_that_is_rehearsed(tmp_path: Path, rehearse: Mock) -> None:

@@ -78,20 +78,17 @@ def floors_of(trials: Sequence[Trial]) -> list[Floor]:
 
 
 def _floor(kind: str, rows: Sequence[Trial]) -> Floor:
-    wheels = sorted({row.wheel for row in rows})
-    found = [row for row in rows if row.delay is not None]
-    smallest = {
-        wheel: min(row.size for row in found if row.wheel == wheel)
-        for wheel in wheels
-        if any(row.wheel == wheel for row in found)
-    }
+    smallest: dict[int, float] = {}
+    for row in rows:
+        if row.delay is not None:
+            smallest[row.wheel] = min(row.size, smallest.get(row.wheel, row.size))
     best = min(smallest, key=lambda wheel: smallest[wheel], default=None)
     delays = [row.delay for row in rows if row.delay is not None]
     names = [name for row in rows for name in row.called.split(", ") if name]
     return Floor(
         kind,
         rows[0].unit,
-        max(smallest.values()) if len(smallest) == len(wheels) else None,
+        max(smallest.values()) if smallest.keys() == {row.wheel for row in rows} else None,
         None if best is None else smallest[best],
         None if best is None else best + 1,
         max(row.size for row in rows),
