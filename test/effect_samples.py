@@ -51,6 +51,9 @@ MODERATE: Physics = {
     "sensor.power_bias": {"power": 0.4},
     "sensor.power_lag": {"time_constant": 0.05},
     "sensor.clock_offset": {"delay": 0.02},
+    "sensor.encoder_scale": {"scale": 0.98},
+    "sensor.encoder_eccentricity": {"cosine": 0.02, "sine": -0.01},
+    "sensor.supply_scale": {"scale": 1.04},
 }
 # As large as they come; sensors are not part of the motion.
 LARGE: Physics = {

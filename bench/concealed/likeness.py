@@ -38,7 +38,7 @@ _ALIKE: tuple[frozenset[str], ...] = tuple(
             "parameter.physics.electrical.driver_standby.power",
         ),
         ("sensor.power_lag", "sensor.clock_offset"),
-        ("kinematic.wheel_radius", "parameter.robot.wheel_radius"),
+        ("kinematic.wheel_radius", "parameter.robot.wheel_radius", "sensor.encoder_scale"),
         ("friction.stribeck", "parameter.physics.friction.stribeck.torque"),
         ("contact.roller_drag", "parameter.physics.contact.roller_drag.coefficient"),
         ("friction.load_dependent", "parameter.physics.friction.load_dependent.coefficient"),

@@ -43,6 +43,14 @@ def _ripple(size: float, scales: Scales, random: np.random.Generator) -> dict[st
     }
 
 
+def _off_disc(size: float, scales: Scales, random: np.random.Generator) -> dict[str, float]:
+    direction = random.uniform(-math.pi, math.pi)
+    return {
+        "cosine": float(size * math.cos(direction)),
+        "sine": float(size * math.sin(direction)),
+    }
+
+
 def _iron(size: float, scales: Scales, random: np.random.Generator) -> dict[str, float]:
     return {
         "hysteresis": 0.6 * size * scales.torque / scales.gear,
@@ -100,4 +108,11 @@ RECIPES: Mapping[str, Recipe] = {
     ),
     "sensor.power_lag": Recipe(lambda s, u, _: {"time_constant": s}, (0.08, 0.02, 0.004)),
     "sensor.clock_offset": Recipe(lambda s, u, _: {"delay": s}, (0.06, 0.015, 0.003)),
+    "sensor.encoder_scale": Recipe(
+        lambda s, _, random: {"scale": 1.0 + s * _either(random)}, (0.05, 0.02, 0.005)
+    ),
+    "sensor.encoder_eccentricity": Recipe(_off_disc, (0.05, 0.02, 0.005)),
+    "sensor.supply_scale": Recipe(
+        lambda s, _, random: {"scale": 1.0 + s * _either(random)}, (0.2, 0.05, 0.012)
+    ),
 }

@@ -16,6 +16,7 @@ from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.start import body_of, is_incredible, start, start_again
 from tomr_odometry.traction import Traction, Tractions
 from tomr_power_model.drive.sources import PowerReading
+from tomr_power_model.model.encoder_flaws import EncoderFlaws
 from tomr_power_model.model.encoders import RecentStamps
 from tomr_power_model.model.ticks import Arrival, TickClock, to_ns
 from tomr_power_model.robot import GRAVITY, WHEELS, Robot
@@ -55,6 +56,7 @@ class SlipOdometry:
         self._clock = TickClock(given.ticks)
         self._tractions = Tractions(robot)
         self._body, self._radius = body_of(robot)
+        self._flaws = EncoderFlaws.of(robot)
         # Without an IMU wheels may slide unseen: the covariance has to allow for it. With one whose
         # biases no standstill has told yet, what slides from the start may look like a bias.
         noise = given.noise
@@ -183,6 +185,7 @@ class SlipOdometry:
         counted = (angle[0], angle[1], angle[2])
         self._stamps.add(stamp, counted)
         (time,) = self._stamps.times([stamp])
+        angle = self._flaws.angle(angle)
         if self._time:
             is_aided = self.settings.use_imu and self._is_fresh("imu", stamp)
             if self._is_aided and not is_aided and self._mode[3] > SLIDES:

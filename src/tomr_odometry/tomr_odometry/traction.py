@@ -17,6 +17,8 @@ from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.binding import plain
 from tomr_power_model.dynamics.numbers import laid_out, no_input
 from tomr_power_model.dynamics.vehicle import vehicle_of
+from tomr_power_model.model.encoder_flaws import EncoderFlaws
+from tomr_power_model.model.encoders import WheelEstimate
 from tomr_power_model.robot import WHEELS, Robot
 
 Triple = tuple[float, float, float]
@@ -53,6 +55,7 @@ class Tractions:
         # Of each wheel as if it were the only one: what does not hang on the others costs a third.
         self._alone = [_of_wheel(self._numbers, wheel) for wheel in range(WHEELS)]
         self._laws = plain(tuple(robot.physics))
+        self._flaws = EncoderFlaws.of(robot)
         self._delay = round(1e9 * robot.controller.delay)
         self._period = round(1e9 * self._numbers[at.PERIOD])
         self._window = round(0.5e9 * robot.sensors.power_window)
@@ -118,7 +121,9 @@ class Tractions:
         powers = np.stack([np.ones_like(times), times, times * times])
         shape = np.linalg.solve(powers @ powers.T, powers @ angles)
         scale = 1e-9 * (newest - self._samples[0][0])
-        return list(last), (shape[1] / scale).tolist(), (2.0 / scale**2 * shape[2]).tolist()
+        shown = WheelEstimate(shape[1] / scale, 2.0 / scale**2 * shape[2], np.array(last))
+        wheels = self._flaws.turned(shown)
+        return list(last), wheels.speed.tolist(), wheels.acceleration.tolist()
 
     def _motion(self, time_ns: int) -> list[float] | None:
         """Wheels' speeds and accelerations at some time, as the inverse dynamics take them."""

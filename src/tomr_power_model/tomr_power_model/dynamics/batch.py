@@ -13,7 +13,7 @@ from tomr_power_model.dynamics.layout import (
     OUT_CURRENT,
     OUT_HEADER,
     OUT_POWER,
-    OUT_SPEED,
+    OUT_SHOWN,
     OUT_TILT,
     OUT_VOLTAGE,
     OUT_WHEEL,
@@ -25,6 +25,7 @@ from tomr_power_model.dynamics.layout import (
     RESISTING,
     STEP,
     STRIDE,
+    SUPPLY_SCALE,
 )
 from tomr_power_model.dynamics.start import begin
 from tomr_power_model.dynamics.step import advance
@@ -77,7 +78,7 @@ def series(p: Numbers, steps: Any, kind: int, wheel: int, value: Any, tilt: Any,
     for k in range(len(steps)):
         tilt[k] = 0.0
         if kind == SPEED:
-            value[k] = steps[k, own + OUT_SPEED]
+            value[k] = steps[k, own + OUT_SHOWN]
         elif kind == POWER:
             value[k], tilt[k] = steps[k, own + OUT_POWER], steps[k, own + OUT_TILT]
         elif kind == TOTAL:
@@ -156,6 +157,8 @@ def read(
             scale, bias = p[w + POWER_SCALE], p[w + POWER_BIAS]
             if p[w + POWER_LAG] > 0.0:
                 follow(value, tilt, step / p[w + POWER_LAG])
+        elif kind == TOTAL:
+            scale = p[SUPPLY_SCALE]
         total[0] = 0.0
         for k in range(count):
             total[k + 1] = total[k] + step * value[k]

@@ -31,8 +31,9 @@ where it runs as it is. Every field is an offset; those of a wheel count from it
     LEANS,  # whether anything depends on the wheels' loads
     SLIDES,  # whether traction is limited
     HEATS,  # whether windings heat up
-) = range(25)
-DECAY = 25  # E, (3, 3)
+    SUPPLY_SCALE,  # of the supply's sensor
+) = range(26)
+DECAY = 26  # E, (3, 3)
 GAIN = DECAY + 9  # G, (3, 3)
 MOBILITY = GAIN + 9  # inverse mass matrix at base_link, (3, 3)
 INERTIA = MOBILITY + 9  # mass matrix at base_link, (3, 3)
@@ -73,8 +74,11 @@ TO_TWIST = 18  # twist per wheel speed, pseudo-inverse of ROLL
     POWER_BIAS,  # W
     POWER_LAG,  # s
     POWER_DELAY,  # s
-) = range(21, 47)
-LAWS_START = 47  # parameters of the effects with laws follow
+    ENCODER_SCALE,  # angle that the encoder shows per angle turned
+    ENCODER_COSINE,  # of its disc's eccentricity
+    ENCODER_SINE,
+) = range(21, 50)
+LAWS_START = 50  # parameters of the effects with laws follow
 
 # State: s[FIELD].
 TWIST = 0  # of the body in base_link [m/s, m/s, rad/s]
@@ -97,7 +101,7 @@ STATE_HEADER = 13
     HELD,  # dry friction at the axle [N m]
     SIDE,  # force along the free direction [N]
     TRANSMITTED,  # torque that the gear carried [N m]
-    ANGLE,  # rad
+    ANGLE,  # as the encoder shows it [rad]
     COUNTED,  # angle as the encoder counts it [rad]
     TURNED,  # angle as the encoder would count it ideally [rad]
     RISE,  # of the winding above 25 C [K]
@@ -115,8 +119,9 @@ STATE_HEADER = 13
     FORCE,  # traction while sliding [N]
     FIRST,  # speed at the start of a part of a step
     ASKED,  # speed that the driver is asked for [rad/s]
-) = range(24)
-STATE_WHEEL = 24
+    SHOWN,  # speed as the encoder shows it [rad/s]
+) = range(25)
+STATE_WHEEL = 25
 
 # Inputs of one driver period: u[FIELD].
 COMMAND = 0  # twist asked for, held over the period
@@ -150,8 +155,9 @@ OUT_HEADER = 2
     OUT_GAP,  # sliding of the contact in the rolling direction [m/s]
     OUT_ASKED,  # speed that the driver is asked for [rad/s]
     OUT_SUM,  # of its errors [rad]
-) = range(9)
-OUT_WHEEL = 9
+    OUT_SHOWN,  # speed as the encoder shows it [rad/s]
+) = range(10)
+OUT_WHEEL = 10
 
 # Motion of the wheels, of which inverse dynamics tells the power: m[FIELD].
 MOTION_YAW = 0  # of a gyro [rad/s]; NaN: as the wheels say

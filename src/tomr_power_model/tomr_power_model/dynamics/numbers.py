@@ -155,7 +155,7 @@ def _body(p: Array, vehicle: Vehicle, effects: PlantNumbers) -> None:
     )
     p[at.MASS], p[at.CENTER_X], p[at.CENTER_Y] = m, x, y
     p[at.FLOOR_X], p[at.FLOOR_Y] = m * GRAVITY * np.array(effects.floor_force)
-    p[at.SAG] = effects.voltage_drop
+    p[at.SAG], p[at.SUPPLY_SCALE] = effects.voltage_drop, effects.supply_scale
     p[at.INERTIA : at.INERTIA + 9] = inertia.ravel()
     p[at.MOBILITY : at.MOBILITY + 9] = np.linalg.inv(inertia).ravel()
 
@@ -179,6 +179,8 @@ def _motors(records: Array, vehicle: Vehicle, effects: PlantNumbers, timing: Tim
     records[:, at.INITIAL_RISE] = effects.initial_rise
     records[:, at.POWER_SCALE], records[:, at.POWER_BIAS] = effects.power_scale, effects.power_bias
     records[:, at.POWER_LAG], records[:, at.POWER_DELAY] = effects.power_lag, effects.power_delay
+    records[:, at.ENCODER_SCALE] = effects.encoder_scale
+    records[:, at.ENCODER_COSINE : at.ENCODER_SINE + 1] = effects.encoder_eccentricity
 
 
 def _wheels(records: Array, vehicle: Vehicle, effects: PlantNumbers, geometry: Geometry) -> None:

@@ -136,6 +136,7 @@ class Steps:
     gap: Array  # sliding of the contacts in the rolling direction [m/s], (m, n)
     asked: Array  # wheel speeds that the drivers are asked for [rad/s], (m, n)
     sums: Array  # of the drivers' errors [rad], (m, n)
+    shown: Array  # speeds as the encoders show them [rad/s], (m, n)
 
     @classmethod
     def of(cls, out: Array, wheels: int) -> "Steps":
@@ -155,6 +156,7 @@ class Steps:
             gap=own[..., at.OUT_GAP],
             asked=own[..., at.OUT_ASKED],
             sums=own[..., at.OUT_SUM],
+            shown=own[..., at.OUT_SHOWN],
         )
 
 

@@ -35,6 +35,7 @@ from tomr_power_model.dynamics.layout import (
     ROLL,
     SAG,
     SET,
+    SHOWN,
     SPEED,
     STATE_HEADER,
     STATE_WHEEL,
@@ -44,7 +45,7 @@ from tomr_power_model.dynamics.layout import (
     VOLTAGE,
     WHEEL_LOAD,
 )
-from tomr_power_model.dynamics.step import supply_current
+from tomr_power_model.dynamics.step import shown, supply_current
 
 
 def begin(p: Numbers, s: Mutable, motion: Mutable, power: Mutable, n: int) -> None:
@@ -60,7 +61,8 @@ def begin(p: Numbers, s: Mutable, motion: Mutable, power: Mutable, n: int) -> No
         a = MOTION_HEADER + i * MOTION_WHEEL
         speed = times(p, w + ROLL, s[TWIST], s[TWIST + 1], s[TWIST + 2])
         change = times(p, w + ROLL, s[RATE], s[RATE + 1], s[RATE + 2])
-        s[z + SPEED], s[z + MEASURED], s[z + MEAN] = speed, speed, speed
+        seen = shown(p, w, s[z + ANGLE]) * speed
+        s[z + SPEED], s[z + MEAN], s[z + MEASURED], s[z + SHOWN] = speed, speed, seen, seen
         s[z + RISE] = p[w + INITIAL_RISE]
         s[z + WHEEL_LOAD], s[z + TURNED], s[z + COUNTED] = p[w + LOAD], 0.0, 0.0
         motion[a + MOTION_SPEED], motion[a + MOTION_ACCELERATION] = speed, change

@@ -49,6 +49,9 @@ from tomr_power_model.dynamics.layout import (
     DRAGS,
     DRAWN,
     DRY,
+    ENCODER_COSINE,
+    ENCODER_SCALE,
+    ENCODER_SINE,
     GAIN,
     GAP,
     GEAR,
@@ -75,6 +78,7 @@ from tomr_power_model.dynamics.layout import (
     OUT_GAP,
     OUT_HEADER,
     OUT_POWER,
+    OUT_SHOWN,
     OUT_SPEED,
     OUT_SUM,
     OUT_TILT,
@@ -96,6 +100,7 @@ from tomr_power_model.dynamics.layout import (
     SEEN_ANGLE,
     SEEN_HEADING,
     SET,
+    SHOWN,
     SIDE_LIMIT,
     SLIDES,
     SLIDING,
@@ -172,9 +177,20 @@ def advance(p: Numbers, s: Mutable, u: Numbers, out: Mutable, n: int) -> None:
             turned = counted - s[z + COUNTED]
             s[z + COUNTED] = counted
         if p[CONTINUOUS] > 0.0:
-            s[z + MEASURED] = s[z + SPEED]
+            s[z + MEASURED] = s[z + SHOWN]
         else:
             s[z + MEASURED] = turned / p[PERIOD]
+
+
+def shown(p: Numbers, w: int, angle: float) -> float:
+    """Speed that a wheel's encoder shows, per speed, where it shows an angle [rad].
+
+    Where the angle is not known its disc is taken for centred.
+    """
+    x, y = p[w + ENCODER_COSINE], p[w + ENCODER_SINE]
+    if (x != 0.0 or y != 0.0) and angle == angle:
+        return p[w + ENCODER_SCALE] / (1.0 + x * math.cos(angle) + y * math.sin(angle))
+    return p[w + ENCODER_SCALE]
 
 
 def supply_current(p: Numbers, power: float) -> float:
@@ -327,10 +343,13 @@ def report(p: Numbers, s: Mutable, u: Numbers, out: Mutable, row: int, n: int) -
         out[o + OUT_GAP] = s[z + GAP]
         out[o + OUT_ASKED] = s[z + ASKED]
         out[o + OUT_SUM] = s[z + INTEGRAL]
+        per_turn = shown(p, w, s[z + ANGLE])
+        out[o + OUT_SHOWN] = per_turn * mean
         s[z + TRANSMITTED] = k * current - p[w + ROTOR] * (s[z + NEXT] - s[z + SPEED]) / duration
         s[z + SPEED] = s[z + NEXT]
-        s[z + ANGLE] += mean * duration
-        s[z + MEASURED] += mean * duration  # of the period so far, as an angle
+        s[z + SHOWN] = per_turn * s[z + NEXT]
+        s[z + ANGLE] += per_turn * mean * duration
+        s[z + MEASURED] += per_turn * mean * duration  # of the period so far, as an angle
         if p[HEATS] > 0.0:
             settled = p[w + THERMAL_RESISTANCE] * copper
             s[z + RISE] = settled + p[w + THERMAL_KEEP] * (s[z + RISE] - settled)

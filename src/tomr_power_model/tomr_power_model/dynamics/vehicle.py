@@ -97,6 +97,9 @@ def plant_numbers(vehicle: Vehicle) -> PlantNumbers:
         power_bias=[0.0] * n,
         power_lag=[0.0] * n,
         power_delay=[0.0] * n,
+        encoder_scale=[1.0] * n,
+        encoder_eccentricity=[(0.0, 0.0)] * n,
+        supply_scale=1.0,
     )
     for effect_id, per_wheel in vehicle.physics.items():
         effect = EFFECTS[effect_id]

@@ -89,6 +89,9 @@ class PlantNumbers:
     power_bias: list[float]  # W
     power_lag: list[float]  # s
     power_delay: list[float]  # s
+    encoder_scale: list[float]  # angle shown per angle turned
+    encoder_eccentricity: list[tuple[float, float]]  # of the discs, see sensor.encoder_eccentricity
+    supply_scale: float  # of the supply's own sensor
 
 
 class Effect:

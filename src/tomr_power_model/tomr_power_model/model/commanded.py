@@ -51,7 +51,7 @@ class Seen:
 class Commanded:
     """The steps that belong to a tick; at least one, but for drivers slower than the ticks."""
 
-    speed: list[float]  # of the wheels, mean of the tick [rad/s]
+    speed: list[float]  # of the wheels as encoders show it, mean of the tick [rad/s]
     torque: list[float]  # of the motors at the wheels, likewise [N m]
     voltage: float  # of the supply, likewise [V]
     starts: tuple[int, ...]  # of each step [ns]
@@ -65,7 +65,7 @@ class Commanded:
 
 
 class SimulatedMotion:
-    """Angles and speeds of the wheels at the steps' ends, of the last moments."""
+    """Angles and speeds that encoders show at the steps' ends, of the last moments."""
 
     def __init__(self) -> None:
         self._points: deque[tuple[float, ...]] = deque()  # time since the origin [ns], rad, rad/s
@@ -213,7 +213,7 @@ class CommandPath:
         return row
 
     def _standing(self) -> tuple[list[float], list[float]]:
-        return self.wheel(at.TURNED), self.wheel(at.SPEED)
+        return self.wheel(at.TURNED), self.wheel(at.SHOWN)
 
     def _see(self, seen: Seen | None) -> None:
         """Put the simulation where the robot was seen, for one period; None: as it goes on."""
@@ -239,7 +239,7 @@ class CommandPath:
         first = at.OUT_HEADER
         means = [sum(column) / len(rows) for column in zip(*rows, strict=True)]
         return (
-            means[first + at.OUT_SPEED :: at.OUT_WHEEL],
+            means[first + at.OUT_SHOWN :: at.OUT_WHEEL],
             means[first + at.OUT_TORQUE :: at.OUT_WHEEL],
             means[at.OUT_VOLTAGE],
         )

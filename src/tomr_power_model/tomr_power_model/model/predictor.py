@@ -18,6 +18,7 @@ from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.readings import NAN, UNKNOWN_READING, SupplyReading
 from tomr_power_model.model.commanded import Commanded, CommandPath, CommandTiming, Seen
 from tomr_power_model.model.continuity import COMMAND_TOLERANCE, Continuity
+from tomr_power_model.model.encoder_flaws import EncoderFlaws
 from tomr_power_model.model.encoders import (
     UNKNOWN,
     UNKNOWN_MOTION,
@@ -42,6 +43,7 @@ COMMANDS = "cmd_vel"
 ENCODERS = "joint_states"
 IMU = "imu/data"
 
+_BY_ANGLE = {"drivetrain.torque_ripple", "sensor.encoder_eccentricity"}
 _RESTS = 0.05  # rad/s: a slower wheel may stand still
 _INTERVALS = 5  # between commands, of which the middle one is usual
 _LOST = 1.5  # of the usual: a command was lost
@@ -77,7 +79,9 @@ class PowerPredictor:
         self._reads_motor = robot.measurement.quantity == "motor_current"
         numbers = plant_numbers(vehicle_of(robot))
         self._drop, self._cold = numbers.voltage_drop, numbers.initial_rise
-        self._ripples = "drivetrain.torque_ripple" in robot.physics
+        self._flaws = EncoderFlaws.of(robot)
+        self._supply_scale = numbers.supply_scale
+        self._ripples = bool(_BY_ANGLE & robot.physics.keys())
         self._sticks = any(EFFECTS[name].dry_torque is not None for name in robot.physics)
         self._to_twist = Body.of(robot).to_twist.tolist()
         # The paper's coefficients are fitted to what the monitors showed.
@@ -181,7 +185,8 @@ class PowerPredictor:
         estimate = self._encoders.at(tick) if begins or self._ripples else UNKNOWN_MOTION
         speed, gyro = estimate.speed.tolist(), self._yaw_rate(tick)
         before = self._moved(estimate, -0.5 * self._period_s)
-        commanded = self._path.over(tick, Seen(self._twist(speed), before, self._heading))
+        twist = self._twist(self._flaws.turned(estimate).speed.tolist())
+        commanded = self._path.over(tick, Seen(twist, before, self._heading))
         if begins and commanded is not None and _is_half_known(speed):
             self._begun = tick
         if commanded is not None:
@@ -192,10 +197,12 @@ class PowerPredictor:
         share = 0.5 + windows.offset_s / self._period_s
         held = self._resting.voltages(self._path, after, speed, share)
         rise = self._path.wheel(at.RISE) or self._cold
-        turned = self._period_s * self._turning(speed, gyro, commanded)
+        wheels = self._flaws.turned(estimate)
+        turning = wheels.speed.tolist()
+        turned = self._period_s * self._turning(turning, gyro, commanded)
         motion = MeasuredMotion(
-            speed,
-            estimate.acceleration.tolist(),
+            turning,
+            wheels.acceleration.tolist(),
             estimate.angle.tolist(),
             gyro,
             self._heading + 0.5 * turned,
@@ -336,7 +343,7 @@ class PowerPredictor:
         auxiliary = self._robot.supply.auxiliary_power if means.other is None else means.other
         power = means.total + auxiliary + self._path.besides.supply
         voltage = self._bus_voltage(means, power)
-        return SupplyReading.rounded(voltage, power / voltage)
+        return SupplyReading.rounded(voltage, self._supply_scale * power / voltage)
 
 
 def _voltages(means: Means) -> list[float]:

@@ -1,5 +1,6 @@
 """What the nodes of the suite share: parameters, inputs, complaints, a clean end."""
 
+import gc
 import signal
 import sys
 from collections.abc import Callable, Iterable, Mapping
@@ -276,6 +277,9 @@ def run_node(make: Callable[[], Node], arguments: list[str] | None = None) -> in
         node.introduce()
     executor = make_executor()
     executor.add_node(node)
+    # What start-up left lives as long as the node: the collector need not walk it again and again.
+    gc.collect()
+    gc.freeze()
     failure: InputError | None = None
     while not stop.is_set and failure is None:
         executor.spin_once(_SIGNAL_CHECK_S)

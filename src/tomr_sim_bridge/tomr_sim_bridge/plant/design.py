@@ -27,6 +27,9 @@ class PlantDesign:
     power_bias: Vector = field(factory=_zeros)  # W
     power_lag: Vector = field(factory=_zeros)  # s
     power_delay: Vector = field(factory=_zeros)  # s
+    total_scale: float = 1.0  # of the measurement of the whole robot's power
+    encoder_scale: Vector = field(factory=lambda: np.ones(WHEELS))  # counts per true count
+    encoder_center: Vector = field(factory=lambda: np.zeros((WHEELS, 2)))  # disc, over its radius
 
     @classmethod
     def of(cls, robot: Robot) -> "PlantDesign":

@@ -58,7 +58,9 @@ class PowerMonitor:
         if self._robot.measurement.total == "battery_state":
             change = self._window(stamp) / (WINDOW_NS / NANOSECONDS)
             total = self._digitise(
-                float(change[moments.VOLTAGE]), float(change[moments.TOTAL_CURRENT]), _TOTAL_NOISE
+                float(change[moments.VOLTAGE]),
+                self._design.total_scale * float(change[moments.TOTAL_CURRENT]),
+                _TOTAL_NOISE,
             )
             message = battery_state(stamp, total.voltage, -total.drawn, "battery")
             found.append(Sample("battery_state", stamp, message))

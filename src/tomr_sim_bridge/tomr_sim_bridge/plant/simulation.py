@@ -238,10 +238,16 @@ class Simulation:
                 self._duty = self._drivers.tick(now, quantise(self._encoder, quantum))
             voltage = np.where(actions.connected, self._duty * bus * actions.drive, 0.0)
             current, turned = engine.advance(grid.steps, voltage)
-            self._encoder = self._encoder + turned * actions.encoder
+            self._encoder = self._encoder + self._counted(turned) * actions.encoder
             mean_current += current
             mean_power += voltage * current
         return mean_current / grid.runs, mean_power / grid.runs
+
+    def _counted(self, turned: Vector) -> Vector:
+        """What the encoders count of a turn [rad]: a disc off its centre runs fast and slow."""
+        x, y = self._design.encoder_center.T
+        rate = 1.0 + x * np.cos(self._encoder) + y * np.sin(self._encoder)
+        return np.asarray(self._design.encoder_scale * turned / rate)
 
     def _loads(self, angle: Vector, speed: Vector, actions: FaultActions) -> WheelLoads:
         loads = WheelLoads(

@@ -1,4 +1,4 @@
-"""Flaws of the power measurement, not of the robot."""
+"""Flaws of what is measured, not of the robot."""
 
 import numpy as np
 
@@ -43,3 +43,27 @@ class ClockOffset(PlantEffect):
                 "the future: give a delay of 0 or more"
             )
         design.power_delay = delay
+
+
+@plant_effect("sensor.supply_scale")
+class SupplyScale(PlantEffect):
+    """Measured power of the whole robot is off by a factor."""
+
+    def shape(self, design: PlantDesign) -> None:
+        design.total_scale = float(self.values("scale", absent=1.0)[0])
+
+
+@plant_effect("sensor.encoder_scale")
+class EncoderScale(PlantEffect):
+    """Encoders count more or less than a turn has counts."""
+
+    def shape(self, design: PlantDesign) -> None:
+        design.encoder_scale = self.values("scale", absent=1.0)
+
+
+@plant_effect("sensor.encoder_eccentricity")
+class EncoderEccentricity(PlantEffect):
+    """Discs of encoders are off their axles' centres."""
+
+    def shape(self, design: PlantDesign) -> None:
+        design.encoder_center = np.stack([self.values("cosine"), self.values("sine")], axis=1)
