@@ -8,7 +8,7 @@ import pytest
 from attrs import evolve
 from numpy.typing import NDArray
 
-from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL
+from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, TOTAL
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_sim_bridge.missions.mission import Mission
 from tomr_sim_bridge.missions.schema import TwistPhase
