@@ -110,6 +110,7 @@ def _track(rows: Array, design: PlantDesign, commands: tuple[Array, Array]) -> T
     charge = np.column_stack([rows[:, moments.SUPPLY_CURRENT], rows[:, moments.TOTAL_CURRENT]])
     for wheel in range(WHEELS):
         charge[:, wheel] = _as_monitored(charge[:, wheel], voltage, design, wheel)
+    charge[:, WHEELS] *= design.total_scale
     return Track(
         command_time=commands[0],
         command=commands[1],

@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from attrs import asdict, frozen
+from attrs import asdict, evolve, frozen
 from numpy.typing import NDArray
 
-from tomr_commission.observed import Observed, band_of, tells_currents
+from tomr_commission.observed import Observed, band_of, tells_currents, yaw_band_of
 from tomr_commission.request import BandChoice
 from tomr_fault_diag.residuals.calibrated import fit_bands, widened
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL
@@ -40,8 +40,22 @@ def bands_of(drives: Sequence[Observed], choice: BandChoice) -> BandSettings:
         str(drives[0].units[MOTORS.start]),
         choice.within,
     )
-    wide = widened(fitted, choice.margin, choice.speed_factor)
+    wide = _yaw_widened(drives, widened(fitted, choice.margin, choice.speed_factor), choice)
     return BandSettings(**{name: float(f"{value:.4g}") for name, value in asdict(wide).items()})
+
+
+def _yaw_widened(
+    drives: Sequence[Observed], bands: BandSettings, choice: BandChoice
+) -> BandSettings:
+    """Bands in which a gyro's healthy residuals stay: as they are, or wider."""
+    ratio = np.concatenate(
+        [np.abs(drive.yaw[:, 0]) / yaw_band_of(drive, bands) for drive in drives]
+    )
+    known = ratio[np.isfinite(ratio)]
+    if not len(known):
+        return bands
+    wider = max(choice.margin * float(np.quantile(known, choice.within)), 1.0)
+    return evolve(bands, yaw=wider * bands.yaw, yaw_relative=wider * bands.yaw_relative)
 
 
 def regimes(drive: Observed) -> Mapping[str, Mask]:

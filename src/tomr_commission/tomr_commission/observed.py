@@ -17,6 +17,7 @@ from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import (
     MOTORS,
+    NO_GYRO,
     NOT_MEASURED,
     RESIDUALS,
     SPEEDS,
@@ -46,6 +47,7 @@ class Observed:
     modelled: Array  # (n, 10)
     missing: NDArray[np.str_]  # why a residual is unknown, empty where it is known, (n, 10)
     units: NDArray[np.str_]  # of the residuals, (10,)
+    yaw: Array  # gyro less wheels, and yaw rate as the wheels tell [rad/s], (n, 2)
 
     @classmethod
     def of(cls, name: str, frames: list[ResidualFrame]) -> Self:
@@ -64,16 +66,13 @@ class Observed:
             np.array([[item.modelled for item in row] for row in rows]),
             np.array([[item.missing for item in row] for row in rows], dtype=np.str_),
             np.array(units),
+            np.array([[frame.yaw.residual, frame.yaw.modelled] for frame in frames]),
         )
 
     @property
     def change(self) -> Array:
         """How far each modelled value moved over three ticks, (n, 10); 0 where it is not known."""
-        low, high = self.modelled.copy(), self.modelled.copy()
-        for back in range(1, _TRANSIENT_TICKS):
-            low[back:] = np.fmin(low[back:], self.modelled[:-back])
-            high[back:] = np.fmax(high[back:], self.modelled[:-back])
-        return np.nan_to_num(high - low)
+        return _moved(self.modelled)
 
     @property
     def hours(self) -> float:
@@ -117,7 +116,17 @@ class Observed:
             self.modelled[rows],
             self.missing[rows],
             self.units,
+            self.yaw[rows],
         )
+
+
+def _moved(values: Array) -> Array:
+    """How far each column moved over three ticks; 0 where it is not known."""
+    low, high = values.copy(), values.copy()
+    for back in range(1, _TRANSIENT_TICKS):
+        low[back:] = np.fmin(low[back:], values[:-back])
+        high[back:] = np.fmax(high[back:], values[:-back])
+    return np.nan_to_num(high - low)
 
 
 def observe(bag: Path, name: str, robot: Robot, settings: DiagnosisSettings) -> Observed:
@@ -157,6 +166,13 @@ def band_of(observed: Observed, bands: BandSettings) -> Array:
     return np.asarray(width + transient * observed.change)
 
 
+def yaw_band_of(observed: Observed, bands: BandSettings) -> Array:
+    """Half widths of the band of the yaw rate [rad/s], (n,)."""
+    wheels = observed.yaw[:, 1:]
+    width = np.maximum(bands.yaw, bands.yaw_relative * np.abs(np.nan_to_num(wheels)))
+    return np.asarray(width + bands.yaw_transient * _moved(wheels))[:, 0]
+
+
 def frames_of(observed: Observed, bands: BandSettings) -> list[ResidualFrame]:
     """The frames that the residual stage publishes with some bands."""
     width = band_of(observed, bands)
@@ -167,6 +183,7 @@ def frames_of(observed: Observed, bands: BandSettings) -> list[ResidualFrame]:
         width.tolist(),
         observed.modelled.tolist(),
         observed.missing.tolist(),
+        zip(observed.yaw.tolist(), yaw_band_of(observed, bands).tolist(), strict=True),
         strict=True,
     )
     return [
@@ -178,6 +195,7 @@ def frames_of(observed: Observed, bands: BandSettings) -> list[ResidualFrame]:
                     residuals, widths, models, units, absent, strict=True
                 )
             ),
+            yaw=Residual(yaw, rounded(band), wheels, "rad/s", "" if yaw == yaw else NO_GYRO),
         )
-        for stamp, residuals, widths, models, absent in rows
+        for stamp, residuals, widths, models, absent, ((yaw, wheels), band) in rows
     ]

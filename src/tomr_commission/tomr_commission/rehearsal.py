@@ -167,5 +167,11 @@ def observed_of(drive: Drive) -> Observed:
     missing = np.full(residual.shape, "", dtype=np.str_)
     stamps = (1 + np.arange(len(residual), dtype=np.int64)) * TICK_NS
     return Observed(
-        drive.mission.name, stamps, residual, np.asarray(compared.modelled), missing, units
+        drive.mission.name,
+        stamps,
+        residual,
+        np.asarray(compared.modelled),
+        missing,
+        units,
+        np.full((len(residual), 2), np.nan),  # a gyro is not simulated
     )

@@ -8,8 +8,11 @@ from xml.etree import ElementTree
 import yaml
 
 from tomr_fault_diag.classifier.messages import NAME
+from tomr_fault_diag.classifier.states import STATES
+from tomr_fault_diag.residuals.frame import residual_names
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
 from tomr_power_model.robot import shipped_robot
+from tomr_power_model.robot.parameters import NAMELESS
 from tomr_power_model.topics.predictions import prediction_topics
 
 CONFIG = Path(__file__).parents[1] / "config"
@@ -38,11 +41,14 @@ def test_foxglove_layout_shows_what_there_is() -> None:
 def test_plotjuggler_layout_shows_what_there_is() -> None:
     root = ElementTree.parse(CONFIG / "plotjuggler.xml").getroot()
     curves = [str(curve.get("name")) for curve in root.iter("curve")]
-    assert len(curves) == 15
+    assert len(curves) == 38
+    statuses = {f"/{RESIDUALS}/{NAMELESS}/{name}" for name in residual_names(ROBOT.wheel_topics)}
+    states = {f"/diagnostics/{NAMELESS}/{NAME}/p {state.name}" for state in STATES}
+    told = {f"{status}/{key}" for status in statuses for key in ("residual", "band", "modelled")}
     for curve in curves:
         joint = re.fullmatch(r"(.*)/(wheel_\d_joint)/velocity", curve)
         topic = joint[1] if joint else curve.removesuffix("/current")
-        assert topic in TOPICS
+        assert topic in TOPICS or curve in told | states
         assert joint is None or joint[2] in ROBOT.wheel_names
 
 

@@ -20,6 +20,7 @@ from tomr_fault_diag.classifier.belief import (
     ENCODERS,
     ENDED,
     EXTERNAL,
+    HYPOTHESES,
     LOADED,
     METERS,
     OTHER,
@@ -75,6 +76,8 @@ _SLIP_MARGIN = 4.0  # that slip need be less striking: a short one shows in few 
 # it would say it again and again.
 _CREEPING = (DRAGS, WEAKS, METERS)
 _SLIGHT = 1.0
+# What a gyro says for slip in a tick: so much for each band beyond the first, so much at most.
+_PER_BAND, _MOST_SAID = 8.0, 10.0
 _HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
 _OF_A_WHEEL = (*_HIDDEN, METERS)
 
@@ -155,11 +158,14 @@ class WindowJudge:
         count = 1 if self._slot is None else slot - self._slot
         self._slot = slot
         for _ in range(count):
-            self._opinion = self._step(channels_of(frame), unseen, _astray(frame))
+            self._opinion = self._step(
+                channels_of(frame), unseen, _astray(frame), _said_by_gyro(frame)
+            )
         return self._opinion
 
-    def _step(self, seen: Array, unseen: Unseen, astray: list[int]) -> Opinion:
-        """Opinion after one more tick of the network; `astray`: wheels that turn otherwise."""
+    def _step(self, seen: Array, unseen: Unseen, astray: list[int], gyro: Array) -> Opinion:
+        """Opinion after one more tick of the network; `astray`: wheels that turn otherwise,
+        `gyro`: what one says of the network's hypotheses besides."""
         self._window[:-1] = self._window[1:]
         self._window[-1] = seen
         self._lacking = max(self._lacking - 1, 0)
@@ -185,9 +191,11 @@ class WindowJudge:
             over = likelihoods[kind] - likelihoods[NORMAL]
             plain = np.sign(over) * np.maximum(np.abs(over) - _SLIGHT, 0.0)
             likelihoods[kind] = likelihoods[NORMAL] + plain
-        likelihoods = of_states(likelihoods)
+        likelihoods = of_states(likelihoods + gyro)
         shares = self._belief.update(likelihoods)
-        self._recent.append(_ratios(likelihoods))
+        striking = _ratios(likelihoods)
+        striking[ENCODERS] -= gyro[ENCODERS]  # a gyro alone accuses no encoder
+        self._recent.append(striking)
         group = max(_GROUPS, key=lambda group: float(shares[group].sum()))
         best = self._kept(shares, group)
         self._accuse(group)
@@ -254,6 +262,25 @@ def _ratios(likelihoods: Array) -> Array:
 def _astray(frame: ResidualFrame) -> list[int]:
     """Wheels whose speeds are far out of their bands."""
     return [wheel for wheel, index in enumerate(SPEEDS) if is_far(frame.residuals[index])]
+
+
+def _said_by_gyro(frame: ResidualFrame) -> Array:
+    """Log-likelihoods (19,) of the body's yaw rate over those if all wheels roll as they show.
+
+    Slip makes it another one, and need not; so does an encoder that shows too little, by turning
+    the body on as its wheel does. 0 within the band, without a gyro, and where an encoder shows
+    what it should not: then it is the encoders that are in doubt.
+    """
+    said, yaw = np.zeros(HYPOTHESES), frame.yaw
+    beyond = abs(yaw.residual) / yaw.band - 1.0
+    if not beyond > 0.0 or _astray(frame):  # nor where it is NaN
+        return said
+    said[[SLIP, OTHER]] = min(_PER_BAND * beyond, _MOST_SAID)
+    for wheel, index in enumerate(SPEEDS):
+        # A wheel that turns forwards turns the body clockwise (ros2_controllers' omni wheels).
+        if frame.residuals[index].modelled * yaw.residual < 0.0:
+            said[ENCODERS.start + wheel] = said[SLIP]
+    return said
 
 
 def _stands(window: Array, wheel: int) -> bool:

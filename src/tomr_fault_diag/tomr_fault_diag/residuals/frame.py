@@ -1,5 +1,6 @@
-"""The ten residuals of one tick, in the order of Wang 2024, Table 1."""
+"""The ten residuals of one tick, in the order of Wang 2024, Table 1, and what a gyro says."""
 
+import math
 from collections.abc import Mapping
 from typing import Literal
 
@@ -18,11 +19,15 @@ INPUT_ORDERS: Mapping[str, tuple[int, ...]] = {
     "powers_first": (TOTAL, *MOTORS, *ENCODERS, *SPEEDS),
 }
 
+YAW = "residuals: yaw rate against the gyro"
+
 # Why a residual is unknown: until the first command, and on robots without power of single motors.
 NO_COMMAND = "no fresh cmd_vel for the model"
 NOT_MEASURED = "not measured on this robot"
 GAP = "a gap in "  # and which stream: it paused, or went on only just before
 SCATTER = "the stamps of joint_states scatter too much to tell a speed"
+NOT_BELIEVED = "the gyro has not agreed with the wheels for long enough yet"
+NO_GYRO = "no fresh imu/data"
 FROZEN = " repeats itself while the motor works"  # and before it which stream
 
 Unit = Literal["W", "A", "rad/s"]
@@ -64,6 +69,7 @@ class ResidualFrame:
     stamp_ns: int
     residuals: tuple[Residual, ...]
     supply: float = float("nan")  # voltage of the supply over the nominal one, where it is told
+    yaw: Residual = Residual(math.nan, math.nan, math.nan, "rad/s", NO_GYRO)  # gyro - wheels
 
     @property
     def codes(self) -> tuple[int, ...]:

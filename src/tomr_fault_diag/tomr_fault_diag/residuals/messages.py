@@ -8,6 +8,7 @@ from tomr_fault_diag.residuals.frame import (
     RESIDUALS,
     TOTAL,
     UNITS,
+    YAW,
     Residual,
     ResidualFrame,
     residual_names,
@@ -29,7 +30,8 @@ def residual_message(
         _status(name, residual, hardware_id, [("supply", f"{frame.supply:.6g}")] * (not place))
         for place, (name, residual) in enumerate(zip(names, frame.residuals, strict=True))
     )
-    return DiagnosticMessage(TOPIC, frame.stamp_ns, statuses)
+    yaw = _status(YAW, frame.yaw, hardware_id, ())
+    return DiagnosticMessage(TOPIC, frame.stamp_ns, (*statuses, yaw))
 
 
 def _status(
@@ -73,10 +75,10 @@ def sentence(residual: Residual) -> str:
 def frame_of(message: Any, stamp_ns: int) -> ResidualFrame:
     """The frame that a message carries; raises Unusable if it carries none."""
     statuses = message.status
-    if len(statuses) != RESIDUALS:
-        raise Unusable(f"{len(statuses)} statuses, a frame has {RESIDUALS}")
-    residuals = tuple(_residual(status) for status in statuses)
-    return ResidualFrame(stamp_ns, residuals, _supply(statuses[TOTAL]))
+    if len(statuses) != RESIDUALS + 1:
+        raise Unusable(f"{len(statuses)} statuses, a frame has {RESIDUALS + 1}")
+    *residuals, yaw = (_residual(status) for status in statuses)
+    return ResidualFrame(stamp_ns, tuple(residuals), _supply(statuses[TOTAL]), yaw)
 
 
 def _supply(status: Any) -> float:

@@ -22,6 +22,7 @@ def _live(
 RESIDUAL_PARAMETERS: tuple[ParameterSpec, ...] = (
     *TICK_PARAMETERS,
     HARDWARE_ID,
+    ParameterSpec("watch_gyro", "compare the yaw rate of imu/data with the wheels'", "bool", True),
     ParameterSpec("encoder_window", "span of the fit to the encoders", "float", 0.07, "s", 0.01, 1),
     _live("band.relative", "of the modelled power or current of a motor", 0.6),
     _live("band.power", "least band of a motor's power", 1.1, "W", LEAST_BAND),
@@ -32,6 +33,11 @@ RESIDUAL_PARAMETERS: tuple[ParameterSpec, ...] = (
     _live("band.speed", "least band of a wheel speed", 0.1, "rad/s", LEAST_BAND),
     _live("band.speed_relative", "of the expected wheel speed", 0.01),
     _live("band.speed_transient", "part of the expected speed's change over the last ticks", 0.1),
+    _live(
+        "band.yaw", "least band of a gyro's yaw rate against the wheels'", 0.1, "rad/s", LEAST_BAND
+    ),
+    _live("band.yaw_relative", "of the yaw rate that the wheels tell", 0.1),
+    _live("band.yaw_transient", "part of that yaw rate's change over the last ticks", 1.0),
 )
 
 
@@ -53,6 +59,9 @@ class BandSettings:
     speed: float = 0.1  # rad/s
     speed_relative: float = 0.01
     speed_transient: float = 0.1
+    yaw: float = 0.1  # rad/s
+    yaw_relative: float = 0.1
+    yaw_transient: float = 1.0
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:
@@ -89,6 +98,7 @@ class ResidualSettings:
     encoder_window: int = to_ns(0.07)
     bands: BandSettings = field(factory=BandSettings)
     hardware_id: str = NAMELESS
+    watch_gyro: bool = True
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:
@@ -99,4 +109,5 @@ class ResidualSettings:
             encoder_window=to_ns(cast(float, values["encoder_window"])),
             bands=BandSettings.of(values),
             hardware_id=str(values["hardware_id"]) or NAMELESS,
+            watch_gyro=bool(values["watch_gyro"]),
         )

@@ -11,6 +11,8 @@ from tomr_fault_diag.residuals.frame import (
     GAP,
     MOTORS,
     NO_COMMAND,
+    NO_GYRO,
+    NOT_BELIEVED,
     NOT_MEASURED,
     SCATTER,
     Residual,
@@ -18,6 +20,7 @@ from tomr_fault_diag.residuals.frame import (
     Unit,
     rounded,
 )
+from tomr_fault_diag.residuals.gyro import GyroWatch, yaw_of
 from tomr_fault_diag.residuals.measured import Measured, SupplyWindow
 from tomr_fault_diag.residuals.repeats import RepeatWatch, Work
 from tomr_fault_diag.residuals.scatter import ScatterWatch
@@ -30,14 +33,17 @@ from tomr_power_model.drive.sources import (
     PowerReading,
     motor_topics,
 )
+from tomr_power_model.dynamics.body import Body
 from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.readings import NAN, UNKNOWN_READING
 from tomr_power_model.model.continuity import POWER_TOLERANCE, Continuity
+from tomr_power_model.model.encoder_flaws import EncoderFlaws
 from tomr_power_model.model.encoders import (
     UNKNOWN,
     EncoderSample,
     EncoderWindow,
     Triple,
+    WheelEstimate,
 )
 from tomr_power_model.model.input_health import InputReporter, InputState
 from tomr_power_model.model.prediction import Prediction
@@ -46,6 +52,7 @@ from tomr_power_model.robot import WHEELS, Robot
 
 PREDICTIONS = "predictions"
 ENCODERS = "joint_states"
+IMU = "imu/data"
 
 # The model's change over so long, in ticks, widens the band: where power jumps, a lag of a few
 # milliseconds between the streams is a large residual.
@@ -111,6 +118,9 @@ class ResidualStage:
         lately = max(_FEWEST, round(_TRANSIENT / ticks.period))
         self._recent: deque[_Modelled] = deque(maxlen=lately)
         self._scatter = ScatterWatch(fastest)
+        self._gyro = GyroWatch(ticks.period)
+        self._flaws = EncoderFlaws.of(robot)
+        self._turning = Body.of(robot).to_twist[2].tolist()  # yaw rate per wheel speed
         self._decided = 0  # newest tick
 
     def retune(self, bands: BandSettings) -> None:
@@ -153,6 +163,13 @@ class ResidualStage:
                 self._repeats[supply].take(stamp, (reading.voltage, reading.current, reading.power))
         else:
             self._flows[supply].precedes(stamp)
+        return arrival
+
+    def imu(self, stamp_ns: int, yaw_rate: float) -> Arrival:
+        """Take a gyro's yaw rate [rad/s]."""
+        arrival = self._arrive(IMU, stamp_ns)
+        if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
+            self._gyro.add(stamp_ns, yaw_rate)
         return arrival
 
     def refused(self, topic: str) -> None:
@@ -203,6 +220,7 @@ class ResidualStage:
             self._decided = 0
             self._encoders.leap()
             self._scatter.clear()
+            self._gyro.clear()
             self._predictions.clear()
             self._recent.clear()
         return arrival
@@ -214,7 +232,8 @@ class ResidualStage:
         prediction = known or _no_prediction(tick)
         self._recent.append(_Modelled.of(prediction))
         absent = "" if known else "no prediction: is the power_model node running?"
-        speeds = self._speeds(tick, absent)
+        estimate = self._encoders.at(tick)
+        speeds = self._speeds(tick, estimate, absent)
         motors = [self._supply(tick, wheel, speeds[wheel]) for wheel in range(WHEELS)]
         return ResidualFrame(
             tick,
@@ -225,6 +244,7 @@ class ResidualStage:
                 *(self._derived(wheel, motors[wheel], absent) for wheel in range(WHEELS)),
             ),
             self._supply_share(tick),
+            self._yaw(tick, estimate, speeds),
         )
 
     def _supply_share(self, tick: int) -> float:
@@ -294,8 +314,7 @@ class ResidualStage:
             measured.value, models, measured.unit, least, measured.missing, absent, unmodelled
         )
 
-    def _speeds(self, tick: int, absent: str) -> list[Residual]:
-        estimate = self._encoders.at(tick)
+    def _speeds(self, tick: int, estimate: WheelEstimate, absent: str) -> list[Residual]:
         bands = self.settings.bands
         pauses = self._encoders.continuity.is_broken(tick)
         is_fresh = tick - self._encoders.continuity.last(tick) < self.settings.stale
@@ -323,6 +342,23 @@ class ResidualStage:
                 )
             )
         return speeds
+
+    def _yaw(self, tick: int, estimate: WheelEstimate, speeds: list[Residual]) -> Residual:
+        """What a gyro measures less what the wheels tell."""
+        bands, measured = self.settings.bands, self._gyro.rate(tick)
+        wheels = yaw_of(self._turning, self._flaws.turned(estimate).speed.tolist())
+        if any(speed.residual != speed.residual for speed in speeds):
+            wheels = NAN
+        band = max(bands.yaw, bands.yaw_relative * abs(wheels))
+        band += bands.yaw_transient * self._gyro.spread(wheels)
+        unmodelled = "no fresh joint_states"
+        residual, missing = measured - wheels, _missing(measured, wheels, NO_GYRO, "", unmodelled)
+        self._gyro.compare(wheels, residual, band)
+        if not missing and not self._gyro.is_believed:
+            missing = NOT_BELIEVED
+        if missing:
+            return Residual(NAN, NAN, NAN, "rad/s", missing)
+        return Residual(rounded(residual), rounded(band), rounded(wheels), "rad/s")
 
     def _least(self, unit: Unit) -> float:
         bands = self.settings.bands

@@ -94,7 +94,8 @@ class StageNode(Node):
     def _subscribe(self, item: Input, advance: Callable[[], None], qos: QoSProfile) -> None:
         clock = self.get_clock()
         self._note("listens to", item.topic, item.type_name)
-        self._unheard.add(item.topic)
+        if not item.is_optional:
+            self._unheard.add(item.topic)
 
         def subscribe(type_name: str) -> Any:
             kind = message_class(type_name)

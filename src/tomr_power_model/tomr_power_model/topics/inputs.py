@@ -47,14 +47,16 @@ class Input:
     other_types: tuple[str, ...] = ()
     # Whether a message of this stamp [ns] is left out, told before the rest of it is read.
     is_too_close: Callable[[int], bool] | None = None
+    is_optional: bool = False  # whether a robot may well lack it
 
 
 class Thinning:
     """Leaves out samples that come more closely than nodes take those of a topic: they tell nothing
     more. What `Flow` lets through of a flood is uneven, and recordings know nothing of it."""
 
-    def __init__(self) -> None:
-        self._closest = NANOSECONDS // limits().topic_rate
+    def __init__(self, closest_ns: int = 0) -> None:
+        """`closest_ns`: that samples may come, where that is farther than the nodes' limit."""
+        self._closest = max(closest_ns, NANOSECONDS // limits().topic_rate)
         self._last = 0
 
     def is_too_close(self, stamp_ns: int) -> bool:

@@ -1,0 +1,150 @@
+"""The gyro's yaw rate beside that of the wheels: when it is believed, and what it says."""
+
+import math
+from collections.abc import Callable
+
+import pytest
+from attrs import evolve
+
+from tomr_fault_diag.classifier.judges import make_judge
+from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.classifier.stage import FaultClassifier
+from tomr_fault_diag.residuals.frame import (
+    NO_GYRO,
+    NOT_BELIEVED,
+    RESIDUALS,
+    SPEEDS,
+    YAW,
+    Residual,
+    ResidualFrame,
+)
+from tomr_fault_diag.residuals.gyro import GyroWatch
+from tomr_fault_diag.residuals.messages import frame_of, residual_message
+from tomr_fault_diag.residuals.settings import ResidualSettings
+from tomr_fault_diag.residuals.sources import residual_inputs
+from tomr_fault_diag.residuals.stage import ResidualStage
+from tomr_power_model.geometry.kinematics import wheels_to_twist
+from tomr_power_model.messages.bag import to_bag
+from tomr_power_model.messages.readings import SupplyReading
+from tomr_power_model.model.prediction import Prediction
+from tomr_power_model.robot import shipped_robot
+
+MS = 1_000_000
+BASE = 1_700_000_000_000 * MS
+ROBOT = shipped_robot("reference")
+SPEED = (3.0, 4.0, 5.0)
+RATE = float(wheels_to_twist(ROBOT)[2] @ SPEED)  # rad/s
+
+
+def frames(gyro: Callable[[int], float | None], until_ms: int = 6000) -> dict[int, ResidualFrame]:
+    """By time [ms]; wheels turn at SPEED, `gyro` says what is measured at a time, None: nothing."""
+    stage = ResidualStage(ROBOT)
+    reading = SupplyReading.rounded(24.0, 0.4)
+    found = {}
+    for at_ms in range(0, until_ms, 10):
+        stamp = BASE + at_ms * MS
+        if at_ms % 50 == 0:
+            motors = (reading, reading, reading)
+            stage.prediction(Prediction(stamp, SPEED, SPEED, motors, reading, motors))
+        first, second, third = (1e-3 * at_ms * speed for speed in SPEED)
+        stage.encoders(stamp, (first, second, third), SPEED)
+        rate = gyro(at_ms)
+        if rate is not None:
+            stage.imu(stamp, rate)
+        found.update({(frame.stamp_ns - BASE) // MS: frame for frame in stage.due()})
+    return found
+
+
+def test_a_gyro_is_believed_once_it_has_agreed_for_two_seconds_of_turning() -> None:
+    found = frames(lambda at_ms: RATE)
+    missing = {at_ms: frame.yaw.missing for at_ms, frame in found.items() if at_ms >= 200}
+    first = min(at_ms for at_ms, why in missing.items() if not why)
+    assert 1900 <= first <= 2400
+    assert {why for at_ms, why in missing.items() if at_ms < first} == {NOT_BELIEVED}
+    assert found[5000].yaw.residual == pytest.approx(0.0, abs=1e-6)
+    assert found[5000].yaw.modelled == pytest.approx(RATE, rel=1e-5)
+
+
+def test_what_differs_then_is_told_over_its_band() -> None:
+    found = frames(lambda at_ms: RATE if at_ms < 4000 else RATE - 0.5)
+    assert found[3900].yaw.code == 0
+    assert found[5000].yaw.residual == pytest.approx(-0.5, abs=1e-6)
+    assert found[5000].yaw.code == -1
+    assert found[5000].yaw.band == pytest.approx(max(0.1, 0.1 * abs(RATE)), rel=1e-3)
+
+
+@pytest.mark.parametrize("rate", [-RATE, 0.0, 2.0 * RATE])
+def test_a_gyro_that_is_mounted_otherwise_is_never_believed(rate: float) -> None:
+    found = frames(lambda at_ms: rate)
+    assert {frame.yaw.missing for frame in found.values()} <= {
+        NOT_BELIEVED,
+        "no fresh joint_states",
+    }
+
+
+def test_a_robot_without_one_misses_nothing_else() -> None:
+    with_one, without = frames(lambda at_ms: RATE), frames(lambda at_ms: None)
+    assert {frame.yaw.missing for frame in without.values()} == {NO_GYRO}
+    assert repr(without[5000].residuals) == repr(with_one[5000].residuals)
+
+
+def test_a_robot_that_does_not_turn_proves_no_gyro() -> None:
+    watch = GyroWatch(50 * MS)
+    for _ in range(500):
+        watch.compare(0.1, 0.0, 0.1)
+    assert not watch.is_believed
+
+
+def test_the_mean_is_of_the_tick() -> None:
+    watch = GyroWatch(50 * MS)
+    for at_ms, rate in ((40, 9.0), (60, 1.0), (80, 2.0), (100, 3.0), (120, 9.0)):
+        watch.add(at_ms * MS, rate)
+    assert watch.rate(100 * MS) == pytest.approx(2.0)
+    assert math.isnan(watch.rate(200 * MS))
+
+
+def test_it_is_left_out_where_the_robot_says_so() -> None:
+    settings = ResidualSettings(watch_gyro=False)
+    topics = {item.topic for item in residual_inputs(ROBOT, ResidualStage(ROBOT, settings))}
+    assert "imu/data" not in topics
+    (gyro,) = (
+        item for item in residual_inputs(ROBOT, ResidualStage(ROBOT)) if item.topic == "imu/data"
+    )
+    assert gyro.is_optional
+
+
+def test_it_travels_with_the_residuals() -> None:
+    found = frames(lambda at_ms: RATE if at_ms < 4000 else RATE - 0.5)
+    for frame in (found[500], found[5000]):
+        message = to_bag(residual_message(ROBOT, frame).plain)
+        assert message.status[RESIDUALS].name == YAW
+        back = frame_of(message, frame.stamp_ns).yaw
+        assert (back.residual == frame.yaw.residual) or (back.stale and frame.yaw.stale)
+        assert back.missing == frame.yaw.missing
+
+
+def named(yaw: float) -> list[str]:
+    """States named of a robot whose residuals are 0, but for the yaw rate, after two seconds."""
+    classifier = FaultClassifier(make_judge(ClassifierSettings()))
+    speeds = tuple(Residual(0.0, 0.2, want, "rad/s") for want in SPEED)
+    power = Residual(0.0, 2.0, 4.0)
+    healthy = (power,) * SPEEDS.start + speeds + (power,) * (RESIDUALS - SPEEDS.stop)
+    states = []
+    for tick in range(100):
+        frame = ResidualFrame(BASE + 50 * tick * MS, healthy)
+        if tick >= 40:
+            frame = evolve(frame, yaw=Residual(yaw, 0.2, RATE, "rad/s"))
+        diagnosis = classifier.classify(frame)
+        if diagnosis is not None and diagnosis.changed:
+            states.append(diagnosis.state.name)
+    return states
+
+
+def test_a_body_that_turns_otherwise_than_its_wheels_say_slips() -> None:
+    assert named(-0.6) == ["normal", "slip"]
+    assert named(0.6) == ["normal", "slip"]
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.19, math.nan])
+def test_within_the_band_or_without_a_gyro_nothing_is_said(yaw: float) -> None:
+    assert named(yaw) == ["normal"]

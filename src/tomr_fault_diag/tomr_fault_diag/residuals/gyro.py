@@ -1,0 +1,71 @@
+"""The yaw rate that a gyro measures beside that of the wheels: where they differ, wheels slide or
+encoders are wrong.
+
+A gyro that is mounted otherwise, or belongs to another robot, differs always. So one is believed
+only once it has agreed with the wheels while the robot turned for a while.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+
+from tomr_power_model.model.ticks import to_ns
+
+_TURNS = 0.2  # rad/s: slower turning says nothing of how a gyro is mounted
+_AGREED = 40  # ticks of turning in which it has to agree, one after another
+_SPREAD = 3  # ticks over which the change of the wheels' yaw rate counts
+_MOST_HZ = 60  # samples beyond tell nothing more
+CLOSEST_NS = to_ns(1.0 / _MOST_HZ)
+
+
+class GyroWatch:
+    """Samples of the last moments, and whether the gyro is believed."""
+
+    def __init__(self, period_ns: int) -> None:
+        """`period_ns` of the ticks."""
+        self._period = max(period_ns, to_ns(0.05))
+        self._samples: deque[tuple[int, float]] = deque()
+        self._agreed = 0  # ticks
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all samples; whether it is believed stays: it is the same gyro."""
+        self._samples.clear()
+        self._recent: deque[float] = deque(maxlen=_SPREAD)
+
+    @property
+    def is_believed(self) -> bool:
+        """Whether it has agreed with the wheels for long enough."""
+        return self._agreed >= _AGREED
+
+    def add(self, stamp_ns: int, yaw_rate: float) -> None:
+        """Take a sample newer than those before [rad/s]."""
+        self._samples.append((stamp_ns, yaw_rate))
+
+    def rate(self, tick_ns: int) -> float:
+        """Mean yaw rate of the window that ends at a tick [rad/s]; NaN without a sample in it."""
+        samples, begin = self._samples, tick_ns - self._period
+        while samples and samples[0][0] <= begin:
+            samples.popleft()
+        found = [rate for stamp, rate in samples if stamp <= tick_ns]
+        return sum(found) / len(found) if found else float("nan")
+
+    def spread(self, wheels: float) -> float:
+        """How far the yaw rate that the wheels tell [rad/s] moved lately, the newest included."""
+        if wheels != wheels:  # NaN
+            return 0.0
+        self._recent.append(wheels)
+        return max(self._recent) - min(self._recent)
+
+    def compare(self, wheels: float, residual: float, band: float) -> None:
+        """Take note of how a tick's yaw rates [rad/s] agree."""
+        if self.is_believed or residual != residual:
+            return
+        if abs(residual) > band:
+            self._agreed = 0
+        elif abs(wheels) > _TURNS:
+            self._agreed += 1
+
+
+def yaw_of(to_twist: Sequence[float], speed: Sequence[float]) -> float:
+    """Yaw rate of the body [rad/s] from wheel speeds [rad/s] and the last row of their inverse."""
+    return sum(k * w for k, w in zip(to_twist, speed, strict=True))
