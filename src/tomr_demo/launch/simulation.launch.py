@@ -1,25 +1,20 @@
 """Simulate a robot, and diagnose it too unless told otherwise."""
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
+from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, OpaqueFunction
 from launch.conditions import IfCondition
 from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, PythonExpression
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
+
+from tomr_power_model.launching import ROBOT_FILE, find_files
 
 
 def generate_launch_description() -> LaunchDescription:
     """Start the simulator, which also gives the time, and the nodes of the diagnosis."""
     robot = LaunchConfiguration("robot")
-    # A file, or the name of a robot that is shipped.
-    robot_file = PythonExpression(
-        [
-            *("'", robot, "' if '", robot, "'.endswith(('.yaml', '.yml')) else "),
-            *("'", FindPackageShare("tomr_power_model"), "/robots/", robot, ".yaml'"),
-        ]
-    )
     namespace = LaunchConfiguration("namespace")
     factor = ParameterValue(LaunchConfiguration("real_time_factor"), value_type=float)
     clock = ParameterValue(LaunchConfiguration("publish_clock"), value_type=bool)
@@ -54,11 +49,15 @@ def generate_launch_description() -> LaunchDescription:
                 default_value="false",
                 description="true: the diagnosis in one process",
             ),
+            OpaqueFunction(function=find_files),
             Node(
                 package="tomr_sim_bridge",
                 executable="sim_bridge",
                 namespace=namespace,
-                parameters=[robot_file, {"real_time_factor": factor, "publish_clock": clock}],
+                parameters=[
+                    LaunchConfiguration(ROBOT_FILE),
+                    {"real_time_factor": factor, "publish_clock": clock},
+                ],
                 output="screen",
             ),
             IncludeLaunchDescription(

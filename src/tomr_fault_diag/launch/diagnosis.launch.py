@@ -1,21 +1,14 @@
 """Diagnose a robot: from its commands, encoders and motor power to /diagnostics."""
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.conditions import IfCondition, UnlessCondition
-from launch.substitutions import LaunchConfiguration, PythonExpression
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
-from launch_ros.substitutions import FindPackageShare
 
-ROBOT = LaunchConfiguration("robot")
-# A file, or the name of a robot that is shipped.
-ROBOT_FILE = PythonExpression(
-    [
-        *("'", ROBOT, "' if '", ROBOT, "'.endswith(('.yaml', '.yml')) else "),
-        *("'", FindPackageShare("tomr_power_model"), "/robots/", ROBOT, ".yaml'"),
-    ]
-)
+from tomr_power_model.launching import ROBOT_FILE, SETTINGS_FILE, find_files
+
 ARGUMENTS = (
     DeclareLaunchArgument(
         "robot",
@@ -25,9 +18,8 @@ ARGUMENTS = (
     ),
     DeclareLaunchArgument(
         "settings",
-        # A file is needed either way: by default the robot's once more, which changes nothing.
-        default_value=ROBOT_FILE,
-        description="parameter file with settings of the nodes, such as cmd_vel_type",
+        default_value="",
+        description="parameter file with settings of the nodes, such as cmd_vel_type; empty: none",
     ),
     DeclareLaunchArgument(
         "use_sim_time",
@@ -68,7 +60,7 @@ def stage(
     *parameters: dict[str, ParameterValue], package: str, executable: str, composed: bool = False
 ) -> Node:
     """One node of the diagnosis, with the parameters it has besides those of all."""
-    files = [ROBOT_FILE, LaunchConfiguration("settings")]
+    files = [LaunchConfiguration(ROBOT_FILE), LaunchConfiguration(SETTINGS_FILE)]
     condition = IfCondition if composed else UnlessCondition
     return Node(
         package=package,
@@ -87,6 +79,7 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             *ARGUMENTS,
+            OpaqueFunction(function=find_files),
             stage(rate, name, package="tomr_power_model", executable="power_model"),
             stage(rate, name, package="tomr_fault_diag", executable="power_residuals"),
             stage(name, package="tomr_fault_diag", executable="fault_classifier"),

@@ -252,7 +252,8 @@ def test_a_gap_is_no_time_in_which_a_fault_recovers() -> None:
 def test_every_state_that_is_wrong_says_what_to_check_and_which_of_the_six_it_is() -> None:
     named = [value for value in vars(states).values() if isinstance(value, State)]
     for state in (*STATES, *POWER_SENSOR, *named):
-        assert bool(check_first(state)) == (state.level is not Level.OK), state
+        told = state.level is not Level.OK or state is states.NOT_ENOUGH
+        assert bool(check_first(state)) == told, state
         paper = "unknown" if state.paper is None else STATES[state.paper].name
         assert six_state(state) == paper
     found = next(d for d in classified(FAULTY) if d.changed and d.state is STATES[MOTOR + 1])

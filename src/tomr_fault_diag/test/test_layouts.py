@@ -55,6 +55,28 @@ def test_plotjuggler_layout_shows_what_there_is() -> None:
 def test_aggregator_takes_the_statuses_of_every_robot() -> None:
     document = yaml.safe_load((CONFIG / "aggregator.yaml").read_text())
     analyzers = document["/**"]["ros__parameters"]["analyzers"].values()
-    for name in (NAME, f"/robot_2/{NAME}", "inputs: joint_states", "/robot_2/inputs: cmd_vel"):
+    names = (
+        NAME,
+        f"/robot_2/{NAME}",
+        "inputs: joint_states",
+        "/robot_2/inputs: cmd_vel",
+        "slip_odometry",
+    )
+    for name in names:
         taking = [a for a in analyzers if any(part in name for part in a["contains"])]
         assert len(taking) == 1, name
+
+
+def test_aggregator_of_several_robots_takes_the_statuses_of_each() -> None:
+    document = yaml.safe_load((CONFIG / "aggregator_fleet.yaml").read_text())
+    groups = document["/**"]["ros__parameters"]["analyzers"]
+    for robot, group in groups.items():
+        starts = [
+            start
+            for analyzer in group["analyzers"].values()
+            for key in ("startswith", "find_and_remove_prefix")
+            for start in analyzer.get(key, [])
+        ]
+        for name in (NAME, "inputs: joint_states", "slip_odometry"):
+            assert sum(f"/{robot}/{name}".startswith(start) for start in starts) == 1, name
+            assert not any(f"/another/{name}".startswith(start) for start in starts)

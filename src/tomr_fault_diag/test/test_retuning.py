@@ -99,6 +99,25 @@ def test_after_a_pause_what_is_retuned_and_cleared_is_the_new(
     assert answer.message == "slip is cleared"
 
 
+@pytest.mark.parametrize("node", ["classifier", "diagnosis"], indirect=True)
+def test_a_node_to_which_nothing_comes_says_so(
+    node: StageNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sent: list[DiagnosticMessage] = []
+    monkeypatch.setattr(node, "send", sent.append)
+    *_, timer = node.timers  # the one before looks which type cmd_vel has
+    timer.callback()
+    assert not sent  # it has only just begun
+    monkeypatch.setattr(node, "_heard_at", node._heard_at - 3.5)
+    timer.callback()
+    (status,) = sent[0].statuses
+    assert (status.level, sent[0].topic) == (Level.STALE, "/diagnostics")
+    assert "is their namespace right?" in status.message
+    node.heard_now()
+    timer.callback()
+    assert len(sent) == 1
+
+
 def held(node: DiagnosisNode) -> list[int]:
     """How much a node has, and how much it says that it has."""
     entities = (node.services, node.publishers, node.subscriptions, node.timers)

@@ -1,28 +1,21 @@
 """Odometry that knows of slip."""
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
-from launch.substitutions import LaunchConfiguration, PythonExpression
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
-from launch_ros.substitutions import FindPackageShare
 
-ROBOT = LaunchConfiguration("robot")
-# A file, or the name of a robot that is shipped.
-ROBOT_FILE = PythonExpression(
-    [
-        *("'", ROBOT, "' if '", ROBOT, "'.endswith(('.yaml', '.yml')) else "),
-        *("'", FindPackageShare("tomr_power_model"), "/robots/", ROBOT, ".yaml'"),
-    ]
-)
+from tomr_power_model.launching import ROBOT_FILE, SETTINGS_FILE, find_files
+
 ARGUMENTS = (
     DeclareLaunchArgument(
         "robot", default_value="reference", description="robot.yaml, or a shipped robot by name"
     ),
     DeclareLaunchArgument(
         "settings",
-        default_value=ROBOT_FILE,
-        description="parameter file with settings of the node, such as publish_tf",
+        default_value="",
+        description="parameter file with settings of the node, such as publish_tf; empty: none",
     ),
     DeclareLaunchArgument("use_sim_time", default_value="false", description="time of /clock"),
     DeclareLaunchArgument("namespace", default_value="", description="of the robot's topics"),
@@ -36,10 +29,10 @@ def generate_launch_description() -> LaunchDescription:
         executable="slip_odometry",
         namespace=LaunchConfiguration("namespace"),
         parameters=[
-            ROBOT_FILE,
-            LaunchConfiguration("settings"),
+            LaunchConfiguration(ROBOT_FILE),
+            LaunchConfiguration(SETTINGS_FILE),
             {"use_sim_time": ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)},
         ],
         output="screen",
     )
-    return LaunchDescription([*ARGUMENTS, node])
+    return LaunchDescription([*ARGUMENTS, OpaqueFunction(function=find_files), node])

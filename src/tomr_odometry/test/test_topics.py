@@ -54,6 +54,17 @@ def test_covariances_stand_where_their_coordinates_are(resting: Estimate) -> Non
         assert np.count_nonzero(full) == 12
 
 
+def test_the_status_tells_which_robot_it_is_of(resting: Estimate) -> None:
+    item = evolve(resting, stamp_ns=START)
+    for namespace, settings, name, hardware_id in (
+        ("", SETTINGS, "slip_odometry", "tomr"),
+        ("robot_2", OdometrySettings(hardware_id="two"), "/robot_2/slip_odometry", "two"),
+    ):
+        messages = estimate_messages(ROBOT, item, settings, namespace)
+        found = {one.topic: to_bag(one.message) for one in messages}[STATUS_TOPIC]
+        assert (found.status[0].name, found.status[0].hardware_id) == (name, hardware_id)
+
+
 def test_a_transform_is_published_on_request_only(resting: Estimate) -> None:
     assert TF_TOPIC not in published(resting)
     item = evolve(resting, pose=np.array([1.0, 2.0, 0.5]))

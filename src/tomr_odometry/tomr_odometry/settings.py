@@ -10,7 +10,7 @@ from tomr_odometry.kernel import Noise
 from tomr_power_model.errors import InputError
 from tomr_power_model.model.settings import GAP, tick_settings
 from tomr_power_model.model.ticks import TickSettings, to_ns
-from tomr_power_model.robot.parameters import ParameterSpec, check_all
+from tomr_power_model.robot.parameters import HARDWARE_ID, NAMELESS, ParameterSpec, check_all
 
 _S = ParameterSpec
 PARAMETERS: tuple[ParameterSpec, ...] = (
@@ -24,6 +24,7 @@ PARAMETERS: tuple[ParameterSpec, ...] = (
     _S("odom_frame", "frame of the pose", "str", "odom"),
     _S("base_frame", "frame of the robot", "str", "base_link"),
     _S("publish_tf", "odom_frame to base_frame on /tf as well", "bool", False),
+    HARDWARE_ID,
     _S("publish_floor", "where wheels slid, on floor_traction, each second", "bool", False),
 )
 
@@ -45,6 +46,7 @@ class OdometrySettings:
     base_frame: str = "base_link"
     publish_tf: bool = False
     publish_floor: bool = False
+    hardware_id: str = NAMELESS
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:
@@ -58,6 +60,7 @@ class OdometrySettings:
             base_frame=str(values["base_frame"]),
             publish_tf=bool(values["publish_tf"]),
             publish_floor=bool(values["publish_floor"]),
+            hardware_id=str(values["hardware_id"]) or NAMELESS,
         )
 
     @classmethod

@@ -36,6 +36,7 @@ from tomr_power_model.robot import Robot
 from tomr_power_model.topics.inputs import Input, guarded, measured_inputs
 
 ODOM_TOPIC, SLIP_TOPIC, STATUS_TOPIC = "odom_slip", "slip", "/diagnostics"
+STATUS = "slip_odometry"
 TF_TOPIC, FLOOR_TOPIC = "/tf", "floor_traction"
 FLOOR = "nav_msgs/msg/OccupancyGrid"
 _SIGMAS = 2.0  # of the interval of a traction
@@ -136,7 +137,7 @@ def _floor(item: Estimate, grid: Grid, settings: OdometrySettings) -> Plain:
     return Plain(FLOOR, fields)
 
 
-def _status(robot: Robot, item: Estimate) -> Status:
+def _status(robot: Robot, item: Estimate, namespace: str, hardware_id: str) -> Status:
     """What the estimate rests on; a number alone in each value, for PlotJuggler."""
     values = [("slipping", f"{float(item.is_slipping):g}")]
     for wheel, name in enumerate(robot.wheel_topics):
@@ -155,11 +156,13 @@ def _status(robot: Robot, item: Estimate) -> Status:
         values += [(f"{name}_{what}", f"{number:.4g}") for what, number in numbers.items()]
     values += [(name, f"{value:.5g}") for name, value in item.learnt]
     level = Level.WARN if item.is_slipping or item.missing else Level.OK
-    return Status("slip_odometry", level, item.words, tuple(values), "tomr")
+    # Robots share /diagnostics: there the names of statuses begin with their namespaces.
+    name = f"/{namespace}/{STATUS}" if namespace else STATUS
+    return Status(name, level, item.words, tuple(values), hardware_id)
 
 
 def estimate_messages(
-    robot: Robot, item: Estimate, settings: OdometrySettings
+    robot: Robot, item: Estimate, settings: OdometrySettings, namespace: str = ""
 ) -> Iterator[Published]:
     """What is published of an estimate.
 
@@ -180,7 +183,9 @@ def estimate_messages(
         ),
     )
     if item.stamp_ns % STATUS_PERIOD < settings.ticks.period:
-        message = diagnostics(item.stamp_ns, [_status(robot, item)])
+        message = diagnostics(
+            item.stamp_ns, [_status(robot, item, namespace, settings.hardware_id)]
+        )
         yield Published(STATUS_TOPIC, item.stamp_ns, message)
     if item.floor is not None:
         message = _floor(item, item.floor, settings)

@@ -1,5 +1,7 @@
 """A diagnosis as a DiagnosticArray (REP-107)."""
 
+import math
+
 from tomr_fault_diag.classifier.advice import check_first
 from tomr_fault_diag.classifier.stage import Diagnosis
 from tomr_fault_diag.classifier.states import (
@@ -14,7 +16,14 @@ from tomr_fault_diag.classifier.states import (
     WAITING,
     State,
 )
-from tomr_fault_diag.residuals.frame import GAP, residual_names
+from tomr_fault_diag.residuals.frame import (
+    GAP,
+    RESIDUALS,
+    YAW,
+    Residual,
+    ResidualFrame,
+    residual_names,
+)
 from tomr_fault_diag.residuals.messages import sentence
 from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.plain import Level, Status
@@ -23,6 +32,7 @@ from tomr_power_model.robot import Robot
 
 TOPIC = "/diagnostics"
 NAME = "fault_classifier: drive"
+SILENCE = "nothing comes on the topics of this robot: is their namespace right?"
 
 
 def diagnosis_message(
@@ -48,14 +58,27 @@ def diagnosis_message(
     return DiagnosticMessage(TOPIC, diagnosis.stamp_ns, (status,))
 
 
+def silence_message(
+    robot: Robot, stamp_ns: int, hardware_id: str, commissioned: str = "no"
+) -> DiagnosticMessage:
+    """What a node says to which nothing comes at all: a wrong namespace, or a robot that is off."""
+    unknown = Residual(math.nan, math.nan, math.nan, missing=SILENCE)
+    frame = ResidualFrame(stamp_ns, (unknown,) * RESIDUALS)
+    said = Diagnosis(stamp_ns, STALE, stamp_ns, (), frame, changed=False)
+    return diagnosis_message(robot, said, hardware_id, commissioned)
+
+
 def evidence_of(robot: Robot, diagnosis: Diagnosis) -> list[str]:
     """The residuals outside their bands, and those that are missing, in words."""
     names = residual_names(robot.wheel_topics)
-    return [
+    found = [
         f"{name.removeprefix('residuals: ')}: {sentence(residual)}"
         for name, residual in zip(names, diagnosis.frame.residuals, strict=True)
         if residual.code or residual.stale
     ]
+    if diagnosis.frame.yaw.code:
+        found.append(f"{YAW.removeprefix('residuals: ')}: {sentence(diagnosis.frame.yaw)}")
+    return found
 
 
 def six_state(state: State) -> str:

@@ -52,7 +52,9 @@ UNKNOWN = State("unknown", Level.WARN)
 LOW_SUPPLY = State("low supply", Level.WARN)  # its voltage lies below what is normal
 WAITING = State("waiting", Level.OK)  # for a first command: what it asks for is not known
 STALE = State("stale", Level.STALE)  # nothing can be compared
-NOT_ENOUGH = State("not enough data", Level.STALE)  # too many gaps to say anything
+# Too many gaps to say anything. OK as all that cannot be decided: the status of the stream that
+# has them warns of it, and a pause of the commands is nobody's fault.
+NOT_ENOUGH = State("not enough data", Level.OK)
 # Nothing is wrong as far as can be told, and in this motion nothing could be told.
 NOT_OBSERVABLE = State("not observable in this motion", Level.OK)
 FAULTLESS = frozenset(

@@ -11,7 +11,7 @@ from attrs import frozen
 
 from tomr_fault_diag.classifier.commissioned import commissioned_words
 from tomr_fault_diag.classifier.judges import make_judge
-from tomr_fault_diag.classifier.messages import diagnosis_message
+from tomr_fault_diag.classifier.messages import diagnosis_message, silence_message
 from tomr_fault_diag.classifier.severity import SeverityWatch
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
@@ -108,6 +108,11 @@ class Pipeline:
     def release(self) -> str:
         """Let go of a named fault, latched or not; returns its name, empty if there was none."""
         return self._classifier.release()
+
+    def silence(self, stamp_ns: int) -> DiagnosticMessage:
+        """What to say where nothing comes at all."""
+        hardware_id = self.settings.classifier.hardware_id
+        return silence_message(self.robot, stamp_ns, hardware_id, self._commissioned)
 
     def messages(self, step: Step) -> Iterator[Outgoing]:
         """The messages that the nodes publish at such a step."""

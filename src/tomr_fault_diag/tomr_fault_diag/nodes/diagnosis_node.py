@@ -59,6 +59,7 @@ class DiagnosisNode(LifecycleNodeMixin, StageNode):
         """Listen, and diagnose."""
         inputs = {item.topic: self._input(item) for item in self.pipeline.inputs}
         self.listen(inputs.values(), self._advance)
+        self.watch_silence(self._say_silence)
         if state is not UNMANAGED:
             self.introduce()
         return TransitionCallbackReturn.SUCCESS
@@ -93,10 +94,15 @@ class DiagnosisNode(LifecycleNodeMixin, StageNode):
     def _input(self, item: Input) -> Input:
         def take(message: Any, receive_ns: int) -> None:
             step = self.pipeline.take(item.topic, message, receive_ns)
+            if step.frames:
+                self.heard_now()
             for outgoing in self.pipeline.messages(self._heard(step)):
                 self.send(outgoing)
 
         return evolve(item, take=take)
+
+    def _say_silence(self, now_ns: int) -> None:
+        self.send(self.pipeline.silence(now_ns))
 
     def _heard(self, step: Step) -> Step:
         """A step without what nobody listens to: words and numbers for it cost time."""

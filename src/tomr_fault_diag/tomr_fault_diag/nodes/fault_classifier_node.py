@@ -8,7 +8,7 @@ from std_srvs.srv import Trigger
 
 from tomr_fault_diag.classifier.commissioned import commissioned_words
 from tomr_fault_diag.classifier.judges import make_judge
-from tomr_fault_diag.classifier.messages import TOPIC, diagnosis_message
+from tomr_fault_diag.classifier.messages import TOPIC, diagnosis_message, silence_message
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
 from tomr_fault_diag.classifier.severity import SeverityWatch
 from tomr_fault_diag.classifier.stage import FaultClassifier
@@ -46,13 +46,19 @@ class FaultClassifierNode(StageNode):
         self.listen([Input(RESIDUALS, DIAGNOSTICS, guarded(self._take))], self._advance, STAGE_QOS)
         self.on_change(self._retune)
         offer_clearing(self, self.classifier.release)
+        self.watch_silence(self._say_silence)
 
     def _take(self, message: Any, receive_ns: int) -> None:
         frame = frame_of(message, stamp_of(message, receive_ns))
         diagnosis = self.classifier.classify(frame)
+        self.heard_now()
         if diagnosis is not None:
             hardware_id = self.classifier.settings.hardware_id
             self.send(diagnosis_message(self._robot, diagnosis, hardware_id, self._commissioned))
+
+    def _say_silence(self, now_ns: int) -> None:
+        hardware_id = self.classifier.settings.hardware_id
+        self.send(silence_message(self._robot, now_ns, hardware_id, self._commissioned))
 
     def _retune(self, values: Mapping[str, object]) -> None:
         self.classifier.settings = ClassifierSettings.of(values)

@@ -29,7 +29,9 @@ class SlipOdometryNode(StageNode):
 
     def _advance(self) -> None:
         for estimate in self._core.due():
-            for message in estimate_messages(self._robot, estimate, self._settings):
+            for message in estimate_messages(
+                self._robot, estimate, self._settings, self._namespace
+            ):
                 self.publish(message.topic, message.message)
 
 

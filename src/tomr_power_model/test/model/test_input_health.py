@@ -54,6 +54,15 @@ def test_a_gap_is_a_warning_for_a_while() -> None:
     assert (stream.gaps, stream.refused) == (1, 0)
 
 
+@pytest.mark.parametrize(("ms", "level"), [(480, Level.WARN), (520, Level.OK), (60_000, Level.OK)])
+def test_commands_that_end_and_begin_anew_are_no_gap_to_warn_of(ms: int, level: Level) -> None:
+    stream = flow(1000)
+    for t in range(980 + ms, 980 + ms + 1000, 20):
+        stream.take(BASE + t * MS)
+    assert said(InputState("x", stream, is_optional=True), 980 + ms + 500)[0] is level
+    assert said(InputState("x", stream), 980 + ms + 500)[0] is Level.WARN
+
+
 @pytest.mark.parametrize(("samples", "is_gap"), [(5, False), (6, True), (9, True)])
 def test_what_is_a_gap_is_known_from_the_first_five_intervals_on(
     samples: int, is_gap: bool

@@ -68,6 +68,7 @@ class Continuity:
         self.refused_since = 0  # the newest sample
         self.gaps = 0
         self.resumed = 0  # first stamp after the last gap, 0: there was none
+        self.silence = 0  # how long that was [ns]
         self._until = 0
 
     def leap(self) -> None:
@@ -176,5 +177,5 @@ class Continuity:
 
     def _break_off(self, stamp: int, silence: int) -> None:
         given = self._tolerance
-        self.resumed, self.gaps = stamp, self.gaps + 1
+        self.resumed, self.silence, self.gaps = stamp, silence, self.gaps + 1
         self._until = stamp + given.after + round(given.share * min(silence, _LONGEST))

@@ -11,6 +11,7 @@ from tomr_power_model.model.ticks import to_ns
 
 TOPIC = "/diagnostics"
 _MANY = 3  # messages in a row that cannot be used
+_PAUSE = to_ns(0.5)  # of the commands: who is silent for so long has ended, and begun anew
 _RECENT = to_ns(2.0)  # in which a gap or a refused message is worth a warning
 
 
@@ -40,7 +41,8 @@ class InputState:
             return Level.WARN, self.ailment
         if flow.refused_at and tick_ns - flow.refused_at < _RECENT:
             return Level.WARN, "sends what cannot be used at times"
-        if flow.resumed and tick_ns - flow.resumed < _RECENT:
+        paused = self.is_optional and flow.silence >= _PAUSE
+        if flow.resumed and tick_ns - flow.resumed < _RECENT and not paused:
             return Level.WARN, "a gap a moment ago"
         return Level.OK, "as it should be"
 

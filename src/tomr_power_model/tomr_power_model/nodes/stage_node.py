@@ -3,6 +3,7 @@
 import gc
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib import import_module
@@ -13,6 +14,7 @@ from typing import Any
 import rclpy
 from attrs import evolve
 from rclpy._rclpy_pybind11 import RCLError
+from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
@@ -40,6 +42,7 @@ STAGE_QOS = QoSProfile(depth=500, reliability=ReliabilityPolicy.RELIABLE)
 HEARD = "has heard every topic that it listens to"
 
 _SIGNAL_CHECK_S = 0.2  # the longest that a signal waits while no message comes
+_SILENT_S, _SAY_S = 3.0, 1.0  # without a decision, until it is said, and how often
 
 
 @cache
@@ -137,8 +140,24 @@ class StageNode(Node):
         if not self._unheard:
             self.get_logger().info(HEARD)
 
+    def watch_silence(self, say: Callable[[int], None]) -> None:
+        """Have `say` called, with the time [ns], for as long as nothing can be decided of what
+        comes; by the computer's clock, since that of a robot which is off stands still."""
+        self.heard_now()
+
+        def look() -> None:
+            if time.monotonic() - self._heard_at > _SILENT_S:
+                say(self.get_clock().now().nanoseconds)
+
+        timer = self.create_timer(_SAY_S, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._ends.append(lambda: self.destroy_timer(timer))
+
+    def heard_now(self) -> None:
+        """Note that something was decided just now."""
+        self._heard_at = time.monotonic()
+
     def unlisten(self) -> None:
-        """Take back all subscriptions."""
+        """Take back all subscriptions, and stop watching for silence."""
         self._unheard.clear()
         for end in self._ends:
             end()

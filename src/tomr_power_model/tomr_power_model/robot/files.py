@@ -83,6 +83,27 @@ def shipped_robot(name: str) -> Robot:
     return load_robot(name)
 
 
+def robot_file(given: str) -> Path:
+    """The file of a robot: given by its path, in which ~ is the home, or shipped, by name.
+
+    Raises InputError where it is not there.
+    """
+    if given in shipped_robots():
+        return Path(str(files("tomr_power_model").joinpath("robots").joinpath(f"{given}.yaml")))
+    try:
+        return parameter_file(given)
+    except InputError as error:
+        raise InputError(f"{error}, or one of {', '.join(shipped_robots())}") from None
+
+
+def parameter_file(given: str) -> Path:
+    """A file that is there, in whose path ~ is the home. Raises InputError where it is not."""
+    path = Path(given).expanduser()
+    if not path.is_file():
+        raise InputError(f"{given}: no such file: give the path of a parameter file")
+    return path.absolute()
+
+
 def read_sections(source: Path | str) -> dict[str, dict[str, object]]:
     """Flat dotted parameters of each section of a ROS 2 parameter file, not checked."""
     document = load_yaml(_text(source), str(source))
