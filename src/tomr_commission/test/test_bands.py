@@ -10,6 +10,7 @@ from tomr_commission.bands import bands_of, outside, regime_table, regimes, stea
 from tomr_commission.observed import Observed
 from tomr_commission.request import BandChoice
 from tomr_fault_diag.residuals.frame import SPEEDS
+from tomr_fault_diag.residuals.settings import BandSettings
 
 Steady = Callable[..., Observed]
 
@@ -26,6 +27,21 @@ def test_bands_hold_the_share_that_was_asked_for(steady: Steady) -> None:
     drive = steady(ticks=8000)
     shares = outside([drive], bands_of([drive], BandChoice(0.99, 1.0, 1.0)))
     assert all(0.002 < share < 0.03 for share in shares.values())
+
+
+def test_the_band_of_a_gyro_is_widened_where_healthy_driving_asks_for_it(steady: Steady) -> None:
+    usual, drive = BandSettings(), steady()
+    random = np.random.default_rng(2)
+
+    def band(sigma: float) -> BandSettings:
+        yaw = np.stack([random.normal(0.0, sigma, 4000), np.full(4000, 0.5)], axis=1)
+        return bands_of([evolve(drive, yaw=yaw)], BandChoice(margin=1.5))
+
+    assert bands_of([drive], BandChoice()).yaw == usual.yaw  # without a gyro
+    assert band(0.01).yaw == usual.yaw
+    # 99.9 % of |normal|: 3.29 sigma, with a margin of 1.5.
+    assert band(0.1).yaw == pytest.approx(1.5 * 3.29 * 0.1, rel=0.1)
+    assert band(0.1).yaw_relative / usual.yaw_relative > 4.0
 
 
 def test_regimes_of_a_start_and_a_reversal(steady: Steady) -> None:

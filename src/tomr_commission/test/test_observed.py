@@ -56,3 +56,16 @@ def test_what_is_left_out_is_left_out(healthy: Observed) -> None:
     kept = healthy.without([(2.0, 5.0)])
     assert len(healthy.stamp_ns) - len(kept.stamp_ns) == 61
     assert not ((kept.seconds > 2.0) & (kept.seconds < 5.0)).any()
+
+
+def test_the_gyro_is_seen_with_its_band(healthy: Observed) -> None:
+    yaw = np.array([[np.nan, np.nan], [0.05, 2.0], [-0.5, 2.3]])
+    drive = evolve(healthy.part(slice(0, 3), "three"), yaw=yaw)
+    unknown, first, second = (frame.yaw for frame in frames_of(drive, BandSettings()))
+    assert unknown.stale
+    assert (first.residual, first.modelled, first.unit, first.code) == (0.05, 2.0, "rad/s", 0)
+    # A tenth of 2.3 rad/s, and the 0.3 rad/s by which the wheels' rate moved.
+    assert np.isclose(second.band, 0.53)
+    assert second.code == 0
+    narrow = BandSettings(yaw_transient=0.0)
+    assert frames_of(drive, narrow)[2].yaw.code == -1

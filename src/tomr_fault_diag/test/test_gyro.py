@@ -6,9 +6,12 @@ from collections.abc import Callable
 import pytest
 from attrs import evolve
 
-from tomr_fault_diag.classifier.judges import make_judge
+from tomr_fault_diag.classifier.belief import ENCODERS, OTHER
+from tomr_fault_diag.classifier.judges import WindowJudge, _said_by_gyro, make_judge
+from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
+from tomr_fault_diag.classifier.states import SLIP
 from tomr_fault_diag.residuals.frame import (
     NO_GYRO,
     NOT_BELIEVED,
@@ -123,17 +126,48 @@ def test_it_travels_with_the_residuals() -> None:
         assert back.missing == frame.yaw.missing
 
 
+def healthy_frame(yaw: float, off: float = 0.0) -> ResidualFrame:
+    """A frame without residuals but of the yaw rate [rad/s], and of the first wheel's speed."""
+    speeds = [Residual(0.0, 0.2, want, "rad/s") for want in SPEED]
+    speeds[0] = evolve(speeds[0], residual=off)
+    power = Residual(0.0, 2.0, 4.0)
+    residuals = (*(power,) * SPEEDS.start, *speeds, *(power,) * (RESIDUALS - SPEEDS.stop))
+    return ResidualFrame(BASE, residuals, yaw=Residual(yaw, 0.2, RATE, "rad/s"))
+
+
+def test_what_a_gyro_says_by_hand() -> None:
+    said = _said_by_gyro(healthy_frame(-0.25))
+    # A quarter of a band beyond it, 8 nats a band. Wheels that turn forwards turn the body
+    # clockwise: more of that may be encoders that show too little.
+    accused = [SLIP, *range(ENCODERS.start, ENCODERS.stop), OTHER]
+    assert said[accused] == pytest.approx(2.0)
+    assert said.sum() == pytest.approx(2.0 * len(accused))
+    less = _said_by_gyro(healthy_frame(0.25))
+    assert less[[SLIP, OTHER]] == pytest.approx(2.0)
+    assert less.sum() == pytest.approx(4.0)
+    assert _said_by_gyro(healthy_frame(-5.0)).max() == pytest.approx(10.0)
+    # Where an encoder shows what it should not, it is in doubt itself.
+    assert not _said_by_gyro(healthy_frame(-5.0, off=0.7)).any()
+
+
+def test_a_gyro_alone_accuses_no_encoder() -> None:
+    judge = make_judge(ClassifierSettings())
+    assert isinstance(judge, WindowJudge)
+    for tick in range(60):
+        frame = evolve(healthy_frame(-0.6), stamp_ns=BASE + 50 * tick * MS)
+        judge.judge(frame, 50 * MS, Unseen())
+    newest = judge._recent[-1]
+    assert newest[SLIP] > judge.settings.striking
+    assert (newest[ENCODERS] < 0.5 * judge.settings.striking).all()
+
+
 def named(yaw: float) -> list[str]:
     """States named of a robot whose residuals are 0, but for the yaw rate, after two seconds."""
     classifier = FaultClassifier(make_judge(ClassifierSettings()))
-    speeds = tuple(Residual(0.0, 0.2, want, "rad/s") for want in SPEED)
-    power = Residual(0.0, 2.0, 4.0)
-    healthy = (power,) * SPEEDS.start + speeds + (power,) * (RESIDUALS - SPEEDS.stop)
     states = []
     for tick in range(100):
-        frame = ResidualFrame(BASE + 50 * tick * MS, healthy)
-        if tick >= 40:
-            frame = evolve(frame, yaw=Residual(yaw, 0.2, RATE, "rad/s"))
+        now = BASE + 50 * tick * MS
+        frame = evolve(healthy_frame(yaw if tick >= 40 else math.nan), stamp_ns=now)
         diagnosis = classifier.classify(frame)
         if diagnosis is not None and diagnosis.changed:
             states.append(diagnosis.state.name)

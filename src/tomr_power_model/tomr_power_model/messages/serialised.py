@@ -1,7 +1,7 @@
 """What stages read of the messages that come most often, straight from their bytes.
 
 A BatteryState has nineteen fields and an Imu three matrices, of which stages need a few: to build
-all of them took a quarter of the nodes' CPU. The bytes are CDR as DDS has it: four bytes of head,
+all of them takes five to ten times as long. The bytes are CDR as DDS has it: four bytes of head,
 then every number at a multiple of its size, strings with their length before and a zero behind.
 """
 
