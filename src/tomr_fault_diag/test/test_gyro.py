@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from attrs import evolve
 
@@ -30,7 +31,7 @@ from tomr_power_model.geometry.kinematics import wheels_to_twist
 from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.messages.readings import SupplyReading
 from tomr_power_model.model.prediction import Prediction
-from tomr_power_model.robot import shipped_robot
+from tomr_power_model.robot import Robot, shipped_robot
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
@@ -39,17 +40,23 @@ SPEED = (3.0, 4.0, 5.0)
 RATE = float(wheels_to_twist(ROBOT)[2] @ SPEED)  # rad/s
 
 
-def frames(gyro: Callable[[int], float | None], until_ms: int = 6000) -> dict[int, ResidualFrame]:
-    """By time [ms]; wheels turn at SPEED, `gyro` says what is measured at a time, None: nothing."""
-    stage = ResidualStage(ROBOT)
+def frames(
+    gyro: Callable[[int], float | None],
+    robot: Robot = ROBOT,
+    faster: Callable[[int], float] = lambda at_ms: 1.0,
+) -> dict[int, ResidualFrame]:
+    """By time [ms] for 6 s; wheels turn at SPEED times `faster`, `gyro` says what is measured at a
+    time, None: nothing."""
+    stage = ResidualStage(robot)
     reading = SupplyReading.rounded(24.0, 0.4)
-    found = {}
-    for at_ms in range(0, until_ms, 10):
+    found, turned = {}, np.zeros(3)
+    for at_ms in range(0, 6000, 10):
         stamp = BASE + at_ms * MS
         if at_ms % 50 == 0:
             motors = (reading, reading, reading)
             stage.prediction(Prediction(stamp, SPEED, SPEED, motors, reading, motors))
-        first, second, third = (1e-3 * at_ms * speed for speed in SPEED)
+        first, second, third = turned
+        turned = turned + 0.01 * faster(at_ms) * np.array(SPEED)
         stage.encoders(stamp, (first, second, third), SPEED)
         rate = gyro(at_ms)
         if rate is not None:
@@ -76,6 +83,36 @@ def test_what_differs_then_is_told_over_its_band() -> None:
     assert found[5000].yaw.band == pytest.approx(max(0.1, 0.1 * abs(RATE)), rel=1e-3)
 
 
+def test_a_change_of_the_wheels_yaw_rate_widens_the_band() -> None:
+    """By all of it: a gyro may be late by a tick or two."""
+    found = frames(
+        lambda at_ms: RATE if at_ms < 4000 else 1.5 * RATE,
+        faster=lambda at_ms: 1.0 if at_ms < 4000 else 1.5,
+    )
+    usual = found[3900].yaw.band
+    assert found[4100].yaw.band > usual + 0.3 * abs(RATE)
+    assert found[4400].yaw.band == pytest.approx(max(0.1, 0.15 * abs(RATE)), rel=1e-2)
+    watch = GyroWatch(50 * MS)
+    spreads = [watch.spread(rate) for rate in (1.0, 1.5, math.nan, 1.2, 1.2)]
+    assert spreads == pytest.approx([0.0, 0.5, 0.0, 0.5, 0.3])
+
+
+def test_wheels_are_taken_to_turn_as_flawed_encoders_mean() -> None:
+    flaw = {"sensor.encoder_scale": ({"scale": 0.5},) * 3}
+    robot = evolve(ROBOT, physics={**ROBOT.physics, **flaw})
+    assert frames(lambda at_ms: 2.0 * RATE, robot)[5000].yaw.code == 0
+    assert frames(lambda at_ms: 2.0 * RATE, robot)[5000].yaw.missing == ""
+
+
+def test_agreement_is_counted_anew_after_a_tick_without() -> None:
+    watch = GyroWatch(50 * MS)
+    for residual in (*[0.0] * 39, 0.2, *[0.0] * 39):
+        watch.compare(0.5, residual, 0.1)
+    assert not watch.is_believed
+    watch.compare(0.5, 0.0, 0.1)
+    assert watch.is_believed
+
+
 @pytest.mark.parametrize("rate", [-RATE, 0.0, 2.0 * RATE])
 def test_a_gyro_that_is_mounted_otherwise_is_never_believed(rate: float) -> None:
     found = frames(lambda at_ms: rate)
@@ -100,7 +137,7 @@ def test_a_robot_that_does_not_turn_proves_no_gyro() -> None:
 
 def test_the_mean_is_of_the_tick() -> None:
     watch = GyroWatch(50 * MS)
-    for at_ms, rate in ((40, 9.0), (60, 1.0), (80, 2.0), (100, 3.0), (120, 9.0)):
+    for at_ms, rate in ((40, 9.0), (50, 9.0), (60, 1.0), (80, 2.0), (100, 3.0), (120, 9.0)):
         watch.add(at_ms * MS, rate)
     assert watch.rate(100 * MS) == pytest.approx(2.0)
     assert math.isnan(watch.rate(200 * MS))

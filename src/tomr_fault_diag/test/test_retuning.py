@@ -118,6 +118,13 @@ def test_a_node_to_which_nothing_comes_says_so(
     assert len(sent) == 1
 
 
+@pytest.mark.parametrize("node", ["residuals", "diagnosis"], indirect=True)
+def test_no_gyro_is_waited_for(node: StageNode) -> None:
+    assert "/imu/data" in {subscription.topic_name for subscription in node.subscriptions}
+    assert "imu/data" not in node._unheard
+    assert "joint_states" in node._unheard
+
+
 def held(node: DiagnosisNode) -> list[int]:
     """How much a node has, and how much it says that it has."""
     entities = (node.services, node.publishers, node.subscriptions, node.timers)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from attrs import evolve
 from odometry_drives import ROBOT, START, Recorded, contained, drive, ice, off, play
 
 from tomr_odometry.estimator import SlipOdometry
@@ -169,3 +170,16 @@ def test_messages_hold_ratios_and_a_covariance(slippery: Recorded) -> None:
     assert len(odometry.message.fields["pose"].fields["covariance"]) == 36  # type: ignore[attr-defined]
     assert slip.message.fields["name"] == list(ROBOT.wheel_names)
     assert all(abs(value) <= 1.0 for value in slip.message.fields["position"])  # type: ignore[attr-defined]
+
+
+def test_encoders_that_are_described_as_flawed_are_read_so() -> None:
+    half = {"sensor.encoder_scale": ({"scale": 0.5},) * 3}
+    flawed, poses = evolve(ROBOT, physics={**ROBOT.physics, **half}), []
+    for robot, shown in ((ROBOT, 1.0), (flawed, 0.5)):
+        core = SlipOdometry(robot)
+        for sample in range(200):
+            ahead = 0.05 * shown * sample
+            core.encoders(START + 10_000_000 * sample, (ahead, -ahead, 0.0), (0.0, 0.0, 0.0))
+        poses.append(list(core.due())[-1].pose)
+    assert np.hypot(*poses[0][:2]) > 0.2
+    np.testing.assert_allclose(poses[1], poses[0], atol=1e-3)

@@ -13,6 +13,7 @@ from tomr_power_model.dynamics.simulation import Simulation
 from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.model.encoder_flaws import EncoderFlaws
 from tomr_power_model.model.encoders import WheelEstimate
+from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import Robot, shipped_robot
 
 NAN3 = np.full(3, math.nan)
@@ -87,3 +88,23 @@ def test_the_driver_holds_what_its_encoder_shows(scale: float, cosine: float) ->
     counted = simulation.of_wheels(state, at.TURNED)[1]
     period = simulation.period_s
     assert counted == pytest.approx(sum(shown) * period, rel=1e-6)
+
+
+def test_the_simulation_begins_as_the_wheels_turn_and_not_as_they_show() -> None:
+    robot = shipped_robot("reference")
+    half = {"sensor.encoder_scale": ({"scale": 0.5},) * 3}
+    found = []
+    for model in (robot, evolve(robot, physics={**robot.physics, **half})):
+        predictor = PowerPredictor(model)
+        for at_ms in range(0, 400, 10):
+            stamp = 1_700_000_000_000_000_000 + at_ms * 1_000_000
+            angle = 4e-3 * at_ms
+            predictor.encoders(stamp, (angle, angle, angle), (4.0, 4.0, 4.0))
+            if at_ms >= 300 and at_ms % 50 == 0:
+                predictor.command(stamp, (0.0, 0.0, -1.0))
+            predictor.due()
+            speeds = predictor._path.wheel(at.SPEED)
+            if speeds:
+                break
+        found.append(speeds[0])
+    assert found[1] > 1.5 * found[0] > 3.0  # after a tick in which both are slowed down alike
