@@ -101,10 +101,10 @@ def test_the_simulation_begins_as_the_wheels_turn_and_not_as_they_show() -> None
             angle = 4e-3 * at_ms
             predictor.encoders(stamp, (angle, angle, angle), (4.0, 4.0, 4.0))
             if at_ms >= 300 and at_ms % 50 == 0:
-                predictor.command(stamp, (0.0, 0.0, -1.0))
+                predictor.command(stamp, (0.0, 0.0, 0.0))
             predictor.due()
             speeds = predictor._path.wheel(at.SPEED)
             if speeds:
                 break
         found.append(speeds[0])
-    assert found[1] > 1.5 * found[0] > 3.0  # after a tick in which both are slowed down alike
+    assert found[1] > 1.5 * found[0] > 1.0  # after a tick in which both are slowed down alike
