@@ -9,7 +9,7 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-from tomr_power_model.launching import ROBOT_FILE, find_files
+from tomr_power_model.nodes.launching import ROBOT_FILE, find_files
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -6,7 +6,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from tomr_power_model.launching import ROBOT_FILE, SETTINGS_FILE, find_files
+from tomr_power_model.nodes.launching import ROBOT_FILE, SETTINGS_FILE, find_files
 
 ARGUMENTS = (
     DeclareLaunchArgument(

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from tomr_power_model.errors import InputError
-from tomr_power_model.launching import find_files
+from tomr_power_model.nodes.launching import find_files
 from tomr_power_model.robot import load_robot, shipped_robot
 
 
