@@ -188,8 +188,8 @@ UNDECIDED: dict[str, tuple[Callable[[], Iterable[_Raw]], str]] = {
     ),
     "reversed": (
         lambda: _restamped(lambda stamp: 3_400_000_000_000_000_000 - stamp),
-        "the stamps of battery_state, cmd_vel, joint_states, wheel_1/power, wheel_2/power, "
-        "wheel_3/power run backwards",
+        "the stamps of battery_state, cmd_vel, imu/data, joint_states, wheel_1/power, "
+        "wheel_2/power, wheel_3/power run backwards",
     ),
     "other epochs": (
         lambda: _restamped(lambda stamp: stamp - 10**18, "/joint_states"),

@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from attrs import evolve
+
 from tomr_fault_diag.residuals.frame import (
     RESIDUALS,
     TOTAL,
@@ -31,6 +33,8 @@ def residual_message(
         for place, (name, residual) in enumerate(zip(names, frame.residuals, strict=True))
     )
     yaw = _status(YAW, frame.yaw, hardware_id, ())
+    if frame.yaw.stale:  # a robot need not have a gyro
+        yaw = evolve(yaw, level=Level.OK)
     return DiagnosticMessage(TOPIC, frame.stamp_ns, (*statuses, yaw))
 
 
