@@ -27,7 +27,6 @@ from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_OK
 from tomr_power_model.errors import InputError, one_line
 from tomr_power_model.messages.outgoing import TYPES, DiagnosticMessage, Outgoing
 from tomr_power_model.messages.plain import Plain, build
-from tomr_power_model.messages.serialised import quickly_read
 from tomr_power_model.nodes.command_type import CommandType
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
 from tomr_power_model.robot import Robot
@@ -113,10 +112,7 @@ class StageNode(Node):
                     return
                 problem = flow.refuses(data, now)
                 if problem is None:
-                    message = quickly_read(type_name, data)
-                    if message is None:
-                        message = deserialize_message(data, kind)
-                    problem = item.take(message, now)
+                    problem = item.take(deserialize_message(data, kind), now)
                 if problem is not None:
                     self.complain(item.topic, problem)
                 advance()
