@@ -31,6 +31,7 @@ from tomr_power_model.geometry.kinematics import wheels_to_twist
 from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.messages.readings import SupplyReading
 from tomr_power_model.model.prediction import Prediction
+from tomr_power_model.model.ticks import TickSettings
 from tomr_power_model.robot import Robot, shipped_robot
 
 MS = 1_000_000
@@ -44,15 +45,16 @@ def frames(
     gyro: Callable[[int], float | None],
     robot: Robot = ROBOT,
     faster: Callable[[int], float] = lambda at_ms: 1.0,
+    period_ms: int = 50,
 ) -> dict[int, ResidualFrame]:
     """By time [ms] for 6 s; wheels turn at SPEED times `faster`, `gyro` says what is measured at a
     time, None: nothing."""
-    stage = ResidualStage(robot)
+    stage = ResidualStage(robot, ResidualSettings(ticks=TickSettings(period=period_ms * MS)))
     reading = SupplyReading.rounded(24.0, 0.4)
     found, turned = {}, np.zeros(3)
     for at_ms in range(0, 6000, 10):
         stamp = BASE + at_ms * MS
-        if at_ms % 50 == 0:
+        if at_ms % period_ms == 0:
             motors = (reading, reading, reading)
             stage.prediction(Prediction(stamp, SPEED, SPEED, motors, reading, motors))
         first, second, third = turned
@@ -65,11 +67,13 @@ def frames(
     return found
 
 
-def test_a_gyro_is_believed_once_it_has_agreed_for_two_seconds_of_turning() -> None:
-    found = frames(lambda at_ms: RATE)
+@pytest.mark.parametrize("period_ms", [10, 50, 200])
+def test_a_gyro_is_believed_once_it_has_agreed_for_two_seconds_of_turning(period_ms: int) -> None:
+    """At any rate of decisions."""
+    found = frames(lambda at_ms: RATE, period_ms=period_ms)
     missing = {at_ms: frame.yaw.missing for at_ms, frame in found.items() if at_ms >= 200}
     first = min(at_ms for at_ms, why in missing.items() if not why)
-    assert 1900 <= first <= 2400
+    assert 1900 <= first <= 2600
     assert {why for at_ms, why in missing.items() if at_ms < first} == {NOT_BELIEVED}
     assert found[5000].yaw.residual == pytest.approx(0.0, abs=1e-6)
     assert found[5000].yaw.modelled == pytest.approx(RATE, rel=1e-5)
@@ -92,7 +96,7 @@ def test_a_change_of_the_wheels_yaw_rate_widens_the_band() -> None:
     usual = found[3900].yaw.band
     assert found[4100].yaw.band > usual + 0.3 * abs(RATE)
     assert found[4400].yaw.band == pytest.approx(max(0.1, 0.15 * abs(RATE)), rel=1e-2)
-    watch = GyroWatch(50 * MS)
+    watch = GyroWatch(50 * MS, 3)
     spreads = [watch.spread(rate) for rate in (1.0, 1.5, math.nan, 1.2, 1.2)]
     assert spreads == pytest.approx([0.0, 0.5, 0.0, 0.5, 0.3])
 
@@ -105,7 +109,7 @@ def test_wheels_are_taken_to_turn_as_flawed_encoders_mean() -> None:
 
 
 def test_agreement_is_counted_anew_after_a_tick_without() -> None:
-    watch = GyroWatch(50 * MS)
+    watch = GyroWatch(50 * MS, 3)
     for residual in (*[0.0] * 39, 0.2, *[0.0] * 39):
         watch.compare(0.5, residual, 0.1)
     assert not watch.is_believed
@@ -129,14 +133,14 @@ def test_a_robot_without_one_misses_nothing_else() -> None:
 
 
 def test_a_robot_that_does_not_turn_proves_no_gyro() -> None:
-    watch = GyroWatch(50 * MS)
+    watch = GyroWatch(50 * MS, 3)
     for _ in range(500):
         watch.compare(0.1, 0.0, 0.1)
     assert not watch.is_believed
 
 
 def test_the_mean_is_of_the_tick() -> None:
-    watch = GyroWatch(50 * MS)
+    watch = GyroWatch(50 * MS, 3)
     for at_ms, rate in ((40, 9.0), (50, 9.0), (60, 1.0), (80, 2.0), (100, 3.0), (120, 9.0)):
         watch.add(at_ms * MS, rate)
     assert watch.rate(100 * MS) == pytest.approx(2.0)

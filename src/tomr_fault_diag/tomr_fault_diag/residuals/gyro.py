@@ -6,31 +6,32 @@ only once it has agreed with the wheels while the robot turned for a while.
 """
 
 from collections import deque
-from collections.abc import Sequence
 
 from tomr_power_model.model.ticks import to_ns
 
 _TURNS = 0.2  # rad/s: slower turning says nothing of how a gyro is mounted
-_AGREED = 40  # ticks of turning in which it has to agree, one after another
-_SPREAD = 3  # ticks over which the change of the wheels' yaw rate counts
+_AGREED = to_ns(2.0)  # of turning, tick after tick, in which it has to agree
 _MOST_HZ = 60  # samples beyond tell nothing more
+_KEPT = 1024  # samples, should no tick come
 CLOSEST_NS = to_ns(1.0 / _MOST_HZ)
 
 
 class GyroWatch:
     """Samples of the last moments, and whether the gyro is believed."""
 
-    def __init__(self, period_ns: int) -> None:
-        """`period_ns` of the ticks."""
-        self._period = max(period_ns, to_ns(0.05))
-        self._samples: deque[tuple[int, float]] = deque()
-        self._agreed = 0  # ticks
+    def __init__(self, period_ns: int, lately: int) -> None:
+        """`period_ns` of the ticks; `lately`: so many of them in which a change counts."""
+        self._period = period_ns
+        self._window = max(period_ns, to_ns(0.05))
+        self._samples: deque[tuple[int, float]] = deque(maxlen=_KEPT)
+        self._recent: deque[float] = deque(maxlen=lately)
+        self._agreed = 0  # ns
         self.clear()
 
     def clear(self) -> None:
         """Forget all samples; whether it is believed stays: it is the same gyro."""
         self._samples.clear()
-        self._recent: deque[float] = deque(maxlen=_SPREAD)
+        self._recent.clear()
 
     @property
     def is_believed(self) -> bool:
@@ -43,7 +44,7 @@ class GyroWatch:
 
     def rate(self, tick_ns: int) -> float:
         """Mean yaw rate of the window that ends at a tick [rad/s]; NaN without a sample in it."""
-        samples, begin = self._samples, tick_ns - self._period
+        samples, begin = self._samples, tick_ns - self._window
         while samples and samples[0][0] <= begin:
             samples.popleft()
         found = [rate for stamp, rate in samples if stamp <= tick_ns]
@@ -63,9 +64,4 @@ class GyroWatch:
         if abs(residual) > band:
             self._agreed = 0
         elif abs(wheels) > _TURNS:
-            self._agreed += 1
-
-
-def yaw_of(to_twist: Sequence[float], speed: Sequence[float]) -> float:
-    """Yaw rate of the body [rad/s] from wheel speeds [rad/s] and the last row of their inverse."""
-    return sum(k * w for k, w in zip(to_twist, speed, strict=True))
+            self._agreed += self._period

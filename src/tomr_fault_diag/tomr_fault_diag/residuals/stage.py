@@ -20,7 +20,7 @@ from tomr_fault_diag.residuals.frame import (
     Unit,
     rounded,
 )
-from tomr_fault_diag.residuals.gyro import GyroWatch, yaw_of
+from tomr_fault_diag.residuals.gyro import GyroWatch
 from tomr_fault_diag.residuals.measured import Measured, SupplyWindow
 from tomr_fault_diag.residuals.repeats import RepeatWatch, Work
 from tomr_fault_diag.residuals.scatter import ScatterWatch
@@ -118,9 +118,9 @@ class ResidualStage:
         lately = max(_FEWEST, round(_TRANSIENT / ticks.period))
         self._recent: deque[_Modelled] = deque(maxlen=lately)
         self._scatter = ScatterWatch(fastest)
-        self._gyro = GyroWatch(ticks.period)
+        self._gyro = GyroWatch(ticks.period, lately)
         self._flaws = EncoderFlaws.of(robot)
-        self._turning = Body.of(robot).to_twist[2].tolist()  # yaw rate per wheel speed
+        self._turning = Body.of(robot).to_twist[2]  # yaw rate per wheel speed [1]
         self._decided = 0  # newest tick
 
     def retune(self, bands: BandSettings) -> None:
@@ -346,7 +346,7 @@ class ResidualStage:
     def _yaw(self, tick: int, estimate: WheelEstimate, speeds: list[Residual]) -> Residual:
         """What a gyro measures less what the wheels tell."""
         bands, measured = self.settings.bands, self._gyro.rate(tick)
-        wheels = yaw_of(self._turning, self._flaws.turned(estimate).speed.tolist())
+        wheels = float(self._turning @ self._flaws.turned(estimate).speed)
         if any(speed.residual != speed.residual for speed in speeds):
             wheels = NAN
         band = max(bands.yaw, bands.yaw_relative * abs(wheels))
