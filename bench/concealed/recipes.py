@@ -29,10 +29,15 @@ def _either(random: np.random.Generator) -> float:
     return float(random.choice([-1.0, 1.0]))
 
 
-def _off_center(size: float, scales: Scales, random: np.random.Generator) -> dict[str, float]:
+def _some_way(reach: float, random: np.random.Generator) -> tuple[float, float]:
+    """The coordinates of so far in a direction by chance."""
     direction = random.uniform(-math.pi, math.pi)
-    reach = size * scales.radius
-    return {"x": float(reach * math.cos(direction)), "y": float(reach * math.sin(direction))}
+    return float(reach * math.cos(direction)), float(reach * math.sin(direction))
+
+
+def _off_center(size: float, scales: Scales, random: np.random.Generator) -> dict[str, float]:
+    x, y = _some_way(size * scales.radius, random)
+    return {"x": x, "y": y}
 
 
 def _ripple(size: float, scales: Scales, random: np.random.Generator) -> dict[str, float]:
@@ -44,11 +49,8 @@ def _ripple(size: float, scales: Scales, random: np.random.Generator) -> dict[st
 
 
 def _off_disc(size: float, scales: Scales, random: np.random.Generator) -> dict[str, float]:
-    direction = random.uniform(-math.pi, math.pi)
-    return {
-        "cosine": float(size * math.cos(direction)),
-        "sine": float(size * math.sin(direction)),
-    }
+    cosine, sine = _some_way(size, random)
+    return {"cosine": cosine, "sine": sine}
 
 
 def _iron(size: float, scales: Scales, random: np.random.Generator) -> dict[str, float]:

@@ -209,6 +209,15 @@ def test_too_many_gaps_are_not_enough_data() -> None:
     found = classified(frames)
     assert [name for _, name in changes(found)] == ["normal", "not enough data"]
     assert not any(d.probabilities for d in found if not d.usable)
+    said = {
+        diagnosis_message(shipped_robot("reference"), d, "").statuses[0].message
+        for d in classified(frames, report_period=0.05)
+        if d.state is states.NOT_ENOUGH
+    }
+    assert said == {
+        "not enough data: a gap in joint_states",
+        "not enough data: gaps a moment ago",
+    }
 
 
 def test_speeds_that_cannot_be_told_leave_the_powers() -> None:

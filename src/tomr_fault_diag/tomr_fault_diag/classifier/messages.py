@@ -26,13 +26,13 @@ from tomr_fault_diag.residuals.frame import (
 )
 from tomr_fault_diag.residuals.messages import sentence
 from tomr_power_model.messages.outgoing import DiagnosticMessage
-from tomr_power_model.messages.plain import Level, Status
+from tomr_power_model.messages.plain import Status
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.robot import Robot
 
 TOPIC = "/diagnostics"
 NAME = "fault_classifier: drive"
-SILENCE = "nothing comes on the topics of this robot: is their namespace right?"
+SILENCE = "no stamped message comes on the topics of this robot: is their namespace right?"
 
 
 def diagnosis_message(
@@ -88,8 +88,8 @@ def six_state(state: State) -> str:
 
 def _headline(robot: Robot, diagnosis: Diagnosis) -> str:
     said = _said(robot, diagnosis)
-    is_held = not diagnosis.usable and diagnosis.state.level is not Level.STALE
-    return f"{said}; no data at present" if is_held and diagnosis.state != WAITING else said
+    is_held = not diagnosis.usable and diagnosis.state not in (STALE, NOT_ENOUGH, WAITING)
+    return f"{said}; no data at present" if is_held else said
 
 
 def _said(robot: Robot, diagnosis: Diagnosis) -> str:
