@@ -331,6 +331,31 @@ def test_samples_that_come_in_another_order_are_a_gap_until_the_clock_begins_ane
     assert speeds[-10:] == [""] * 10
 
 
+@pytest.mark.parametrize(
+    ("count", "is_known"),
+    [(2.0 * math.pi / 40_960, True), (2.0 * math.pi / (64 * 15), True), (0.1, False)],
+)
+def test_coarse_encoders_widen_bands_until_no_speed_is_known(count: float, is_known: bool) -> None:
+    """Whole counts of the angles: 40,960 a turn, 960, 63. The third wheel stands all the time."""
+
+    def rounded(_: int, message: Any) -> Any:
+        message.position = count * (message.position // count)
+        return message
+
+    frames = list(_disturbed("joint_states", rounded).values())[10:]
+    speeds = [[frame.residuals[place] for place in SPEEDS] for frame in frames]
+    assert {speed.stale for one in speeds for speed in one} == {not is_known}
+    assert {frame.codes for frame in frames} == {(0,) * 10}
+    if not is_known:
+        scatter = "the stamps of joint_states scatter too much to tell a speed"
+        assert {speed.missing for one in speeds for speed in one} == {scatter}
+    standing, least = {one[2].band for one in speeds}, ResidualSettings().bands.speed
+    if count < 0.001:
+        assert standing == {least}
+    else:
+        assert min(standing) > 1.2 * least
+
+
 def test_an_angle_that_no_wheel_reaches_is_no_sample_unless_it_stays() -> None:
     def leaps(at: int, message: Any, until: int) -> Any:
         if 600 <= at < until:

@@ -1,9 +1,11 @@
 """Stamps that scatter: how far the samples lie off the motion that they show."""
 
+import math
 import random
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 
 from tomr_fault_diag.residuals.scatter import ScatterWatch
 from tomr_power_model.model.encoders import EncoderSample, EncoderWindow, WheelEstimate
@@ -85,6 +87,37 @@ def test_a_second_of_order_is_enough() -> None:
         watch.take(WheelEstimate(np.full(3, 8.0), np.zeros(3), scatter=0.001))
     assert not watch.is_disorder
     assert watch.seconds == 0.001
+
+
+@pytest.mark.parametrize("turns", [0.4, 1.0, 2.55, 6.7])
+def test_bands_can_hold_what_coarse_encoders_round(turns: float) -> None:
+    """64 counts a motor turn: of the speed's errors 99 % lie within 3.3 of what is told."""
+    count, dice = 2.0 * math.pi / (64 * 15), random.Random(5)
+    window, watch = EncoderWindow(70 * MS, 50 * MS, 200 * MS), ScatterWatch(fastest=40.0)
+    held = []
+    for number in range(6000):
+        stamp = BASE + 10 * number * MS + round(MS * max(-3.0, min(3.0, dice.gauss(0.0, 0.7))))
+        turned = 0.01 * number * turns
+        angles = [count * math.floor(share * turned / count) for share in (1.0, -0.4, -0.6)]
+        window.add(EncoderSample(stamp, (angles[0], angles[1], angles[2]), NOTHING))
+        if number % 5 == 4 and number > 1000:
+            found = window.at(BASE + 10 * number * MS)
+            watch.take(found)
+            counts = watch.counts(window.resolution)
+            for speed, share in zip(found.speed.tolist(), (1.0, -0.4, -0.6), strict=True):
+                noise = found.gain * max(watch.seconds * abs(share) * turns, counts)
+                held.append(abs(speed - share * turns) < 3.3 * noise)
+                assert noise < 0.25
+    assert sum(held) > 0.99 * len(held)
+
+
+def test_even_steps_are_no_resolution() -> None:
+    """What differs in the steps of a perfect motion is a lost sample, not a count."""
+    times = [time for time in range(0, 3000, 10) if time % 990]
+    watch = _watched(times, lambda time: SPEED * time)
+    assert watch.counts(0.08) < 0.02
+    true = _watched(list(range(0, 3000, 10)), lambda time: SPEED * time)
+    assert true.counts(0.08) < 1e-9
 
 
 def test_what_was_seen_can_be_forgotten() -> None:

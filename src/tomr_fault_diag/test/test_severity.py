@@ -12,7 +12,7 @@ from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.severity import SeverityWatch
-from tomr_fault_diag.classifier.severity.interval import jackknife_half, student
+from tomr_fault_diag.classifier.severity.interval import jackknife_half, slope, student
 from tomr_fault_diag.classifier.severity.measures import MEASURES
 from tomr_fault_diag.classifier.severity.tick import Motors, Tick
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
@@ -383,6 +383,15 @@ def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
     values = np.array([1.0, 2.0, 4.0, 9.0])  # deviate by 12.667 squared, of 3 degrees
     half = jackknife_half((values.sum() - values) / 3.0)
     assert half == pytest.approx(student(3) * math.sqrt(12.667 / 4.0), rel=1e-3)
+
+
+def test_stretches_that_tell_nothing_count_for_nothing() -> None:
+    """Four that were all but at rest beside one that was not are not five."""
+    squares = np.array([1e-31, 2e-31, 5e-31, 4e-31, 128.0])
+    products = np.array([-8e-17, 6e-17, 1e-16, 2e-16, -24.0])
+    assert slope(squares, products) is None
+    more, less = np.append(squares, [4.0, 4.0, 4.0]), np.append(products, [-0.75, -0.75, -0.75])
+    assert slope(more, less) == pytest.approx((-0.1875, 0.0))
 
 
 def test_numbers_beyond_all_are_left_out() -> None:

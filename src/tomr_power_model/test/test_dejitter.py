@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tomr_power_model.drive.dejitter import dejitter, even
+from tomr_power_model.drive.dejitter import dejitter, even, grid_of, is_jitter
 from tomr_power_model.model.encoders import EncoderSample, EncoderWindow, RecentStamps
 
 MS = 1_000_000
@@ -60,6 +60,29 @@ def test_samples_that_are_really_uneven_keep_their_stamps() -> None:
     for stamp, angle in zip(stamps.tolist(), angles.tolist(), strict=True):
         watched.add(stamp, tuple(angle))
     assert watched.times(stamps[-8:].tolist()) == stamps[-8:].tolist()
+
+
+@pytest.mark.parametrize("speed", [0.4, 1.0, 2.5, 13.0])
+@pytest.mark.parametrize("is_even", [True, False])
+def test_coarse_encoders_are_not_taken_for_the_other(speed: float, is_even: bool) -> None:
+    """64 counts a motor turn: rounding hides the jitter at any moment, and never turns it round.
+
+    At a steady speed the counts beat with the samples, which looks like noise of two values.
+    """
+    random, count = np.random.default_rng(7), 2.0 * np.pi / (64 * 15)
+    even = 0.01 * np.arange(2000)
+    stamps = even + np.clip(random.normal(0.0, 7e-4, len(even)), -3e-3, 3e-3)
+    turned = np.outer(even if is_even else stamps, speed * np.array([1.0, -0.37, 0.61]))
+    angles = count * np.floor(turned / count)
+    said = []
+    for first in range(0, 1800, 200):
+        part = slice(first, first + 200)
+        grid = grid_of(stamps[part])
+        assert grid is not None
+        said.append(is_jitter(stamps[part], grid, angles[part]))
+    assert (not is_even) not in said
+    if speed >= 2.5:
+        assert said.count(is_even) >= 8  # of nine: soon told
 
 
 @pytest.mark.parametrize("missing", [0, 7])

@@ -13,6 +13,7 @@ _TICKS = 20  # that moved, looked at
 # another order than they were taken in: no stamp can be trusted, neither those of powers.
 _DISORDER = 0.015  # s
 _DISORDER_ANGLE = 0.15  # rad
+_ROUNDED = 1.0 / math.sqrt(12.0)  # standard deviation of what is rounded, in counts
 
 
 class ScatterWatch:
@@ -42,6 +43,14 @@ class ScatterWatch:
     def seconds(self) -> float:
         """Scatter of the samples' times [s], 0 where none was seen."""
         return median(self._seconds) if self._seconds else 0.0
+
+    def counts(self, resolution: float) -> float:
+        """Standard deviation that angles of a resolution [rad] have by being whole counts [rad].
+
+        No more than they scatter about the motion: samples may step alike for other reasons.
+        """
+        rounded = _ROUNDED * resolution
+        return min(rounded, median(self._angles)) if self._angles else rounded
 
     @property
     def is_disorder(self) -> bool:

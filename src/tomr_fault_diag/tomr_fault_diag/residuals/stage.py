@@ -1,4 +1,4 @@
-"""The residual stage: predictions and measurements in, ten residuals per tick out."""
+"""The residual stage: predictions and measurements in, a frame of residuals per tick out."""
 
 import math
 from collections import deque
@@ -59,7 +59,8 @@ IMU = "imu/data"
 _TRANSIENT = to_ns(0.15)
 _FEWEST = 2  # ticks, of slow decisions
 
-_UNSURE = 0.5  # bands: a speed is not known whose standard deviation is larger
+_UNSURE = 1.0  # bands: a speed is not known whose standard deviation is larger
+_NOISE = 3.3  # standard deviations of a speed that its band holds: 99.9 %
 _TURNS = 0.3  # rad/s: a slower wheel may rest
 
 _UNKNOWN_READINGS = (UNKNOWN_READING, UNKNOWN_READING, UNKNOWN_READING)
@@ -323,7 +324,8 @@ class ResidualStage:
         scatter, disorder = self._scatter.seconds, self._scatter.is_disorder
         if disorder:
             reason = f"{GAP}{ENCODERS}: its stamps do not fit"
-        speeds = []
+        counts = self._scatter.counts(self._encoders.resolution)
+        speeds, unsure = [], False
         for wheel, value in enumerate(estimate.speed.tolist()):
             models = [past.speed[wheel] for past in self._recent]
             model = models[-1]
@@ -331,16 +333,14 @@ class ResidualStage:
             sign = -1.0 if model < 0.0 else 1.0
             spread = bands.speed_transient * _spread(models)
             band = max(bands.speed, bands.speed_relative * abs(model)) + spread
-            if disorder:
-                value = NAN
-            elif estimate.gain * scatter * max(abs(model), abs(value)) > _UNSURE * band:
-                value, reason = NAN, SCATTER
-            missing = _missing(value, model, reason, absent)
-            speeds.append(
-                Residual(
-                    rounded(sign * (value - model)), rounded(band), rounded(model), "rad/s", missing
-                )
-            )
+            noise = estimate.gain * max(scatter * max(abs(model), abs(value)), counts)
+            unsure = unsure or noise > _UNSURE * band
+            missing = _missing(NAN if disorder else value, model, reason, absent)
+            residual = NAN if disorder else rounded(sign * (value - model))
+            band = rounded(max(band, _NOISE * noise))
+            speeds.append(Residual(residual, band, rounded(model), "rad/s", missing))
+        if unsure:  # all wheels are read at once: where one cannot be told, no other is better
+            speeds = [evolve(one, residual=NAN, missing=one.missing or SCATTER) for one in speeds]
         return speeds
 
     def _yaw(self, tick: int, estimate: WheelEstimate, speeds: list[Residual]) -> Residual:

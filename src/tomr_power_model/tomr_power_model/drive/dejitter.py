@@ -2,8 +2,8 @@
 
 A driver that samples evenly and stamps when it gets to it scatters its stamps around a grid. Half a
 millisecond of scatter at 100 Hz is 2 % of the speed over 70 ms, the same for all wheels: that looks
-like slip. Whether the samples or only their stamps are uneven shows in motion, which is smoother on
-the times at which it was really sampled.
+like slip. Whether the samples or only their stamps are uneven shows in motion: what the stamps are
+off the grid by is in the angles, or it is not, however coarse these are.
 
 Pure functions, for whole recordings and for the last moments of a live stream alike.
 """
@@ -17,9 +17,10 @@ Array = NDArray[np.float64]
 _FEWEST = 10  # stamps
 _SCATTER = 0.35  # of a period: stamps that scatter wider have no grid
 _GAP = 5.5  # periods: after a longer silence the driver may have started afresh
-_SMOOTHER = 0.9  # share of roughness that the grid must leave
 _MOVING = 0.3  # rad/s
 _ENOUGH = 30  # samples in motion that it takes to tell
+_HALF = 0.5  # between stamps that are right (0) and a grid that is (1)
+_SURE = 4.0  # standard errors; neighbours share samples, which these do not count
 
 
 @frozen
@@ -75,15 +76,30 @@ def even(stamps: Array) -> Array:
 
 
 def is_jitter(stamps: Array, grid: Grid, position: Array) -> bool | None:
-    """Whether samples were taken on the grid and not when stamped; None if too little moves.
+    """Whether samples were taken on the grid and not when stamped; None if that does not show.
+
+    How far a sample lies off the line between its neighbours is regressed on how much of that the
+    stamps add to what the grid leaves: all of it where the grid is right, nothing where the stamps
+    are. Noise of the angles, that of coarse encoders too, is in neither. The standard error is that
+    of clusters: all wheels are read at once.
 
     Args:
         stamps: [s], (n,).
         grid: of these stamps.
         position: of the wheels at the samples [rad], (n, 3).
     """
-    stamped = _roughness(stamps, position)
-    return _roughness(grid.times, position) < _SMOOTHER * stamped if stamped else None
+    stamped = _off(stamps, position)
+    added = stamped - _off(grid.times, position)
+    speed = np.abs(position[2:] - position[:-2]) / (grid.times[2:] - grid.times[:-2])[:, None]
+    added[~(np.isfinite(added) & (np.nan_to_num(speed) > _MOVING))] = 0.0
+    told = added.any(axis=1)
+    if np.count_nonzero(told) < _ENOUGH:
+        return None
+    product = (np.nan_to_num(stamped) * added)[told].sum(axis=1)
+    square = (added[told] ** 2).sum(axis=1)
+    share = float(product.sum() / square.sum())
+    error = float(np.linalg.norm(product - share * square) / square.sum())
+    return share > _HALF if abs(share - _HALF) > _SURE * error else None
 
 
 def dejitter(stamps: Array, position: Array) -> tuple[Array, bool]:
@@ -94,12 +110,9 @@ def dejitter(stamps: Array, position: Array) -> tuple[Array, bool]:
     return grid.times, True
 
 
-def _roughness(time: Array, position: Array) -> float:
-    """How far samples lie off the line between their neighbours [rad]; 0 if little moves."""
+def _off(time: Array, position: Array) -> Array:
+    """How far samples lie off the line between their neighbours [rad], (n - 2, 3)."""
     left, right = time[1:-1] - time[:-2], time[2:] - time[1:-1]
     span = (left + right)[:, None]
     between = (position[:-2] * right[:, None] + position[2:] * left[:, None]) / span
-    off = np.abs(position[1:-1] - between)
-    speed = np.abs(position[2:] - position[:-2]) / span
-    moving = off[np.nan_to_num(speed) > _MOVING]
-    return float(np.median(moving)) if len(moving) >= _ENOUGH else 0.0
+    return np.asarray(position[1:-1] - between)

@@ -26,6 +26,7 @@ _FREE = 2  # more samples than unknowns, to tell how they scatter
 _MOVING = 1.0  # rad/s of the fastest wheel, likewise
 _LEEWAY = 0.05  # s that a stamp may be late: angles that no motor reaches till then are bad
 _NEW_ZERO = 3  # such angles in a row are those of an encoder that counts from elsewhere
+_SAME = 1e-6  # rad: two steps that differ by less are alike
 UNKNOWN: Triple = (float("nan"), float("nan"), float("nan"))
 
 
@@ -73,6 +74,7 @@ class RecentStamps:
         self._jitter = False
         self._grid: Grid | None = None
         self._origin = 0  # of the grid [ns]
+        self.resolution = 0.0  # of the angles, as they show it [rad]; 0 where they have not moved
 
     def add(self, stamp_ns: int, position: Triple) -> None:
         """Take a sample newer than those before."""
@@ -90,15 +92,23 @@ class RecentStamps:
         return times if len(set(times)) == len(times) else stamps_ns
 
     def _look(self) -> None:
+        positions = np.array([position for _, position in self._samples])
+        self._look_at_steps(positions)
         self._origin = self._samples[0][0]
         stamps = 1e-9 * np.array([stamp - self._origin for stamp, _ in self._samples])
         grid = grid_of(stamps)
         if grid is not None:
-            positions = np.array([position for _, position in self._samples])
             found = is_jitter(stamps, grid, positions)
             # At rest nothing can be seen: what was known stays.
             self._jitter = self._jitter if found is None else found
         self._grid = grid if self._jitter else None
+
+    def _look_at_steps(self, positions: Array) -> None:
+        """Whole counts: what steps differ by is one of them at least."""
+        uneven = np.abs(np.diff(positions, n=2, axis=0))
+        told = uneven[uneven > _SAME]
+        if len(told):
+            self.resolution = float(told.min())
 
 
 class EncoderWindow:
@@ -167,6 +177,11 @@ class EncoderWindow:
         last = self._samples[-1]
         furthest = self._fastest * (1e-9 * (sample.stamp_ns - last.stamp_ns) + _LEEWAY)
         return _exceeds(sample.position, last.position, furthest)
+
+    @property
+    def resolution(self) -> float:
+        """Of the angles, as the samples show it [rad]; 0 where that is not known."""
+        return self._stamps.resolution
 
     def at(self, tick_ns: int) -> WheelEstimate:
         """Estimate for the window that ends at a tick; NaN if its samples are missing or stale.

@@ -6,6 +6,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+_LEAST = 4  # stretches that an interval needs
+_NOTHING = 1e-9  # of what the stretch that tells most does: one of less tells nothing
+
 
 @frozen
 class Severity:
@@ -26,6 +29,21 @@ class Severity:
             return f"{self.quantity} {value} % ({low} to {high} %)"
         value, low, high = (f"{number:.3g}" for number in numbers)
         return f"{self.quantity} {value} {self.unit} ({low} to {high} {self.unit})"
+
+
+def slope(squares: Array, products: Array) -> tuple[float, float] | None:
+    """Slope of a line through the origin, and half its interval; None where too little tells.
+
+    Args:
+        squares: of the independent quantity, summed over each stretch, (n,).
+        products: of it with the dependent one, likewise.
+    """
+    told = squares > _NOTHING * squares.max(initial=0.0)
+    x, y = squares[told], products[told]
+    if len(x) < _LEAST:
+        return None
+    others = (y.sum() - y) / (x.sum() - x)
+    return float(y.sum() / x.sum()), float(jackknife_half(others))
 
 
 def jackknife_half(others: Array) -> Array:

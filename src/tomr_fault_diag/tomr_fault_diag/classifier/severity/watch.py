@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.severity.conditions import ConditionsWatch
-from tomr_fault_diag.classifier.severity.interval import Severity, jackknife_half
+from tomr_fault_diag.classifier.severity.interval import Severity, slope
 from tomr_fault_diag.classifier.severity.measures import MEASURES, Measure
 from tomr_fault_diag.classifier.severity.tick import NEXT, Motors, Tick
 from tomr_fault_diag.classifier.states import NORMAL, STATES, State
@@ -31,7 +31,6 @@ Array = NDArray[np.float64]
 _STRETCH = to_ns(0.5)
 _CONSTANTS = 0.05  # of what a description says of them: how well they are known
 _SELDOM = to_ns(0.2)  # between two looks at a robot that is well
-_LEAST = 4  # stretches that an interval needs
 _MOST = 60  # stretches that are remembered
 _SUMS = sum(measure.wheels for measure in MEASURES)
 
@@ -141,9 +140,5 @@ def _places() -> Mapping[State, tuple[Measure, int]]:
 
 
 def _slope(stretches: Sequence[Array], place: int) -> tuple[float, float] | None:
-    """A slope and half its interval; None where too few stretches tell."""
-    x, y = np.array([sums[:, place] for sums in stretches if sums[0, place] > 0.0]).reshape(-1, 2).T
-    if len(x) < _LEAST:
-        return None
-    others = (y.sum() - y) / (x.sum() - x)
-    return float(y.sum() / x.sum()), float(jackknife_half(others))
+    x, y = np.array([sums[:, place] for sums in stretches]).reshape(-1, 2).T
+    return slope(x, y)
