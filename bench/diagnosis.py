@@ -28,6 +28,7 @@ import pickle
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from importlib.resources import files
 from itertools import repeat
 from pathlib import Path
@@ -43,7 +44,7 @@ from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.classifier.states import FAULTLESS, NORMAL, SLIP, State
-from tomr_fault_diag.residuals.frame import ResidualFrame
+from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
 from tomr_power_model.cli import run_main
 from tomr_power_model.robot import shipped_robot
@@ -61,6 +62,7 @@ _APART = 20  # ticks without a show that make the next one an onset of its own
 _AFTER = 10  # ticks after a fault has ceased to show in which naming it still counts
 _RECOVERY = 60  # ticks after the end of a fault
 _EXCUSE = 10  # ticks in which a wheel that slipped excuses the name of slip
+_WIDER = 1.001  # times the usual width: a band that is wider is so for the noise of its encoders
 _TURNING = 0.5  # rad/s: a slower wheel is idle
 _DRIVE_SECONDS = 18.0  # mean length of a drive, at least
 
@@ -92,18 +94,23 @@ def kinds() -> dict[str, Kind]:
 
 
 def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[ResidualFrame]:
-    """The same residuals in other bands."""
+    """The same residuals in other bands than the usual; what was wider for its noise stays so."""
     _, modelled = as_arrays(frames)
-    _, band = Compared(modelled, modelled).residuals(bands)
+    compared = Compared(modelled, modelled)
+    (_, usual), (_, band) = (compared.residuals(chosen) for chosen in (BandSettings(), bands))
+
+    def width(item: Residual, told: float, wanted: float) -> float:
+        return max(wanted, item.band) if item.band > _WIDER * told else wanted
+
     return [
         evolve(
             frame,
             residuals=tuple(
-                evolve(item, band=float(width))
-                for item, width in zip(frame.residuals, row, strict=True)
+                evolve(item, band=width(item, float(told), float(wanted)))
+                for item, told, wanted in zip(frame.residuals, *row, strict=True)
             ),
         )
-        for frame, row in zip(frames, band, strict=True)
+        for frame, *row in zip(frames, usual, band, strict=True)
     ]
 
 
@@ -221,10 +228,13 @@ _BINS = (("0.50 to 0.70", 0.7), ("0.70 to 0.85", 0.85), ("0.85 to 1", 0.999999),
 
 
 def seen(
-    seed: int, kind: str | None, folder: Path | None
+    seed: int, kind: str | None, folder: Path | None, resolution: float | None = None
 ) -> tuple[Drive, LabelledDrive, GroundTruth | None]:
     """A drive, what the first two stages made of it, and its healthy twin if it has a fault."""
     drive = random_drive(shipped_robot("reference"), seed, kind)
+    if resolution is not None:
+        sensors = evolve(drive.plant.sensors, encoder_resolution=resolution)
+        drive = evolve(drive, plant=evolve(drive.plant, sensors=sensors))
     kept = None if folder is None else folder / f"{seed}.pickle"
     if kept is not None and kept.exists():
         labelled, twin = pickle.loads(kept.read_bytes())
@@ -239,14 +249,18 @@ def seen(
     return drive, labelled, twin
 
 
-def simulated(seed: int, kind: str | None, folder: Path | None) -> None:
+def simulated(
+    seed: int, kind: str | None, folder: Path | None, resolution: float | None = None
+) -> None:
     """Only simulate, for a later run to score."""
-    seen(seed, kind, folder)
+    seen(seed, kind, folder, resolution)
 
 
-def scored(seed: int, kind: str | None, folder: Path | None) -> dict[str, Outcome]:
+def scored(
+    seed: int, kind: str | None, folder: Path | None, resolution: float | None = None
+) -> dict[str, Outcome]:
     """A drive scored by every classifier."""
-    drive, labelled, twin = seen(seed, kind, folder)
+    drive, labelled, twin = seen(seed, kind, folder, resolution)
     outcomes = {}
     for name, classifier in kinds().items():
         named = named_by(classifier, rebanded(labelled.frames, classifier.bands))
@@ -280,6 +294,12 @@ def _main(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--json", type=Path, help="write the report to this file as well")
     parser.add_argument("--folder", type=Path, help="keep the simulated drives here, or take them")
     parser.add_argument("--simulate", action="store_true", help="only fill the folder")
+    parser.add_argument(
+        "--encoder-resolution",
+        type=float,
+        metavar="RAD",
+        help="of the wheels' angles (default: the reference's, 40,960 counts a turn)",
+    )
     options = parser.parse_args(arguments)
     first = options.first_seed
     count = max(1, round(options.healthy_hours * 3600.0 / _DRIVE_SECONDS))
@@ -289,10 +309,12 @@ def _main(arguments: Sequence[str] | None) -> int:
     seeds = range(first, first + options.drives)
     more = range(first + _HEALTHY, first + _HEALTHY + count)
     if options.simulate:
-        _run(simulated, seeds, "fault", folder)
-        _run(simulated, more, None, folder)
+        simulating = partial(simulated, resolution=options.encoder_resolution)
+        _run(simulating, seeds, "fault", folder)
+        _run(simulating, more, None, folder)
         return 0
-    sick, well = _run(scored, seeds, "fault", folder), _run(scored, more, None, folder)
+    scoring = partial(scored, resolution=options.encoder_resolution)
+    sick, well = _run(scoring, seeds, "fault", folder), _run(scoring, more, None, folder)
     found = {
         name: report([item[name] for item in sick], [item[name] for item in well])
         for name in kinds()
