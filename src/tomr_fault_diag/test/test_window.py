@@ -286,6 +286,30 @@ def test_a_push_is_no_load_either_where_a_fault_was_believed() -> None:
     assert belief.shares[LOADED] < 1e-6
 
 
+@pytest.mark.parametrize("state", [SLIP, LOADED])
+@pytest.mark.parametrize(
+    ("fault", "decades"), [(CONTROLS.start, -9), (ENCODERS.start, -9), (WEAKS.start + 1, -13)]
+)
+def test_a_fault_on_a_slippery_floor_or_under_a_load_is_as_rare_as_without(
+    state: int, fault: int, decades: int
+) -> None:
+    """The wheels that grip again after a slide look like a motor for a moment."""
+    belief = Belief(0.5, 9.0)
+    belief.shares = np.eye(len(STATE_OF))[state]
+    belief.update(_against_all_but(fault, 10.0))
+    odds = belief.shares[fault] / belief.shares[state]
+    assert np.log10(odds / np.exp(5.0)) == pytest.approx(decades, abs=0.2)
+
+
+@pytest.mark.parametrize("state", [SLIP, LOADED])
+def test_a_fault_that_lasts_is_told_from_the_slip_or_load_before(state: int) -> None:
+    belief = Belief(0.4, 11.0)
+    belief.shares = np.eye(len(STATE_OF))[state]
+    for _ in range(10):  # half a second
+        belief.update(_against_all_but(ENCODERS.start, 20.0))
+    assert belief.shares[ENCODERS.start] > 0.99
+
+
 def test_what_looks_like_another_fault_every_moment_is_none_that_is_known() -> None:
     belief = Belief(0.4, 11.0)
     for k in range(30):

@@ -112,8 +112,11 @@ def _transitions(onset: float) -> Array:
     moves[SLIP, NORMAL] = _SLIP_ENDING
     moves[[NORMAL, EXTERNAL]] = onset
     moves[[NORMAL, EXTERNAL], SLIP] = min(_SLIPPERY * onset, _PUSH)
+    # A floor, or a load, is there beside a fault: it does not turn out to be one.
+    for state in (SLIP, LOADED):
+        moves[state, CONTROLS.start : METERS.stop] = onset
     for kind in (DRAGS, WEAKS, METERS):
-        moves[[NORMAL, EXTERNAL, *_CATCHES_UP], kind] *= _SLOW
+        moves[[NORMAL, EXTERNAL, SLIP, LOADED, *_CATCHES_UP], kind] *= _SLOW
     moves[:, OTHER] *= _STRANGE
     moves[NORMAL, EXTERNAL] = _PUSH
     moves[EXTERNAL, NORMAL] = _PUSH_ENDING
