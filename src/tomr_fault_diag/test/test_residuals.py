@@ -356,6 +356,17 @@ def test_coarse_encoders_widen_bands_until_no_speed_is_known(count: float, is_kn
         assert min(standing) > 1.2 * least
 
 
+def test_where_stamps_scatter_no_speed_is_known_not_even_that_of_a_wheel_that_stands() -> None:
+    dice = random.Random(4)
+
+    def scattered(_: int, message: Any) -> Any:
+        message.position = message.position + message.velocity * dice.gauss(0.0, 0.01)
+        return message
+
+    frames = list(_disturbed("joint_states", scattered).values())[10:]
+    assert all(frame.residuals[place].stale for frame in frames for place in SPEEDS)
+
+
 def test_an_angle_that_no_wheel_reaches_is_no_sample_unless_it_stays() -> None:
     def leaps(at: int, message: Any, until: int) -> Any:
         if 600 <= at < until:

@@ -85,6 +85,49 @@ def test_coarse_encoders_are_not_taken_for_the_other(speed: float, is_even: bool
         assert said.count(is_even) >= 8  # of nine: soon told
 
 
+def test_wheels_that_come_to_rest_are_not_taken_for_uneven_samples() -> None:
+    """Their last counts come one by one, wherever they happen to fall."""
+    even, count, wrong = 0.01 * np.arange(2000), 2.0 * np.pi / (64 * 15), 0
+    since = np.maximum(even % 4.0 - 2.0, 0.0)
+    way = np.outer(even // 4.0 + 1.0 - np.exp(-4.0 * since), [0.25, -0.09, 0.15])
+    angles = count * np.floor(way / count)
+    for seed in range(6):
+        random = np.random.default_rng(seed)
+        stamps = even + np.clip(random.normal(0.0, 7e-4, len(even)), -3e-3, 3e-3)
+        for first in range(0, 1800, 25):
+            part = slice(first, first + 200)
+            grid = grid_of(stamps[part])
+            wrong += grid is not None and is_jitter(stamps[part], grid, angles[part]) is False
+    assert wrong == 0
+
+
+@pytest.mark.parametrize("speed", [0.5, 6.7])
+def test_the_resolution_of_angles_shows_in_their_steps(speed: float) -> None:
+    """Of steps of ten counts and eleven one is told; before anything turned, none."""
+    count, watched = 2.0 * np.pi / (64 * 15), RecentStamps()
+    stamps = np.arange(300, dtype=np.int64) * 10 * MS + _jitter(300)
+    for number, stamp in enumerate(stamps.tolist()):
+        if number == 250:
+            continue  # lost
+        turned = max(0.01 * number - 1.0, 0.0) * speed
+        watched.add(stamp, (count * (turned // count), 0.0, -count * (turned // count)))
+        if number == 99:
+            assert watched.resolution == 0.0
+    assert watched.resolution == pytest.approx(count)
+
+
+def test_a_wheel_that_says_nothing_hides_no_jitter() -> None:
+    even = 0.01 * np.arange(200)
+    stamps = even + 1e-9 * _jitter(200)
+    angles = _angles(even)
+    angles[:, 1] = np.nan
+    grid = grid_of(stamps)
+    assert grid is not None
+    assert is_jitter(stamps, grid, angles) is True
+    assert is_jitter(stamps, grid, _angles(stamps) + 0.0 * angles) is False
+    assert is_jitter(stamps, grid, np.full((200, 3), np.nan)) is None
+
+
 @pytest.mark.parametrize("missing", [0, 7])
 def test_even_stamps_stay_bit_by_bit(missing: int) -> None:
     stamps = np.arange(300, dtype=np.int64) * 10 * MS
