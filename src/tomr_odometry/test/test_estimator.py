@@ -11,6 +11,7 @@ from attrs import evolve
 from odometry_drives import ROBOT, START, Recorded, contained, drive, ice, off, play
 
 from tomr_odometry.estimator import SlipOdometry
+from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.start import body_of
 from tomr_odometry.topics import estimate_messages
 
@@ -95,7 +96,29 @@ def test_what_is_missing_is_said(gripping: Recorded) -> None:
 
     items = list(play(gripping, without))
     assert items[-1].missing == ("imu/data", "wheel_2/power")
-    assert any("without an IMU" in text for text in items[-1].assumed)
+    assert any("less surely than an IMU" in text for text in items[-1].assumed)
+
+
+def test_where_one_power_is_left_the_wheels_are_taken_for_gripping(slippery: Recorded) -> None:
+    def without(time: float, topic: str, message: Any) -> Any:
+        return None if topic in ("imu/data", "wheel_2/power", "wheel_3/power") else message
+
+    items = list(play(slippery, without))
+    assert not any(item.probability.any() for item in items)
+    assert "without an IMU and power" in items[-1].assumed[-1]
+
+
+def test_power_alone_tells_of_slides(slippery: Recorded, gripping: Recorded) -> None:
+    """Without an IMU; where nothing slides the pose is that of the wheels."""
+    settings = OdometrySettings(use_imu=False)
+    plain = evolve(settings, use_power=False)
+    ours, wheels = (list(play(slippery, settings=given)) for given in (settings, plain))
+    assert off(slippery, ours[-1]) < 0.7 * off(slippery, wheels[-1])
+    assert any(item.is_slipping for item in ours)
+    assert contained(slippery, ours) > 0.95
+    ours, wheels = (list(play(gripping, settings=given)) for given in (settings, plain))
+    assert not any(item.is_slipping for item in ours)
+    assert ours[-1].pose == pytest.approx(wheels[-1].pose, abs=1e-6)
 
 
 def _heavy(message: Any) -> None:

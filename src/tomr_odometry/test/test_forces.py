@@ -59,7 +59,10 @@ def test_forces_are_evidence_with_signs_and_an_imu(signed: bool, aided: bool, ro
     measurement = evolve(ROBOT.measurement, signed=signed)
     core = SlipOdometry(evolve(ROBOT, measurement=measurement))
     core._heard = {"encoders": START, "power 1": START}
-    core._tractive, core._is_aided = [Traction(START, 1, 3.0, 2.0, 5.0)], aided
+    core._tractive, core._is_aided = (
+        [Traction(START, 1, 3.0, 2.0, 5.0, ((3.0, -9.0), (2.0, 2.0)))],
+        aided,
+    )
     found = core._evidence(0.01)
     assert found.tolist() == [[1.0, 3.0, core.settings.noise.force**2 + 4.0, 5.0]] * rows
     assert core._forces[1] == 3.0

@@ -94,6 +94,29 @@ def test_a_magnitude_of_current_is_taken_to_drive(signed: bool, speed: float, si
     assert math.copysign(1.0, found.force) == sign
 
 
+def test_a_power_leaves_two_forces_of_which_one_is_told() -> None:
+    found = _started(ROBOT, 100).power(1_000_000_000, 0, 20.0)
+    assert found is not None
+    (one, other), (std, _) = found.either
+    assert found.force in (one, other)
+    assert other - one > 20.0
+    assert found.nearer(one - 5.0) == (one, std)
+    assert found.nearer(other + 5.0)[0] == other
+    # Both currents draw the same power.
+    motor, speed = ROBOT.motors[0], found.speed
+    apart = (other - one) * ROBOT.wheel_radius / motor.wheel_constant
+    middle = -0.5 * motor.wheel_constant * speed / motor.resistance
+    law = motor.resistance * ((0.5 * apart) ** 2 - middle**2)
+    assert law == pytest.approx(20.0, rel=0.1)
+
+
+def test_a_measured_current_leaves_one_force() -> None:
+    measurement = evolve(ROBOT.measurement, quantity="motor_current", signed=True)
+    found = _started(evolve(ROBOT, measurement=measurement), 100).power(1_000_000_000, 0, 2.0)
+    assert found is not None
+    assert found.either[0] == (found.force, found.force)
+
+
 def _one_of_two(law: float, change: float = -20.0) -> tuple[list[float], float, float, float]:
     """Both currents of a power, which is taken for a law's voltage between them, noise, rolling."""
     tractions, motion = Tractions(ROBOT), _motion(4.0, change)
@@ -105,7 +128,7 @@ def _one_of_two(law: float, change: float = -20.0) -> tuple[list[float], float, 
     motor = ROBOT.motors[0]
     held = motor.resistance * current + motor.wheel_constant * 4.0
     motion[at.MOTION_HEADER + at.MOTION_VOLTAGE] = held
-    found, noise, _ = tractions._current(0, power[at.POWER_DRAWN], motion)
+    found, noise, _ = tractions._current(0, power[at.POWER_DRAWN], motion, both[:2])
     return both[:2], found, noise, power[at.POWER_CURRENT]
 
 

@@ -15,6 +15,7 @@ from tomr_odometry.rims import Rims
 from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.start import body_of, is_incredible, start, start_again
 from tomr_odometry.traction import Traction, Tractions
+from tomr_odometry.unaided import FEWEST_POWERS, Unaided
 from tomr_power_model.drive.sources import PowerReading
 from tomr_power_model.model.encoder_flaws import EncoderFlaws
 from tomr_power_model.model.encoders import RecentStamps
@@ -65,10 +66,12 @@ class SlipOdometry:
         # Magnitudes of currents are good for creep, but no evidence of what the body does.
         self._are_evidence = robot.measurement.signed
         self.floor = Floor(robot)
+        self._by_power = Unaided(robot, self._body, self._radius)
         self._clear()
 
     def _clear(self) -> None:
         self._tractions.clear()
+        self._by_power.clear()
         self._queues: dict[str, deque[tuple[int, str, tuple[float, ...]]]] = {}
         self._time = 0  # of the filter's state [ns]
         self._mode = np.zeros(4)
@@ -215,6 +218,8 @@ class SlipOdometry:
         """Go on to a time, with the ways of the rims there."""
         dt = 1e-9 * (time - self._time)
         forces = self._evidence(dt)
+        self._ask_power(dt)
+        ways = np.stack([ways[0] - self._by_power.slid, ways[1]])
         inertial = np.mean(self._inertial, axis=0) if self._inertial else _NO_IMU
         self._inertial, self._tractive = [], []
         self._advance(time, dt, ways, inertial, forces)
@@ -223,9 +228,27 @@ class SlipOdometry:
             lost = _CARRIED_SPEED**2 * dt
             for place in (0, 1, 2, VX, VX + 1, WZ):
                 self._P[place, place] += lost
-        sliding = self._mode[:3] > SLIDES
+        sliding = self._probability > SLIDES
         self._available.take(self._forces, self._force_std, sliding, dt)
         self.floor.take(self._x[:3], sliding, self._forces / self._body.load)
+
+    @property
+    def _probability(self) -> Array:
+        """That each wheel slides."""
+        return self._mode[:3] if self._is_aided else self._by_power.probability
+
+    def _ask_power(self, dt: float) -> None:
+        """What the contacts slid in a step without an IMU."""
+        is_told = self._are_evidence and np.isfinite(self._forces).sum() >= FEWEST_POWERS
+        speeds = self._tractions.speeds
+        if self._is_aided or not is_told or speeds is None:
+            self._by_power.rest()
+            return
+        twist, rims = self._x[VX : WZ + 1], speeds * self._radius
+        self._by_power.step(dt, twist, rims, self._tractive)
+        for found in self._tractive:
+            near = found.nearer(self._by_power.force[found.wheel])
+            self._forces[found.wheel], self._force_std[found.wheel] = near
 
     def _evidence(self, dt: float) -> Array:
         """Forces for the filter, if they are evidence; keeps what creep and messages need."""
@@ -278,7 +301,7 @@ class SlipOdometry:
         ground = body.rows @ twist
         rim = self._rims.speed
         creeps = x[CREEP] * self.settings.creep.shape(self._used) * math.hypot(*self._travel)
-        is_sliding = self._mode[:3] > SLIDES
+        is_sliding = self._probability > SLIDES
         sliding = np.where(is_sliding, rim - ground, creeps)
         larger = np.maximum(np.abs(rim), np.abs(rim - sliding))
         least = np.where(is_sliding, _TURNING, _CREEPING)
@@ -294,7 +317,7 @@ class SlipOdometry:
             slip=np.clip(slip, -1.0, 1.0),
             sliding=sliding,
             creeping=creeps,
-            probability=self._mode[:3].copy(),
+            probability=self._probability.copy(),
             traction=self._forces.copy(),
             traction_std=self._force_std.copy(),
             available=self._available.interval,
@@ -312,7 +335,8 @@ class SlipOdometry:
             return np.zeros((3, 3))
         noise, travel = self._unsure, math.hypot(*self._travel)
         # What makes the pose spread as it does where slides last so long.
-        return np.diag(np.square((noise.way, noise.way, noise.turn)) * travel**2 / _SLIDES_ON)
+        unseen = np.square((noise.way, noise.way, noise.turn)) * travel**2 / _SLIDES_ON
+        return self._by_power.covariance + np.diag(unseen)
 
     def _sensors(self, tick: int) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:
         """Sensors that are silent, and what is used of each."""
@@ -334,8 +358,10 @@ class SlipOdometry:
         found = []
         if not self.settings.creep.is_known:
             found.append("wheels do not creep: not learnt, see tomr_odometry learn")
-        if "imu/data" in missing:
-            found.append("wheels do not slide: without an IMU nothing sure tells that they do")
+        if "imu/data" in missing and self._by_power.is_at_work:
+            found.append("wheels slide as the motors' power tells: less surely than an IMU would")
+        elif "imu/data" in missing:
+            found.append("wheels do not slide: without an IMU and power nothing tells that they do")
         return tuple(found)
 
     def _learnt(self) -> tuple[tuple[str, float], ...]:

@@ -12,6 +12,7 @@ from collections import deque
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.binding import plain
@@ -22,6 +23,7 @@ from tomr_power_model.model.encoders import WheelEstimate
 from tomr_power_model.robot import WHEELS, Robot
 
 Triple = tuple[float, float, float]
+Pair = tuple[tuple[float, float], tuple[float, float]]
 _SPAN_NS = 60_000_000  # of the encoder samples that tell speed and acceleration
 _FEWEST = 8  # samples
 _RESTING = 0.3  # rad/s
@@ -45,6 +47,12 @@ class Traction:
     force: float  # N
     std: float  # of noise and of what dry friction leaves open [N]
     speed: float  # of the wheel [rad/s]
+    either: Pair  # forces of both currents that the power leaves, and their deviations [N]
+
+    def nearer(self, force: float) -> tuple[float, float]:
+        """Of the two forces the one that is nearer to another [N], and its deviation."""
+        first, second = zip(*self.either, strict=True)
+        return min(first, second, key=lambda one: abs(one[0] - force))
 
 
 class Tractions:
@@ -125,6 +133,14 @@ class Tractions:
         wheels = self._flaws.turned(shown)
         return list(last), wheels.speed.tolist(), wheels.acceleration.tolist()
 
+    @property
+    def speeds(self) -> NDArray[np.float64] | None:
+        """Of the wheels at the newest encoder sample [rad/s]; None before there are enough."""
+        if len(self._samples) < _FEWEST:
+            return None
+        self._fitted = self._fitted or self._fit()
+        return np.array(self._fitted[1])
+
     def _motion(self, time_ns: int) -> list[float] | None:
         """Wheels' speeds and accelerations at some time, as the inverse dynamics take them."""
         if len(self._samples) < _FEWEST:
@@ -146,17 +162,42 @@ class Tractions:
             return None
         if stamp_ns - self._samples[-1][0] > _STALE_NS:
             return None
-        current, noise, is_sure = self._current(wheel, drawn, motion)
-        forces, own = [0.0, 0.0], _motion_of(motion, wheel)
-        self._laws.tractions(self._alone[wheel], own, [current], forces, 1)
+        found = self._currents(wheel, drawn, motion)
+        current, noise, is_sure = self._current(wheel, drawn, motion, found)
+        own = _motion_of(motion, wheel)
         speed = own[at.MOTION_HEADER + at.MOTION_SPEED]
         if is_sure and abs(speed) > _MOVING:
             self._follow(wheel, current, speed)
-        force = forces[0]
+        force, left = self._force(wheel, current, own)
         rough = self._roughness(wheel, force)
         newtons = self._constant[wheel] / self._radius
-        std = math.hypot(newtons * noise, forces[1], rough)
-        return Traction(stamp_ns, wheel, force, std, speed)
+        std = math.hypot(newtons * noise, left, rough)
+        either = self._either(wheel, drawn, own, found)
+        return Traction(stamp_ns, wheel, force, std, speed, either)
+
+    def _force(self, wheel: int, current: float, own: list[float]) -> tuple[float, float]:
+        """Force of a contact at a motor's current, and what dry friction leaves open of it [N]."""
+        forces = [0.0, 0.0]
+        self._laws.tractions(self._alone[wheel], own, [current], forces, 1)
+        return forces[0], forces[1]
+
+    def _either(self, wheel: int, drawn: float, own: list[float], found: list[float]) -> Pair:
+        """Forces of both currents, each with its own deviation: which is right does not count."""
+        speed = own[at.MOTION_HEADER + at.MOTION_SPEED]
+        newtons = self._constant[wheel] / self._radius
+        forces, stds = [], []
+        for current in found:
+            force, left = self._force(wheel, current, own)
+            forces.append(force)
+            stds.append(math.hypot(newtons * self._spread(wheel, drawn, current, speed), left))
+        return (forces[0], forces[1]), (stds[0], stds[1])
+
+    def _spread(self, wheel: int, drawn: float, current: float, speed: float) -> float:
+        """Deviation of a current that follows from a power [A]."""
+        if self._is_current:
+            return self._noise
+        slope = abs(2.0 * self._resistance[wheel] * current + self._constant[wheel] * speed)
+        return (self._noise + _POWER_SHARE * abs(drawn)) / max(slope, _LEAST_SLOPE)
 
     def _roughness(self, wheel: int, force: float) -> float:
         """Standard deviation of what changes from sample to sample [N]: a driver that sees coarse
@@ -168,7 +209,17 @@ class Tractions:
             self._rough[wheel] += _ROUGH_SHARE * (second - self._rough[wheel])
         return math.sqrt(self._rough[wheel])
 
-    def _current(self, wheel: int, drawn: float, motion: list[float]) -> tuple[float, float, bool]:
+    def _currents(self, wheel: int, drawn: float, motion: list[float]) -> list[float]:
+        """Both currents that a measured power leaves [A]."""
+        if self._is_current:
+            return [drawn, drawn]
+        found = [0.0, 0.0]
+        self._laws.motor_currents(self._alone[wheel], _motion_of(motion, wheel), [drawn], found, 1)
+        return found
+
+    def _current(
+        self, wheel: int, drawn: float, motion: list[float], found: list[float]
+    ) -> tuple[float, float, bool]:
         """A motor's current [A], its noise, and whether the measurement's sign is beyond doubt."""
         place = at.MOTION_HEADER + wheel * at.MOTION_WHEEL
         constant, cold = self._constant[wheel], self._resistance[wheel]
@@ -180,8 +231,6 @@ class Tractions:
         if self._is_current:  # a magnitude: a motor that brakes is taken for one that drives
             way = math.tanh(motion[place + at.MOTION_SPEED] / _RESTING)
             return abs(drawn) * way, self._noise, False
-        found = [0.0, 0.0]
-        self._laws.motor_currents(self._alone[wheel], _motion_of(motion, wheel), [drawn], found, 1)
         rolling = [0.0] * (WHEELS * at.POWER_WHEEL)
         self._laws.drive_power(self._numbers, motion, rolling, WHEELS)
         expected = rolling[wheel * at.POWER_WHEEL + at.POWER_CURRENT]
@@ -189,8 +238,7 @@ class Tractions:
         cost = [((one - by_law) / law_std) ** 2 + ((one - expected) / spread) ** 2 for one in found]
         side = int(cost[1] < cost[0])
         current, apart = found[side], found[1] - found[0]
-        slope = abs(2.0 * cold * current + back)
-        noise = (self._noise + _POWER_SHARE * abs(drawn)) / max(slope, _LEAST_SLOPE)
+        noise = self._spread(wheel, drawn, current, back / constant)
         other = math.exp(-0.5 * min(abs(cost[1] - cost[0]), 100.0))  # odds of the other current
         return current, math.hypot(noise, math.sqrt(other) * apart), other < _SURE
 

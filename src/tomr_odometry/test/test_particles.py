@@ -1,0 +1,145 @@
+"""Slides told from power alone, against hand-worked floors."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from odometry_drives import ROBOT
+
+from tomr_odometry.particles import Particles, ParticleSettings, Slides
+from tomr_odometry.start import body_of
+from tomr_odometry.traction import Traction
+
+Array = NDArray[np.float64]
+BODY, _ = body_of(ROBOT)
+FRICTION = np.full(3, 1.0)  # N
+STEP = 0.02  # s
+SHARE = 0.12  # traction coefficient of the slippery floor
+FORWARD = np.array([1.0, 0.0, 0.0])
+Told = Callable[[int, float], float]  # force of a wheel at a time [N]
+
+
+def reading(wheel: int, force: float, first: bool = True) -> Traction:
+    """A power that leaves two forces, on either side of that at which it is least."""
+    other = -300.0 - force
+    pair = (force, other) if first else (other, force)
+    return Traction(0, wheel, force, 0.2, 5.0, (pair, (0.2, 0.2)))
+
+
+def played(
+    rims: Callable[[float], Array],
+    force: Told | None,
+    seconds: float,
+    first: bool = True,
+    settings: ParticleSettings | None = None,
+) -> tuple[Slides, Array]:
+    """What the particles say after some seconds, and the rims' speeds then."""
+    particles, time = Particles(BODY, FRICTION, 0.0, settings), 0.0
+    while time < seconds:
+        time += STEP
+        for wheel in range(3):
+            if force is not None:
+                particles.take(reading(wheel, force(wheel, time), first=first))
+        assert particles.step(STEP, rims(time))
+    return particles.slides(rims(time)), rims(time)
+
+
+def rolling(acceleration: float) -> tuple[Callable[[float], Array], Told]:
+    """Rims and forces of wheels that roll, forward at a constant acceleration [m/s^2]."""
+    forces = np.linalg.solve(BODY.rows.T, BODY.inertia @ (acceleration * FORWARD))
+    return (
+        lambda time: BODY.rows @ (acceleration * time * FORWARD),
+        lambda wheel, time: float(forces[wheel]),
+    )
+
+
+def spinning(speed: float = 1.5) -> tuple[Callable[[float], Array], Told, float]:
+    """Rims at full speed at once on a slippery floor, their limits as forces, and what follows.
+
+    Two wheels pull with the traction coefficient times their loads, at 30 degrees to the motion:
+    0.12 * 15 kg / 3 * 9.81 m/s^2 * 2 cos(30 deg) / 15 kg = 0.68 m/s^2. The third does not turn.
+    """
+    rims = BODY.rows @ (speed * FORWARD)
+    forces = SHARE * BODY.load * np.sign(np.round(rims, 9))
+    acceleration = float(np.linalg.solve(BODY.inertia, BODY.rows.T @ forces)[0])
+    return lambda time: rims, lambda wheel, time: float(forces[wheel]), acceleration
+
+
+def test_a_body_on_a_slippery_floor_gains_what_its_traction_gives_it() -> None:
+    rims, force, acceleration = spinning()
+    found, _ = played(rims, force, 0.8, settings=ParticleSettings(dragging=0.0))
+    assert acceleration == pytest.approx(0.68, abs=0.005)
+    assert found.twist[0] == pytest.approx(0.8 * acceleration, rel=0.2)
+    assert abs(found.twist[1]) < 0.05
+    assert found.any_probability > 0.95
+    turning = np.abs(rims(0.0)) > 0.1
+    assert (found.probability[turning] > 0.9).all()
+
+
+def test_wheels_whose_forces_are_those_of_rolling_grip() -> None:
+    rims, force = rolling(0.8)
+    found, last = played(rims, force, 0.8)
+    assert found.any_probability < 0.1
+    assert found.twist == pytest.approx(BODY.to_twist @ last, abs=0.02)
+
+
+def test_which_of_the_two_forces_comes_first_does_not_count() -> None:
+    rims, force, _ = spinning()
+    one, other = (played(rims, force, 0.4, first=first)[0] for first in (True, False))
+    assert one.twist.tolist() == other.twist.tolist()
+
+
+def test_the_same_messages_give_the_same_numbers() -> None:
+    rims, force, _ = spinning()
+    one, other = (played(rims, force, 0.3)[0] for _ in range(2))
+    assert one.twist.tolist() == other.twist.tolist()
+
+
+def test_without_power_no_wheel_is_said_to_slide() -> None:
+    for rims in (rolling(0.8)[0], spinning()[0]):
+        found, _ = played(rims, None, 2.0)
+        assert found.any_probability < 0.5
+
+
+def test_wheels_find_their_grip_again() -> None:
+    """The floor is slippery for half a second, and then the forces are those of rolling."""
+    rims, limits, _ = spinning(0.3)
+    found, last = played(rims, lambda wheel, time: limits(wheel, time) if time < 0.5 else 0.0, 3.0)
+    assert found.any_probability < 0.2
+    assert found.twist == pytest.approx(BODY.to_twist @ last, abs=0.03)
+
+
+def test_a_robot_whose_wheels_stand_does_not_slide_off() -> None:
+    """On a floor that may slope: there forces tell nothing, and particles would run away."""
+    particles = Particles(BODY, FRICTION, 0.0, ParticleSettings(sloping=1.0, slope=1.0))
+    for _ in range(500):
+        particles.step(STEP, np.zeros(3))
+    found = particles.slides(np.zeros(3))
+    assert found.any_probability < 0.3
+    assert np.abs(found.twist).max() < 0.1
+
+
+def test_steps_wait_for_enough_time_and_are_never_long() -> None:
+    particles = Particles(BODY, FRICTION, 0.0)
+    assert not particles.step(0.01, np.zeros(3))
+    assert particles.step(0.01, np.zeros(3))
+    start = np.array([0.0, 0.5, 0.0])
+    particles.start(start)
+    particles._slope[:] = 0.0
+    assert particles.step(60.0, np.zeros(3))  # a tenth of a second of braking at most
+    assert particles._twist[:, 1].max() > 0.4
+
+
+def test_coarse_counts_that_shake_the_motors_count_less() -> None:
+    """Forces that lack half of what rolling takes, smooth and shaken."""
+    rims, force = rolling(1.2)
+
+    def found(shake: float) -> Slides:
+        def told(wheel: int, time: float) -> float:
+            return 0.5 * force(wheel, time) + shake * math.cos(math.pi * time / STEP)
+
+        return played(rims, told, 0.8)[0]
+
+    assert found(20.0).any_probability < 0.5 < found(0.0).any_probability

@@ -1,0 +1,249 @@
+"""Slides told from power alone: a particle filter over the floor and what the body does on it.
+
+Each particle is a floor (traction coefficient, slope), what friction and drag are off by, and the
+twist that the body has on this floor when its rims turn as the encoders say. It predicts the force
+of each contact; a motor's power has two currents, and so tells one of two forces. A particle whose
+forces are those of the power, near either of the two, lives on. Where wheels grip all floors agree.
+
+The contacts are those of the one dynamics (dynamics/contacts.py: sticking up to traction times
+load), but with rims that are given and for all particles at once, which makes a step cheap.
+"""
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_odometry.kernel import STICKING, Body
+from tomr_odometry.traction import Traction
+from tomr_power_model.robot import GRAVITY, WHEELS
+
+Array = NDArray[np.float64]
+
+_SEED = 20_240_101  # the same messages give the same numbers
+_LEAST_STEP = 0.018  # s
+_LONGEST_STEP = 0.1  # s
+_RESTING = 0.025  # m/s of a rim, below which dry friction fades
+_ROUGH_SHARE, _ROUGHEST = 0.04, 60.0  # of a new sample in the mean; N
+_SLIDING = 0.05  # m/s, of a contact that is said to slide
+
+
+class ParticleSettings(NamedTuple):
+    """How many, what floors there are, how they change, and how exactly forces are known."""
+
+    particles: int = 800
+    sweeps: int = 5  # over the contacts
+    gripping: float = 0.6  # share of floors that grip
+    least: float = 0.02  # traction coefficient, evenly by its logarithm up to `grips` and `most`
+    grips: float = 0.3
+    most: float = 1.0
+    new_floor: float = 0.03  # 1/s, at which a robot comes to another floor
+    regain: float = 0.3  # 1/s, at which its wheels find their grip
+    comes_to_rest: float = 1.0  # 1/s, at which it stands where no wheel turns: forces tell nothing
+    wander: float = 0.1  # 1/sqrt(s), of the logarithm of the traction coefficient
+    sloping: float = 0.15  # share of floors that slope
+    slope: float = 0.4  # m/s^2, of those
+    level: float = 0.02  # m/s^2, of the others
+    walk_slope: float = 0.02  # m/s^2/sqrt(s)
+    holds: float = 0.7  # of the traction: a slope pulls no more, or no wheel would hold the robot
+    friction: float = 0.08  # of a wheel's dry friction, by which it is off
+    friction_least: float = 0.1  # N
+    drag: float = 0.3  # of the rollers' drag
+    dragging: float = 0.2  # share of floors on which rollers drag by anything up to
+    drag_most: float = 0.4
+    walk_twist: float = 0.02  # m/s/sqrt(s), while wheels slide
+    force: float = 0.07  # N per kg of the robot, by which predicted forces are off
+    force_share: float = 0.1  # of a force and of dry friction, the same
+    roughness: float = 2.0  # of the variance from sample to sample
+    farthest: float = 6.0  # standard deviations
+    time: float = 0.12  # s, over which what is off is averaged
+    tails: float = 4.0  # degrees of freedom of its distribution
+    trust: float = 0.35  # share of the evidence that counts: what a model is off by stays off
+
+
+@frozen
+class Slides:
+    """What the particles say of a moment."""
+
+    twist: Array  # m/s, m/s, rad/s
+    covariance: Array  # (3, 3)
+    force: Array  # of each contact [N]
+    probability: Array  # that each wheel slides
+    any_probability: float  # that any wheel does
+
+
+class Particles:
+    """Encoder samples and tractions in, the twist of the body on a floor nobody knows out."""
+
+    def __init__(
+        self, body: Body, friction: Array, drag: float, settings: ParticleSettings | None = None
+    ) -> None:
+        """friction: dry friction of each wheel [N] at its rim; drag: of the rollers [-]."""
+        self._set = settings or ParticleSettings()
+        self._body, self._dry, self._described_drag = body, friction, drag
+        self._light = np.asarray(np.linalg.inv(body.inertia))
+        self._per_force = body.rows @ self._light  # change of the twist by each contact's impulse
+        self._yields = np.einsum("ij,ij->i", self._per_force, body.rows)
+        self.start(np.zeros(3))
+
+    def start(self, twist: Array) -> None:
+        """Begin with a known twist on any floor."""
+        s, n = self._set, self._set.particles
+        self._random = np.random.default_rng(_SEED)
+        self._twist = np.tile(twist, (n, 1))
+        self._yaw = np.zeros(n)
+        self._traction = self._floors(n)
+        steep = np.where(self._random.random((n, 1)) < s.sloping, s.slope, s.level)
+        self._slope = steep * self._random.standard_normal((n, 2))
+        off = s.friction * self._dry + s.friction_least
+        self._friction = off * self._random.standard_normal((n, WHEELS))
+        near = self._described_drag * (1.0 + s.drag * self._random.standard_normal(n))
+        other = s.drag_most * self._random.random(n) ** 2
+        self._drag = np.where(self._random.random(n) < s.dragging, other, near)
+        self._force = np.zeros((n, WHEELS))
+        self._off = np.zeros((n, WHEELS))  # standard deviations, averaged
+        self._weight = np.full(n, 1.0 / n)
+        self._readings: list[Traction] = []
+        self._rough = np.zeros(WHEELS)
+        self._seen: tuple[deque[Array], ...] = tuple(deque(maxlen=3) for _ in range(WHEELS))
+        self._since = 0.0
+
+    def _floors(self, count: int) -> Array:
+        s, random = self._set, self._random
+        good = random.random(count) < s.gripping
+        low, high = np.where(good, s.grips, s.least), np.where(good, s.most, s.grips)
+        return np.asarray(low * (high / low) ** random.random(count))
+
+    def take(self, reading: Traction) -> None:
+        """Take what a motor's power tells of its contact's force."""
+        self._readings.append(reading)
+
+    def step(self, dt: float, rims: Array) -> bool:
+        """Go on by dt [s] to rims that turn so fast [m/s]; False: too soon for a step."""
+        self._since += dt
+        if self._since < _LEAST_STEP:
+            return False
+        dt, self._since = min(self._since, _LONGEST_STEP), 0.0
+        self._change(dt, rims)
+        self._move(dt, rims)
+        self._judge(dt, rims)
+        return True
+
+    def slides(self, rims: Array) -> Slides:
+        """What the particles say."""
+        mean = self._weight @ self._twist
+        off = self._twist - mean
+        sliding = np.abs(rims - self._twist @ self._body.rows.T) > _SLIDING
+        return Slides(
+            twist=mean,
+            covariance=(off * self._weight[:, None]).T @ off,
+            force=self._weight @ self._force,
+            probability=self._weight @ sliding,
+            any_probability=float(self._weight @ sliding.any(axis=1)),
+        )
+
+    def _change(self, dt: float, rims: Array) -> None:
+        """Floors change, and wheels find their grip again."""
+        s, random, n = self._set, self._random, self._set.particles
+        other = np.flatnonzero(random.random(n) < s.new_floor * dt)
+        self._traction[other] = self._floors(len(other))
+        back = np.flatnonzero(random.random(n) < s.regain * dt)
+        if len(back):
+            grips = self._traction > s.grips
+            self._force[back] = self._force[grips].mean(axis=0) if grips.any() else 0.0
+            self._twist[back] = self._body.to_twist @ rims
+            self._traction[back] = s.grips * (s.most / s.grips) ** random.random(len(back))
+        if float(np.abs(rims).max()) < _RESTING:
+            self._twist[random.random(n) < s.comes_to_rest * dt] = 0.0
+        self._traction *= np.exp(s.wander * math.sqrt(dt) * random.standard_normal(n))
+        np.clip(self._traction, 0.5 * s.least, 1.2 * s.most, out=self._traction)
+        self._slope += s.walk_slope * math.sqrt(dt) * random.standard_normal((n, 2))
+
+    def _move(self, dt: float, rims: Array) -> None:
+        """Twists and forces on each floor, by sweeps over the contacts."""
+        b, s, twist = self._body, self._set, self._twist
+        free = twist + dt * (self._wrench() @ self._light + self._force @ self._per_force)
+        free[:, 0] += dt * twist[:, 2] * twist[:, 1]
+        free[:, 1] -= dt * twist[:, 2] * twist[:, 0]
+        limit = self._traction[:, None] * b.load
+        for _ in range(s.sweeps):
+            for i in range(WHEELS):
+                more = (rims[i] - free @ b.rows[i]) / (dt * self._yields[i])
+                force = np.clip(self._force[:, i] + more, -limit[:, i], limit[:, i])
+                free += (dt * (force - self._force[:, i]))[:, None] * self._per_force[i]
+                self._force[:, i] = force
+        slides = np.flatnonzero((np.abs(rims - free @ b.rows.T) > _SLIDING).any(axis=1))
+        shaken = self._random.standard_normal((len(slides), 3))
+        free[slides] += s.walk_twist * math.sqrt(dt) * shaken
+        self._twist = free
+        self._yaw += dt * free[:, 2]
+
+    def _wrench(self) -> Array:
+        """Of drag and slope on the body [N, N, N m]."""
+        b, cos, sin = self._body, np.cos(self._yaw), np.sin(self._yaw)
+        along = np.tanh(self._twist @ b.along.T / STICKING) * b.load
+        wrench = -self._drag[:, None] * (along @ b.along)
+        steep = np.hypot(self._slope[:, 0], self._slope[:, 1])
+        most = self._set.holds * GRAVITY * self._traction
+        pull = b.mass * np.minimum(1.0, most / np.maximum(steep, 1e-9))
+        wrench[:, 0] += pull * (cos * self._slope[:, 0] + sin * self._slope[:, 1])
+        wrench[:, 1] += pull * (cos * self._slope[:, 1] - sin * self._slope[:, 0])
+        return np.asarray(wrench)
+
+    def _judge(self, dt: float, rims: Array) -> None:
+        """Weigh the particles by the powers, and leave those that nothing speaks for."""
+        s, share = self._set, 1.0 - math.exp(-dt / self._set.time)
+        logs = np.log(np.maximum(self._weight, 1e-300))
+        turning = np.tanh(rims / _RESTING)
+        for reading in self._readings:
+            i = reading.wheel
+            expected = self._force[:, i] + self._friction[:, i] * turning[i]
+            off = self._apart(reading, expected)
+            self._off[:, i] += share * (off - self._off[:, i])
+            square = self._off[:, i] ** 2
+            logs -= 0.5 * (s.tails + 1.0) * s.trust * dt / s.time * np.log1p(square / s.tails)
+        self._readings.clear()
+        weight = np.exp(logs - logs.max())
+        self._weight = weight / weight.sum()
+        if self._weight @ self._weight > 2.0 / s.particles:
+            self._draw()
+
+    def _apart(self, reading: Traction, expected: Array) -> Array:
+        """Standard deviations between expected forces [N] and the nearer one of the power's."""
+        s, i = self._set, reading.wheel
+        forces, stds = np.array(reading.either)
+        rough = s.roughness * self._roughness(i, forces)
+        common = (s.force * self._body.mass) ** 2 + rough
+        share = s.force_share * (self._dry[i] + np.abs(forces))
+        spread = np.sqrt(common + stds**2 + share**2)
+        off = (forces[:, None] - expected) / spread[:, None]
+        nearer = np.where(np.abs(off[0]) < np.abs(off[1]), off[0], off[1])
+        return np.asarray(np.clip(nearer, -s.farthest, s.farthest))
+
+    def _roughness(self, wheel: int, forces: Array) -> float:
+        """Variance from sample to sample [N^2]: drivers shake their motors by coarse counts."""
+        seen = self._seen[wheel]
+        seen.append(forces)
+        if len(seen) == seen.maxlen:
+            change = float(np.abs(seen[0] - 2.0 * seen[1] + seen[2]).min())
+            new = min(change, _ROUGHEST) ** 2 / 6.0
+            self._rough[wheel] += _ROUGH_SHARE * (new - self._rough[wheel])
+        return float(self._rough[wheel])
+
+    def _draw(self) -> None:
+        """As many particles again, each as often as it weighs; what is constant is spread a bit."""
+        n, random = self._set.particles, self._random
+        places = (random.random() + np.arange(n)) / n
+        kept = np.minimum(np.searchsorted(np.cumsum(self._weight), places), n - 1)
+        self._twist, self._yaw = self._twist[kept], self._yaw[kept]
+        self._traction = self._traction[kept] * np.exp(0.05 * random.standard_normal(n))
+        for constant in ("_slope", "_friction", "_drag"):
+            values = getattr(self, constant)
+            spread = np.sqrt(self._weight @ (values - self._weight @ values) ** 2)
+            noise = 0.1 * spread * random.standard_normal(values.shape)
+            setattr(self, constant, values[kept] + noise)
+        self._force, self._off = self._force[kept], self._off[kept]
+        self._weight = np.full(n, 1.0 / n)
