@@ -36,7 +36,7 @@ class ParticleSettings(NamedTuple):
 
     particles: int = 800
     sweeps: int = 5  # over the contacts
-    gripping: float = 0.6  # share of floors that grip
+    gripping: float = 0.8  # share of floors that grip
     least: float = 0.02  # traction coefficient, evenly by its logarithm up to `grips` and `most`
     grips: float = 0.3
     most: float = 1.0
@@ -47,6 +47,7 @@ class ParticleSettings(NamedTuple):
     sloping: float = 0.15  # share of floors that slope
     slope: float = 0.4  # m/s^2, of those
     level: float = 0.02  # m/s^2, of the others
+    otherwise: float = 0.5  # share of those that find their grip, on another slope; other drag
     walk_slope: float = 0.02  # m/s^2/sqrt(s)
     holds: float = 0.7  # of the traction: a slope pulls no more, or no wheel would hold the robot
     friction: float = 0.08  # of a wheel's dry friction, by which it is off
@@ -156,6 +157,10 @@ class Particles:
             self._force[back] = self._force[grips].mean(axis=0) if grips.any() else 0.0
             self._twist[back] = self._body.to_twist @ rims
             self._traction[back] = s.grips * (s.most / s.grips) ** random.random(len(back))
+            # What was taken for a slide may be a slope or drag: else nothing that grips agrees.
+            slopes, drags = (back[random.random(len(back)) < s.otherwise] for _ in range(2))
+            self._slope[slopes] = s.slope * random.standard_normal((len(slopes), 2))
+            self._drag[drags] = s.drag_most * random.random(len(drags)) ** 2
         if float(np.abs(rims).max()) < _RESTING:
             self._twist[random.random(n) < s.comes_to_rest * dt] = 0.0
         self._traction *= np.exp(s.wander * math.sqrt(dt) * random.standard_normal(n))
@@ -198,13 +203,14 @@ class Particles:
         s, share = self._set, 1.0 - math.exp(-dt / self._set.time)
         logs = np.log(np.maximum(self._weight, 1e-300))
         turning = np.tanh(rims / _RESTING)
-        for reading in self._readings:
-            i = reading.wheel
+        for i in range(WHEELS):
             expected = self._force[:, i] + self._friction[:, i] * turning[i]
-            off = self._apart(reading, expected)
-            self._off[:, i] += share * (off - self._off[:, i])
-            square = self._off[:, i] ** 2
-            logs -= 0.5 * (s.tails + 1.0) * s.trust * dt / s.time * np.log1p(square / s.tails)
+            apart = [self._apart(one, expected) for one in self._readings if one.wheel == i]
+            if apart:  # as much evidence in a time, however often power is measured
+                off = np.mean(apart, axis=0)
+                self._off[:, i] += share * (off - self._off[:, i])
+                square = np.log1p(self._off[:, i] ** 2 / s.tails)
+                logs -= 0.5 * (s.tails + 1.0) * s.trust * dt / s.time * square
         self._readings.clear()
         weight = np.exp(logs - logs.max())
         self._weight = weight / weight.sum()
