@@ -1,6 +1,7 @@
 """Never a confident wrong pose: sensors absent, biased, coarse or frozen; shoves, leaps of time."""
 
 import math
+import warnings
 from collections.abc import Callable
 from copy import deepcopy
 from functools import cache
@@ -129,3 +130,23 @@ def test_where_time_leaps_the_pose_goes_on_and_is_less_sure(by: int) -> None:
     before, after = items[place - 1], items[place]
     assert np.hypot(*(after.pose[:2] - before.pose[:2])) < 0.15
     assert math.sqrt(after.pose_covariance[0, 0]) > 5.0
+
+
+def test_counts_that_leap_and_come_back_do_not_run_away() -> None:
+    """Without an IMU: neither a number beyond all bounds nor a slide is left of it."""
+
+    def leap(time: float, topic: str, message: Any) -> Any:
+        if topic == "imu/data":
+            return None
+        if topic != "joint_states" or not 3.0 < time < 3.02:
+            return message
+        copy = deepcopy(message)
+        copy.position = np.array(message.position) + np.array([1e6, 0.0, 0.0])
+        return copy
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        items = list(play(recorded("grip"), leap))
+    assert all(np.isfinite(item.twist_covariance).all() for item in items)
+    assert not items[-1].is_slipping
+    assert off(recorded("grip"), items[-1]) < 0.5

@@ -1,6 +1,7 @@
 """What the odometry makes of its wheels' forces: creep, and evidence of what the body does."""
 
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,9 @@ from tomr_odometry.creep import Creep
 from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.kernel import CREEP
 from tomr_odometry.settings import OdometrySettings
+from tomr_odometry.start import body_of
 from tomr_odometry.traction import Traction
+from tomr_odometry.unaided import Unaided
 
 SETTINGS = OdometrySettings(creep=Creep((0.5, 1.0, 1.5), 0.0, 0.05))
 
@@ -67,3 +70,25 @@ def test_forces_are_evidence_with_signs_and_an_imu(signed: bool, aided: bool, ro
     assert found.tolist() == [[1.0, 3.0, core.settings.noise.force**2 + 4.0, 5.0]] * rows
     assert core._forces[1] == 3.0
     assert np.isnan(core._forces[[0, 2]]).all()
+
+
+def test_without_an_imu_the_force_told_is_the_one_that_the_slides_speak_for() -> None:
+    core = SlipOdometry(ROBOT)
+    core._tractive = [Traction(START, 1, 3.0, 2.0, 5.0, ((3.0, -9.0), (2.0, 1.0)))]
+    core._forces = np.array([1.0, 3.0, 1.0])
+    core._tractions = SimpleNamespace(speeds=np.zeros(3))  # type: ignore[assignment]
+    core._by_power = SimpleNamespace(  # type: ignore[assignment]
+        force=np.full(3, -8.0), step=lambda *given: None
+    )
+    core._ask_power(0.01)
+    assert core._forces.tolist() == [1.0, -9.0, 1.0]
+    assert core._force_std[1] == 1.0
+
+
+def test_slides_are_looked_for_from_the_motion_with_which_an_imu_leaves_off() -> None:
+    body, radius = body_of(ROBOT)
+    by_power, twist = Unaided(ROBOT, body, radius), np.array([0.5, 0.2, 0.3])
+    by_power.step(0.02, np.zeros(3), np.zeros(3), [])
+    by_power.rest()
+    by_power.step(0.02, twist, body.rows @ twist, [])
+    assert by_power.probability.max() < 0.05

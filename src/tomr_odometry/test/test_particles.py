@@ -34,12 +34,13 @@ def played(
     seconds: float,
     first: bool = True,
     settings: ParticleSettings | None = None,
+    times: int = 1,
 ) -> tuple[Slides, Array]:
     """What the particles say after some seconds, and the rims' speeds then."""
     particles, time = Particles(BODY, FRICTION, 0.0, settings), 0.0
     while time < seconds:
         time += STEP
-        for wheel in range(3):
+        for wheel in times * [0, 1, 2]:
             if force is not None:
                 particles.take(reading(wheel, force(wheel, time), first=first))
         assert particles.step(STEP, rims(time))
@@ -91,6 +92,12 @@ def test_which_of_the_two_forces_comes_first_does_not_count() -> None:
     assert one.twist.tolist() == other.twist.tolist()
 
 
+def test_power_that_is_measured_more_often_is_no_more_evidence() -> None:
+    rims, force, _ = spinning()
+    one, other = (played(rims, force, 0.4, times=times)[0] for times in (1, 3))
+    assert one.twist == pytest.approx(other.twist, abs=1e-9)
+
+
 def test_the_same_messages_give_the_same_numbers() -> None:
     rims, force, _ = spinning()
     one, other = (played(rims, force, 0.3)[0] for _ in range(2))
@@ -119,6 +126,30 @@ def test_a_robot_whose_wheels_stand_does_not_slide_off() -> None:
     found = particles.slides(np.zeros(3))
     assert found.any_probability < 0.3
     assert np.abs(found.twist).max() < 0.1
+
+
+def test_where_wheels_stand_the_robot_comes_to_rest() -> None:
+    """Else on a slippery slope it would slide down for as long as nothing moves."""
+    speeds = []
+    for rate in (0.0, 2.0):
+        settings = ParticleSettings(
+            gripping=0.0, sloping=1.0, slope=1.0, regain=0.0, new_floor=0.0, comes_to_rest=rate
+        )
+        particles = Particles(BODY, FRICTION, 0.0, settings)
+        for _ in range(200):
+            particles.step(STEP, np.zeros(3))
+        speeds.append(float(np.abs(particles._twist).mean()))
+    assert speeds[1] < 0.3 * speeds[0]
+
+
+def test_wheels_that_find_their_grip_may_do_so_on_a_slope_or_with_drag() -> None:
+    """A slide that was none leaves no particle that knows of these."""
+    settings = ParticleSettings(sloping=0.0, dragging=0.0, regain=50.0, otherwise=0.5)
+    particles = Particles(BODY, FRICTION, 0.0, settings)
+    assert particles.step(STEP, np.zeros(3))
+    steep = np.hypot(*particles._slope.T) > 0.3
+    assert 0.25 < steep.mean() < 0.5  # of half of them, those beyond 0.3 of 0.4 m/s^2
+    assert 0.4 < (particles._drag > 1e-3).mean() < 0.6
 
 
 def test_steps_wait_for_enough_time_and_are_never_long() -> None:

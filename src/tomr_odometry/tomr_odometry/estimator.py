@@ -42,6 +42,7 @@ _REST = 0.3  # s of standstill, in which an IMU tells its biases
 _LOST_SPEED = 1.0  # m/s, by which a robot without encoders may be off
 _LOST_MOST = 10.0  # s, after which it may be off no further
 _DOUBTED = 5.0  # s, over which a velocity that turns out wrong is taken to have been so at most
+_FASTEST = 30.0  # m/s, of a rim
 _LIFTED = 1.5  # m/s^2 off the usual weight
 _LIFTED_TILT = 0.6  # rad/s of rolling or pitching
 _CARRIED_NS = to_ns(0.7)  # how long after such a moment the robot may still be carried
@@ -245,6 +246,9 @@ class SlipOdometry:
             self._by_power.rest()
             return
         twist, rims = self._x[VX : WZ + 1], speeds * self._radius
+        if not max(np.abs(rims).max(), np.abs(self._body.rows @ twist).max()) < _FASTEST:
+            self._by_power.rest()  # counts that leap, not a motion
+            return
         self._by_power.step(dt, twist, rims, self._tractive)
         for found in self._tractive:
             near = found.nearer(self._by_power.force[found.wheel])
