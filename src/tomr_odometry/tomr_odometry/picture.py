@@ -5,6 +5,7 @@ from io import BytesIO
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import ArrayLike
 
 from tomr_odometry.estimate import Estimate
 from tomr_odometry.grip import SIDE, UNKNOWN, Grid
@@ -16,6 +17,7 @@ from tomr_power_model.robot import Robot
 _WHEELS = ("#1d4ed8", "#c2410c", "#15803d")
 _ELLIPSES = 12
 _WITHIN_95 = 5.991
+_MARGIN = 0.05  # of the paths' extent
 
 
 def draw(
@@ -35,6 +37,7 @@ def draw(
         if reference is not None:
             true = reference.laid_on(start, reference.at(ours.stamps[:1])[0]).pose
             plane.plot(true[:, 0], true[:, 1], color=MEASURED, lw=1.0, ls="--", label="reference")
+        paths = list(plane.lines)
         turn = np.linspace(0.0, 2.0 * np.pi, 60)
         circle = np.sqrt(_WITHIN_95) * np.stack([np.cos(turn), np.sin(turn)])
         for item in items[:: max(len(items) // _ELLIPSES, 1)]:
@@ -43,7 +46,7 @@ def draw(
             plane.plot(item.pose[0] + ring[0], item.pose[1] + ring[1], color=AFTER, lw=0.4)
         if floor is not None:
             _draw_floor(plane, floor)
-        plane.set_aspect("equal", adjustable="datalim")
+        _show_paths(plane, [line.get_xydata() for line in paths])
         plane.set_xlabel("x [m]")
         plane.set_ylabel("y [m]")
         plane.legend(fontsize=7)
@@ -61,6 +64,16 @@ def draw(
         buffer = BytesIO()
         page.savefig(buffer, format="png")
         return buffer.getvalue()
+
+
+def _show_paths(plane: Axes, paths: Sequence[ArrayLike]) -> None:
+    """All of the paths, however far ellipses and cells of the floor reach."""
+    points = np.concatenate([np.asarray(path) for path in paths])
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = _MARGIN * max(float((high - low).max()), SIDE)
+    plane.set_xlim(low[0] - margin, high[0] + margin)
+    plane.set_ylim(low[1] - margin, high[1] + margin)
+    plane.set_aspect("equal", adjustable="datalim")
 
 
 def _draw_floor(plane: Axes, floor: Grid) -> None:
