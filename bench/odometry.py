@@ -3,6 +3,7 @@
     .venv/bin/python bench/odometry.py robotino [--every 3] [--bags DIR]
     .venv/bin/python bench/odometry.py slips --out corrected
     .venv/bin/python bench/odometry.py bound [--all]
+    .venv/bin/python bench/odometry.py healthy
 
 robotino: the creep of each floor learnt on every second heading and scored on the others; learnt on
 two floors and scored on the third. The error is that of a drive's end when the starts are laid on
@@ -13,6 +14,9 @@ slips: `tomr_odometry` on every drive of slips_practice; its scorer prints the f
 
 bound: those drives without IMU, by one that is told which wheels slide when, the floor's traction,
 slope and drag and the robot's parameters: what it still lacks is what pushes and how slides begin.
+
+healthy: the healthy drives of faults_practice with their IMU and without it: how much slip is told,
+how far from that of the wheels the pose ends, and the CPU, reading included.
 """
 
 import argparse
@@ -26,6 +30,7 @@ from contextlib import redirect_stdout
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import process_time
 
 import numpy as np
 from attrs import frozen
@@ -40,9 +45,10 @@ from tomr_odometry.learn.cli import learnt_text
 from tomr_odometry.learn.drives import Leg, read_legs
 from tomr_odometry.learn.fit import Batch, fit_creep
 from tomr_odometry.offline import estimates
-from tomr_odometry.reference import reference_of
+from tomr_odometry.reference import reference_of, wheel_path
 from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.start import body_of
+from tomr_odometry.summary import end_error, estimated_path
 from tomr_power_model.cli import run_main
 from tomr_power_model.messages.types import ODOMETRY
 from tomr_power_model.recordings import open_recording
@@ -318,6 +324,34 @@ def bound(options: argparse.Namespace) -> int:
     return 0
 
 
+def healthy(options: argparse.Namespace) -> int:
+    """What is made of drives in which no wheel slides."""
+    folder = recordings() / "faults_practice" / "faults" / "practice"
+    if not folder.exists():
+        print(f"skipped: {folder} is absent; set TOMR_RECORDINGS")
+        return 0
+    robot = load_robot(folder / "robot.yaml")
+    for bag in sorted((folder / "healthy").iterdir()):
+        for use_imu in (True, False):
+            core, before = SlipOdometry(robot, OdometrySettings(use_imu=use_imu)), process_time()
+            with open_recording(bag) as recording:
+                items = list(estimates(recording, robot, core, Complaints()))
+                spent = process_time() - before
+                wheels = wheel_path(recording, robot)
+            elapsed = 1e-9 * (items[-1].stamp_ns - items[0].stamp_ns)
+            apart = end_error(estimated_path(items), wheels)
+            ratios = np.mean([(np.abs(item.slip) > 0.1).any() for item in items])
+            told = np.mean([item.is_slipping for item in items])
+            imu = dict(items[-1].sensors).get("imu/data")
+            print(
+                f"{bag.name}, IMU {imu}: a ratio over 0.1 {100 * ratios:.2f} %, slipping told "
+                f"{100 * told:.2f} % of {elapsed:.0f} s, {apart:.4f} m from the wheels' end, "
+                f"{spent / elapsed:.3f} of a core",
+                flush=True,
+            )
+    return 0
+
+
 def _main(arguments: Sequence[str] | None) -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -334,6 +368,7 @@ def _main(arguments: Sequence[str] | None) -> int:
     last = commands.add_parser("bound")
     last.add_argument("--all", action="store_true", help="drives with an IMU, too, without it")
     last.set_defaults(run=bound)
+    commands.add_parser("healthy").set_defaults(run=healthy)
     options = parser.parse_args(arguments)
     return int(options.run(options))
 

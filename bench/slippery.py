@@ -21,6 +21,7 @@ import numpy as np
 from attrs import evolve, frozen
 from commissioned import made
 from numpy.typing import NDArray
+from odometry import ratio
 from record import record_mission
 from tqdm import tqdm
 
@@ -30,6 +31,7 @@ from tomr_odometry.offline import estimates
 from tomr_odometry.reference import reference_of
 from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.start import body_of
+from tomr_odometry.summary import end_error, estimated_path
 from tomr_power_model.cli import run_main
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import GRAVITY, Robot, load_robot
@@ -46,7 +48,6 @@ KINDS = ("grips", "low", "slope", "ice", "shoved", "drag")
 _FIRST_SEED = 400_000
 _TOURS = 3  # of 18 s each
 _SLIDING = 0.05  # m/s, of a contact that slides
-_LOST = (0.02, 0.005, 0.005)  # of plain's error, m, of the way: worse than plain from all of it on
 
 
 def _planned(
@@ -120,28 +121,11 @@ class Met:
     told: float  # share of the sliding
     false: float  # share of the rest
 
-    @property
-    def is_worse(self) -> bool:
-        """Whether ours ends farther off than the wheels' by more than matters."""
-        share, least, of_way = _LOST
-        return self.ends[1] > self.ends[0] + max(share * self.ends[0], least, of_way * self.way)
-
 
 def _estimated(bag: Path, robot: Robot, use_power: bool) -> list[Estimate]:
     core = SlipOdometry(robot, OdometrySettings(use_imu=False, use_power=use_power))
     with open_recording(bag) as recording:
         return list(estimates(recording, robot, core, Complaints()))
-
-
-def _end(items: Sequence[Estimate], true: Array) -> float:
-    """Distance at the end when the starts are laid on each other [m]."""
-    start, end = items[0].pose, items[-1].pose
-    turned = true[0, 2] - start[2]
-    c, s = math.cos(turned), math.sin(turned)
-    x, y = end[:2] - start[:2]
-    return math.hypot(
-        true[0, 0] + c * x - s * y - true[-1, 0], true[0, 1] + s * x + c * y - true[-1, 1]
-    )
 
 
 def met(bag: Path, description: Path) -> Met:
@@ -150,7 +134,8 @@ def met(bag: Path, description: Path) -> Met:
     plain, ours = (_estimated(bag, robot, use_power) for use_power in (False, True))
     with open_recording(bag) as recording:
         reference = reference_of(recording, "ground_truth/odom")
-    stamps = np.array([item.stamp_ns for item in ours])
+    paths = [estimated_path(items) for items in (plain, ours)]
+    stamps = paths[1].stamps
     poses = reference.at(stamps)
     known = np.flatnonzero(np.isfinite(poses).all(axis=1))
     poses, ours, plain = poses[known], [ours[k] for k in known], [plain[k] for k in known]
@@ -167,7 +152,7 @@ def met(bag: Path, description: Path) -> Met:
         for one in off
     ]
     return Met(
-        ends=(_end(plain, poses), _end(ours, poses)),
+        ends=(end_error(paths[0], reference), end_error(paths[1], reference)),
         speeds=(speeds[0], speeds[1]),
         way=float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum()),
         told=float(told[slides].mean()) if slides.any() else math.nan,
@@ -186,13 +171,14 @@ def scored(task: tuple[int, str], folder: Path) -> Met:
 
 
 def _line(kind: str, found: Sequence[Met]) -> str:
-    ends = np.median([item.ends for item in found], axis=0)
+    plain, ours = np.array([item.ends for item in found]).T
+    ends = ratio(ours, plain, np.array([item.way for item in found]))
     pooled = np.sqrt(np.nanmean(np.square([item.speeds for item in found]), axis=0))
     told = np.nanmean([item.told for item in found])
-    worse = sum(item.is_worse for item in found)
     return (
-        f"{kind:7} end {ends[0]:.3f} -> {ends[1]:.3f} m (median), worse {worse} of {len(found)}; "
-        f"sliding {pooled[0]:.3f} -> {pooled[1]:.3f} m/s, told {100 * told:.0f} %; "
+        f"{kind:7} end {ends['plain_m']:.3f} -> {ends['ours_m']:.3f} m, ratio {ends['ratio']:.2f} "
+        f"[{ends['low']:.2f}, {ends['high']:.2f}], worse {100 * ends['worse']:.0f} % of "
+        f"{len(found)}; sliding {pooled[0]:.3f} -> {pooled[1]:.3f} m/s, told {100 * told:.0f} %; "
         f"of the rest {100 * np.mean([item.false for item in found]):.1f} %"
     )
 

@@ -85,6 +85,17 @@ def test_without_an_imu_the_force_told_is_the_one_that_the_slides_speak_for() ->
     assert core._force_std[1] == 1.0
 
 
+def test_what_the_slides_leave_open_of_the_twist_is_in_its_covariance() -> None:
+    core = SlipOdometry(ROBOT)
+    for sample in range(12):
+        core.encoders(START + 10_000_000 * sample, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        list(core.due())
+    before = core._estimate(core._time).twist_covariance
+    core._by_power.covariance = np.diag([0.1, 0.2, 0.3])
+    after = core._estimate(core._time).twist_covariance
+    assert np.diag(after - before) == pytest.approx([0.1, 0.2, 0.3])
+
+
 def test_slides_are_looked_for_from_the_motion_with_which_an_imu_leaves_off() -> None:
     body, radius = body_of(ROBOT)
     by_power, twist = Unaided(ROBOT, body, radius), np.array([0.5, 0.2, 0.3])

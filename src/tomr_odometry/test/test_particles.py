@@ -152,6 +152,41 @@ def test_wheels_that_find_their_grip_may_do_so_on_a_slope_or_with_drag() -> None
     assert 0.4 < (particles._drag > 1e-3).mean() < 0.6
 
 
+def _alike(traction: float, twist: Array) -> Particles:
+    """Particles of one floor that is level and on which nothing drags."""
+    settings = ParticleSettings(
+        regain=0.0, new_floor=0.0, wander=0.0, comes_to_rest=0.0, walk_slope=0.0, walk_twist=0.0
+    )
+    particles = Particles(BODY, FRICTION, 0.0, settings)
+    particles.start(twist)
+    particles._traction[:], particles._slope[:], particles._drag[:] = traction, 0.0, 0.0
+    return particles
+
+
+def test_a_slope_pulls_downhill_in_the_world_and_drag_against_the_rollers() -> None:
+    particles = _alike(1.0, np.array([1.0, 0.0, 0.0]))
+    particles._slope[:] = 0.3, 0.0
+    particles._yaw[:] = 0.5 * math.pi  # the robot looks to the left of downhill
+    assert particles._wrench()[0] == pytest.approx([0.0, -0.3 * BODY.mass, 0.0], abs=1e-9)
+    particles._slope[:] = 9.0, 0.0  # more than the floor holds: 0.7 of its traction
+    particles._yaw[:] = 0.0
+    assert particles._wrench()[0, 0] == pytest.approx(0.7 * 9.81 * BODY.mass, rel=1e-3)
+    particles._slope[:] = 0.0
+    particles._drag[:] = 0.1
+    # Forward, one wheel's rollers turn at full speed and two at half of it: along the axles 1 and
+    # 1/2; each drags with a tenth of its load, and of two of them half of that is forward.
+    load = 0.1 * BODY.mass * 9.81 / 3.0
+    assert particles._wrench()[0] == pytest.approx([-2.0 * load, 0.0, 0.0], rel=1e-3, abs=1e-6)
+
+
+def test_without_traction_a_body_that_turns_keeps_its_way_in_the_world() -> None:
+    particles = _alike(0.0, np.array([0.5, 0.0, 1.0]))
+    particles._traction[:] = 0.0
+    particles._move(0.02, np.zeros(3))
+    assert particles._twist[0] == pytest.approx([0.5, -0.5 * 0.02, 1.0])
+    assert particles._yaw[0] == pytest.approx(0.02)
+
+
 def test_steps_wait_for_enough_time_and_are_never_long() -> None:
     particles = Particles(BODY, FRICTION, 0.0)
     assert not particles.step(0.01, np.zeros(3))

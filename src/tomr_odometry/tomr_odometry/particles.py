@@ -10,7 +10,6 @@ load), but with rims that are given and for all particles at once, which makes a
 """
 
 import math
-from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_odometry.kernel import STICKING, Body
-from tomr_odometry.traction import Traction
+from tomr_odometry.traction import Roughness, Traction
 from tomr_power_model.robot import GRAVITY, WHEELS
 
 Array = NDArray[np.float64]
@@ -27,7 +26,6 @@ _SEED = 20_240_101  # the same messages give the same numbers
 _LEAST_STEP = 0.018  # s
 _LONGEST_STEP = 0.1  # s
 _RESTING = 0.025  # m/s of a rim, below which dry friction fades
-_ROUGH_SHARE, _ROUGHEST = 0.04, 60.0  # of a new sample in the mean; N
 _SLIDING = 0.05  # m/s, of a contact that is said to slide
 
 
@@ -108,8 +106,7 @@ class Particles:
         self._off = np.zeros((n, WHEELS))  # standard deviations, averaged
         self._weight = np.full(n, 1.0 / n)
         self._readings: list[Traction] = []
-        self._rough = np.zeros(WHEELS)
-        self._seen: tuple[deque[Array], ...] = tuple(deque(maxlen=3) for _ in range(WHEELS))
+        self._rough = [Roughness() for _ in range(WHEELS)]
         self._since = 0.0
 
     def _floors(self, count: int) -> Array:
@@ -221,23 +218,13 @@ class Particles:
         """Standard deviations between expected forces [N] and the nearer one of the power's."""
         s, i = self._set, reading.wheel
         forces, stds = np.array(reading.either)
-        rough = s.roughness * self._roughness(i, forces)
+        rough = s.roughness * self._rough[i].take(*reading.either[0])
         common = (s.force * self._body.mass) ** 2 + rough
         share = s.force_share * (self._dry[i] + np.abs(forces))
         spread = np.sqrt(common + stds**2 + share**2)
         off = (forces[:, None] - expected) / spread[:, None]
         nearer = np.where(np.abs(off[0]) < np.abs(off[1]), off[0], off[1])
         return np.asarray(np.clip(nearer, -s.farthest, s.farthest))
-
-    def _roughness(self, wheel: int, forces: Array) -> float:
-        """Variance from sample to sample [N^2]: drivers shake their motors by coarse counts."""
-        seen = self._seen[wheel]
-        seen.append(forces)
-        if len(seen) == seen.maxlen:
-            change = float(np.abs(seen[0] - 2.0 * seen[1] + seen[2]).min())
-            new = min(change, _ROUGHEST) ** 2 / 6.0
-            self._rough[wheel] += _ROUGH_SHARE * (new - self._rough[wheel])
-        return float(self._rough[wheel])
 
     def _draw(self) -> None:
         """As many particles again, each as often as it weighs; what is constant is spread a bit."""
@@ -246,10 +233,14 @@ class Particles:
         kept = np.minimum(np.searchsorted(np.cumsum(self._weight), places), n - 1)
         self._twist, self._yaw = self._twist[kept], self._yaw[kept]
         self._traction = self._traction[kept] * np.exp(0.05 * random.standard_normal(n))
-        for constant in ("_slope", "_friction", "_drag"):
-            values = getattr(self, constant)
-            spread = np.sqrt(self._weight @ (values - self._weight @ values) ** 2)
-            noise = 0.1 * spread * random.standard_normal(values.shape)
-            setattr(self, constant, values[kept] + noise)
+        self._slope = self._spread(self._slope, kept)
+        self._friction = self._spread(self._friction, kept)
+        self._drag = self._spread(self._drag, kept)
         self._force, self._off = self._force[kept], self._off[kept]
         self._weight = np.full(n, 1.0 / n)
+
+    def _spread(self, values: Array, kept: NDArray[np.intp]) -> Array:
+        """Those that are kept, each a tenth of their standard deviation off."""
+        deviation = np.sqrt(self._weight @ (values - self._weight @ values) ** 2)
+        noise = 0.1 * deviation * self._random.standard_normal(values.shape)
+        return np.asarray(values[kept] + noise)

@@ -25,7 +25,7 @@ def spells(items: Sequence[Estimate]) -> list[tuple[float, float]]:
     return found
 
 
-def _end_error(path: Path2D, reference: Path2D) -> float:
+def end_error(path: Path2D, reference: Path2D) -> float:
     """Distance of the ends when the starts are laid on each other [m]. Raises InputError."""
     stamps = path.stamps[(path.stamps >= reference.stamps[0])]
     stamps = stamps[stamps <= reference.stamps[-1]]
@@ -78,8 +78,8 @@ def summary(
         "learnt": dict(last.learnt),
     }
     if reference is not None:
-        found["end_error_m"] = _end_error(ours, reference)
-        found["end_error_of_wheels_m"] = _end_error(wheels, reference)
+        found["end_error_m"] = end_error(ours, reference)
+        found["end_error_of_wheels_m"] = end_error(wheels, reference)
     return found
 
 

@@ -55,6 +55,26 @@ class Traction:
         return min(first, second, key=lambda one: abs(one[0] - force))
 
 
+class Roughness:
+    """Variance of what changes from sample to sample [N^2]: a driver that sees coarse counts shakes
+    its motor."""
+
+    def __init__(self) -> None:
+        self._seen: deque[tuple[float, ...]] = deque(maxlen=3)
+        self._variance = 0.0
+
+    def take(self, *forces: float) -> float:
+        """The variance with another sample; of several forces, one of which is the contact's, that
+        of the smoothest."""
+        self._seen.append(forces)
+        if len(self._seen) == self._seen.maxlen:
+            samples = zip(*self._seen, strict=True)
+            change = min(abs(older - 2.0 * before + new) for older, before, new in samples)
+            new_one = min(change, _ROUGHEST) ** 2 / 6.0
+            self._variance += _ROUGH_SHARE * (new_one - self._variance)
+        return self._variance
+
+
 class Tractions:
     """Streaming: commands, encoder samples and readings in, forces of the contacts out."""
 
@@ -87,8 +107,7 @@ class Tractions:
         self._speed = [0.0] * WHEELS
         self._gain = [0.0] * WHEELS
         self._is_commanded = False
-        self._before = [(math.nan, math.nan)] * WHEELS
-        self._rough = [0.0] * WHEELS
+        self._rough = [Roughness() for _ in range(WHEELS)]
         self._fitted: tuple[list[float], list[float], list[float]] | None = None
 
     def command(self, stamp_ns: int, twist: Triple) -> None:
@@ -169,7 +188,7 @@ class Tractions:
         if is_sure and abs(speed) > _MOVING:
             self._follow(wheel, current, speed)
         force, left = self._force(wheel, current, own)
-        rough = self._roughness(wheel, force)
+        rough = math.sqrt(self._rough[wheel].take(force))
         newtons = self._constant[wheel] / self._radius
         std = math.hypot(newtons * noise, left, rough)
         either = self._either(wheel, drawn, own, found)
@@ -198,16 +217,6 @@ class Tractions:
             return self._noise
         slope = abs(2.0 * self._resistance[wheel] * current + self._constant[wheel] * speed)
         return (self._noise + _POWER_SHARE * abs(drawn)) / max(slope, _LEAST_SLOPE)
-
-    def _roughness(self, wheel: int, force: float) -> float:
-        """Standard deviation of what changes from sample to sample [N]: a driver that sees coarse
-        counts shakes its motor."""
-        before, older = self._before[wheel]
-        self._before[wheel] = (force, before)
-        if older == older:
-            second = min((force - 2.0 * before + older) ** 2, _ROUGHEST**2) / 6.0
-            self._rough[wheel] += _ROUGH_SHARE * (second - self._rough[wheel])
-        return math.sqrt(self._rough[wheel])
 
     def _currents(self, wheel: int, drawn: float, motion: list[float]) -> list[float]:
         """Both currents that a measured power leaves [A]."""
