@@ -22,13 +22,15 @@ class Kind:
 _BY_SPEED = ("torque.speed", "torque.signed_speed")
 KINDS: Mapping[str, Kind] = {
     "x.two_harmonics": Kind(("torque.angle",)),
-    "x.chipped_tooth": Kind(("torque.angle",)),
+    "x.chipped_tooth": Kind(("torque.angle", "torque.tight_angle"), ("bump",)),
     "x.running_in": Kind(("torque.time",), ("exponential",), False),
-    "x.striped_floor": Kind(("torque.place",)),
+    "x.striped_floor": Kind(("torque.place",), ("stripes",)),
     "x.cubic": Kind(_BY_SPEED, ("power law",)),
     "x.intermittent": Kind(("torque.time",), (), False),
-    "x.sticky_start": Kind(("torque.turned", "torque.since_stand"), ("exponential",)),
-    "x.overload": Kind(("driver.current",), ("square beyond a threshold",)),
+    "x.sticky_start": Kind(
+        ("torque.from_rest", "torque.turned", "torque.since_stand"), ("exponential",)
+    ),
+    "x.overload": Kind(("driver.current",), ("square of the excess",)),
     "x.tether": Kind(("force.place",), ("spring",)),
     "x.wind": Kind(("force.velocity",), ("wind",)),
     "x.gust": Kind(("force.time",), (), False),

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tomr_power_model.errors import InputError
-from tomr_power_model.geometry.kinematics import twist_to_wheels, wheels_to_twist
+from tomr_power_model.geometry.kinematics import twist_to_wheels, wheel_angles, wheels_to_twist
 from tomr_power_model.messages.plain import Level
 from tomr_power_model.model.commanded import CommandPath, CommandTiming, Seen
 from tomr_power_model.model.prediction import Prediction
@@ -24,6 +24,7 @@ from tomr_power_model.robot import (
 from tomr_power_model.robot.held import too_steep
 from tomr_power_model.unmodelled import FAMILIES, LearntTerm, Motion, motion_of
 from tomr_power_model.unmodelled.described import parameters_of, terms_of
+from tomr_power_model.unmodelled.motion import contacts_at
 from tomr_power_model.unmodelled.online import OnlineTerms
 from tomr_power_model.unmodelled.term import basis_at
 
@@ -100,7 +101,7 @@ def _own_variable(name: str) -> LearntTerm:
         points = [np.linspace(0.0, 2.0 * np.pi, 360, endpoint=False)]
         grid = [np.sin(points[0])]
     wheels = {"torque": (0, 1, 2), "driver": (0, 1, 2)}.get(family.acts, ())
-    rows = [grid[0].ravel()] * max(len(wheels), 1)
+    rows = [grid[0].ravel()] * LearntTerm.rows(family, len(wheels))
     if family.acts == "force":
         rows = [grid[0].ravel(), grid[-1].ravel()]
     return LearntTerm(family, wheels, tuple(points), np.array(rows))
@@ -121,10 +122,12 @@ FAMILY_ACTIONS: dict[str, Callable[[Motion], np.ndarray]] = {
     "torque.current": lambda m: m.sign * np.abs(m.current),
     "torque.direction": lambda m: m.sign * np.sin(m.direction),
     "torque.heading": lambda m: m.sign * np.sin(m.heading),
-    "torque.place": lambda m: m.sign * m.x,
+    "torque.from_rest": lambda m: m.sign * np.minimum(m.from_rest, 12.0),
+    "torque.place": lambda m: m.sign * m.contact_x,
     "torque.signed_speed": lambda m: np.abs(m.sign) * m.speed,
     "torque.since_stand": lambda m: m.sign * np.minimum(m.since_stand, 8.0),
     "torque.speed": lambda m: m.sign * np.abs(m.speed),
+    "torque.tight_angle": lambda m: m.sign * np.sin(m.angle),
     "torque.time": lambda m: m.sign * m.time,
     "torque.turned": lambda m: m.sign * np.minimum(m.turned, 12.0),
 }
@@ -189,21 +192,59 @@ def test_place_and_heading_are_reckoned_from_the_start() -> None:
 def test_a_sticky_place_resists_each_wheel_against_its_motion() -> None:
     """0.1 N m everywhere; wheel 1 stands in a straight drive and is not resisted."""
     motion = _motion((0.4, 0.0, 0.0))
-    term = _term("torque.place", [[-9.0, 9.0], [-9.0, 9.0]], [[0.1] * 4] * 3, 0, 1, 2)
+    term = _term("torque.place", [[-9.0, 9.0], [-9.0, 9.0]], [[0.1] * 4], 0, 1, 2)
     np.testing.assert_allclose(term.actions(motion).torque, 0.1 * motion.sign)
     np.testing.assert_allclose(np.abs(motion.sign[-1]), [0.0, 1.0, 1.0], atol=1e-6)
+
+
+def test_wheels_touch_the_floor_a_radius_from_the_centre_each_in_its_own_direction() -> None:
+    """At a heading of 90 degrees at (1, 2) all contacts have turned about (1, 2) with the body."""
+    here, turned = (
+        np.stack(contacts_at(wheels_to_twist(ROBOT), *np.array([[x], [y], [heading]])))[:, 0]
+        for x, y, heading in ((0.0, 0.0, 0.0), (1.0, 2.0, 0.5 * np.pi))
+    )
+    around = wheel_angles(ROBOT)
+    expected = ROBOT.robot_radius * np.stack([np.cos(around), np.sin(around)])
+    np.testing.assert_allclose(here, expected, atol=1e-12)
+    np.testing.assert_allclose(turned, [1.0 - here[1], 2.0 + here[0]])
+
+
+def test_one_map_of_the_floor_holds_for_whichever_wheel_is_there() -> None:
+    """0.1 N m beyond the line x = 0, where only the wheels in front are: 0.174 m at most."""
+    motion = _motion((0.0, 0.02, 0.0), 1.0)
+    floor = _term("torque.place", [[-0.5, 0.0, 0.5], [-0.5, 0.5]], [[0.0, 0.0, 0.0, 0.0, 0.1, 0.1]])
+    found = evolve(floor, wheels=(0, 1, 2)).actions(motion).torque[-1]
+    expected = 0.2 * np.maximum(motion.contact_x[-1], 0.0) * motion.sign[-1]
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+    assert np.count_nonzero(np.abs(expected) > 1e-3) in (1, 2)
 
 
 def test_time_and_angle_count_since_the_last_stand() -> None:
     time = np.arange(0.0, 3.0, 0.01)
     speed = np.where((time > 1.0) & (time < 2.0), 0.0, 2.0)[:, None] * np.ones(3)
-    motion = motion_of(
-        wheels_to_twist(ROBOT), time, speed=speed, current=speed, angle=np.cumsum(speed, 0) * 0.01
-    )
+    motion = _driven(time, speed)
     assert motion.since_stand[150] == pytest.approx([0.0] * 3)
     assert motion.since_stand[-1] == pytest.approx([1.0] * 3, abs=0.02)
     assert motion.turned[-1] == pytest.approx([2.0] * 3, abs=0.04)
     assert motion.since_stand[50, 0] > 50.0  # it has not stood yet
+    assert motion.from_rest[50, 0] > 50.0
+
+
+def test_who_turns_about_has_stood_but_not_rested() -> None:
+    """There and back at 2 rad/s: a rest of 0.3 s, 1 rad forth, 1.6 rad back."""
+    time = np.arange(0.0, 2.0, 0.01)
+    pace = np.select([time < 0.3, time < 0.8], [0.0, 2.0], -2.0)
+    motion = _driven(time, pace[:, None] * np.ones(3))
+    half, last = 129, 159  # after 1.3 s where it rested, and after 1.6 s beyond it
+    assert motion.since_stand[half] == pytest.approx([0.5] * 3, abs=0.03)
+    assert motion.turned[half] == pytest.approx([2.0] * 3, abs=0.05)
+    assert motion.from_rest[half] == pytest.approx([0.0] * 3, abs=0.05)
+    assert motion.from_rest[last] == pytest.approx([0.6] * 3, abs=0.05)
+
+
+def _driven(time: np.ndarray, speed: np.ndarray) -> Motion:
+    angle = np.cumsum(speed, 0) * float(time[1] - time[0])
+    return motion_of(wheels_to_twist(ROBOT), time, speed=speed, current=speed, angle=angle)
 
 
 @pytest.mark.parametrize(
@@ -227,8 +268,8 @@ def test_a_term_stands_in_a_description_and_is_read_again(term: LearntTerm) -> N
 @pytest.mark.parametrize(
     ("field", "value", "message"),
     [
-        ("version", 2, r"version = 2: only 1 is understood"),
-        ("version", None, r"version = None: only 1"),
+        ("version", 1, r"version = 1: only 2 is understood"),
+        ("version", None, r"version = None: only 2"),
         ("robot", [17.0, 0.2, 0.05], r"robot = .* is not this one"),
         ("robot", [15.0, 0.2], r"robot = .* is not this one"),
         ("family", "torque.moon", r"unmodelled\.term_1\.family = 'torque\.moon': give one of"),

@@ -7,13 +7,14 @@ from attrs import evolve
 from tomr_power_model.unmodelled import FAMILIES, LearntTerm
 from tomr_power_model.unmodelled.term import value_at
 from tomr_reality_gap.fit import laws, polish
-from tomr_reality_gap.fit.laws import LAWS, Evidence, laws_of, words_of
+from tomr_reality_gap.fit.law_forms import LAWS
+from tomr_reality_gap.fit.laws import Evidence, laws_of, words_of
 from tomr_reality_gap.fit.learnt import Table
 
 
 def _table(family: str, *knots: np.ndarray) -> Table:
     count = int(np.prod([len(points) for points in knots]))
-    return Table(FAMILIES[family], knots, np.eye(count))
+    return Table(FAMILIES[family], knots, np.eye(count), 1.0)
 
 
 def _evidence(values: np.ndarray, exact: float = 1e4) -> Evidence:
@@ -64,6 +65,10 @@ def test_a_spring_is_told_with_its_anchor_and_reaches_beyond_the_table() -> None
         ("torque.speed", "power law", lambda w: 0.01 * w**3, {"size": 0.01, "exponent": 3.0}),
         ("driver.current", "square beyond a threshold", lambda i: 0.5 * i**2 * (i > 4.2),
          {"size": 0.5}),
+        ("driver.current", "square of the excess", lambda i: 0.5 * np.maximum(i - 3.0, 0.0) ** 2,
+         {"size": 0.5, "threshold": 3.0}),
+        ("torque.tight_angle", "bump", lambda a: 0.2 * np.exp(-((a - 2.0) / 0.4) ** 2),
+         {"size": 0.2, "width": 0.4, "place": 2.0}),
         ("torque.angle", "periodic", lambda a: 0.2 * np.sin(3.0 * a + 1.0),
          {"size": 0.2, "order": 3.0, "phase": 1.0}),
     ],
@@ -99,6 +104,12 @@ def test_the_order_of_a_periodic_law_is_a_whole_number(monkeypatch: pytest.Monke
         ("force.velocity", "wind", {"coefficient": 5.0, "x": 0.5, "y": -0.3}),
         ("force.place", "steady force", {"x": 2.0, "y": -1.0}),
         ("torque.place", "patch", {"size": 0.3, "radius": 0.6, "x": -0.2, "y": 0.3}),
+        (
+            "torque.place",
+            "stripes",
+            {"size": 0.3, "width": 0.7, "azimuth": 0.4, "phase": 1.0},
+        ),
+        ("torque.place", "edge", {"size": 0.3, "azimuth": 0.4, "distance": 0.2}),
     ],
 )
 def test_maps_are_told_as_the_laws_that_they_are(
@@ -114,11 +125,23 @@ def test_maps_are_told_as_the_laws_that_they_are(
     elif law == "steady force":
         values = np.stack([np.full_like(x, p["x"]), np.full_like(x, p["y"])])
     else:
-        beyond = np.hypot(p["x"] - x, p["y"] - y) / p["radius"] - 1.0
-        values = p["size"] / (1.0 + np.exp(4.0 * beyond))[None]  # with a soft edge
+        values = p["size"] * _on_it(law, p, x, y)[None]
     found = _laws(_table(family, line, line), values)
     told, _ = found[law]
     assert told == pytest.approx(parameters, abs=0.01)
+
+
+def _on_it(law: str, p: dict[str, float], x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """How far a place is on what resists, its edges as soft as a quarter of the table's 0.25 m."""
+    if law == "patch":
+        inside = p["radius"] - np.hypot(p["x"] - x, p["y"] - y)
+    else:
+        along = x * np.cos(p["azimuth"]) + y * np.sin(p["azimuth"])
+        inside = along - p.get("distance", 0.0)
+    if law == "stripes":
+        turns = np.pi / p["width"]
+        inside = np.sin(turns * along + p["phase"]) / turns
+    return np.asarray(1.0 / (1.0 + np.exp(-inside / (0.25 * 0.25))))
 
 
 def test_every_law_belongs_to_families_that_are_known_and_is_told_with_all_its_parameters() -> None:

@@ -30,7 +30,7 @@ from tomr_reality_gap.arguments import add_inputs, inputs_of
 from tomr_reality_gap.cli import main
 from tomr_reality_gap.explanation import FittedLaw
 from tomr_reality_gap.fit.jacobian import linearise
-from tomr_reality_gap.fit.laws import LAWS, SMOOTH
+from tomr_reality_gap.fit.law_forms import LAWS, SMOOTH
 from tomr_reality_gap.fit.learnt import Table
 from tomr_reality_gap.fit.unmodelled import Remainder, Tried, fitted
 from tomr_reality_gap.hypotheses.scales import scales_of

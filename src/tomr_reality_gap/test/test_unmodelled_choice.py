@@ -1,16 +1,18 @@
 """Which family is taken for what no name explains, from what each of them predicts."""
 
-from types import SimpleNamespace
+from collections.abc import Mapping
+from types import MappingProxyType, SimpleNamespace
 
 import pytest
 
 from tomr_power_model.unmodelled import FAMILIES
 from tomr_reality_gap import explain
 from tomr_reality_gap.fit import unmodelled
-from tomr_reality_gap.fit.unmodelled import unmodelled_effect
+from tomr_reality_gap.fit.unmodelled import Tried, unmodelled_effect
 
 PLACE, SPEED, TIME = "force.place", "torque.speed", "supply.time"
 SIGNED = "torque.signed_speed"
+FLOOR = "torque.place"
 
 
 def _chosen(
@@ -19,6 +21,7 @@ def _chosen(
     *,
     law: float = 0.0,
     is_sure: bool = False,
+    moments: Mapping[str, float] = MappingProxyType({}),
 ) -> str | None:
     """The family that is fitted; what depends on place is a law that explains `law`."""
 
@@ -28,7 +31,7 @@ def _chosen(
         return SimpleNamespace(family=family, laws=laws, explained=law)
 
     tried = [
-        SimpleNamespace(table=SimpleNamespace(family=FAMILIES[name]), share=share)
+        Tried(SimpleNamespace(family=FAMILIES[name]), share, moments.get(name, -1.0))  # type: ignore[arg-type]
         for name, share in sorted(shares.items(), key=lambda item: -item[1])
     ]
     monkeypatch.setattr(unmodelled, "families_tried", lambda *_: tried)
@@ -75,6 +78,22 @@ def test_a_law_of_place_that_explains_nearly_all_is_no_event(
 ) -> None:
     """Few stretches of one drive meet again."""
     assert _chosen(monkeypatch, {PLACE: 0.1, TIME: 0.9}, law=law) == expected
+
+
+@pytest.mark.parametrize(
+    ("stretches", "moments", "expected"),
+    [
+        (-0.5, 0.91, FLOOR),  # new ground all along, but the same for all wheels
+        (-0.5, 0.89, TIME),
+        (0.7, 0.89, TIME),  # it only follows time
+        (0.95, 0.91, FLOOR),
+    ],
+)
+def test_a_map_of_the_floor_is_one_where_it_tells_more_than_time_does(
+    monkeypatch: pytest.MonkeyPatch, stretches: float, moments: float, expected: str
+) -> None:
+    shares = {FLOOR: stretches, TIME: 0.9}
+    assert _chosen(monkeypatch, shares, moments={FLOOR: moments}) == expected
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,8 @@ from tomr_reality_gap.verdict import explanation_of
 
 Array = NDArray[np.float64]
 
+_SEVERAL = 2  # names, that one law may stand behind
+_MORE = 1.2  # times noise, or what another model leaves
 _LITTLE = 0.15  # of the noise: what is left of what is drawn is not looked into
 
 
@@ -76,6 +78,9 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
     if effect is not None:
         plain = dataset
         dataset, found, effect = _beside(plain, found, effect, named, ready.scales)
+    elif (tried := _instead(dataset, found, named, ready.scales)) is not None:
+        plain = dataset
+        dataset, found, effect = tried
     baseline = SimulatorBaseline.of(ready.simulations, dataset, found.noise, base.robot)
     if effect is not None and baseline is not None and baseline.shows(effect):
         effect, dataset, plain = None, plain or dataset, None
@@ -122,6 +127,23 @@ def _beside(
         if names[1] < names[0] and left[1] < left[0]:
             return tried
     return _settled(plain, effect, named, found.best.model)
+
+
+def _instead(
+    plain: Dataset, found: Selection, named: Callable[[Dataset], Selection], scales: Scales
+) -> tuple[Dataset, Selection, Unmodelled] | None:
+    """A law without a name in the place of several names, if it leaves much less than they do."""
+    names, sigma = len(found.best.model.hypotheses), found.noise.sigma
+    left = _left(plain, found, sigma)
+    if names < _SEVERAL or left < _MORE * len(plain.value):
+        return None
+    bare = found.without.model
+    alone = unmodelled_effect(_remainder(plain, bare), bare.described.robot, scales)
+    if alone is None or not alone.laws or not alone.is_repeatable:
+        return None
+    tried = _settled(plain, alone, named)
+    fewer = len(tried[1].best.model.hypotheses) + 1 < names
+    return tried if fewer and _left(*tried[:2], sigma) < left / _MORE else None
 
 
 def _settled(

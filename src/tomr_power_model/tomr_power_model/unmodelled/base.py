@@ -40,6 +40,7 @@ class Family:
     words: ClassVar[str]  # what it is, for a person
     is_strange: ClassVar[bool] = False  # whether no effect of the vocabulary depends on the like
     is_event: ClassVar[bool] = False  # whether it says when, not why: no other drive repeats it
+    is_shared: ClassVar[bool] = False  # whether one table holds for all wheels
     holds: ClassVar[str] = ""  # the family whose terms are all among its own
 
     @classmethod

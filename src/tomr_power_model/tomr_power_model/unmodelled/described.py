@@ -12,7 +12,7 @@ from tomr_power_model.unmodelled.term import LearntTerm
 Array = NDArray[np.float64]
 
 PREFIX = "unmodelled."
-VERSION = 1  # of what the fields mean
+VERSION = 2  # of what the fields mean
 _FIELDS = ("version", "robot", "family", "wheels", "unit", "knots_1", "knots_2", "values")
 _OWNER = ("robot.mass", "robot.robot_radius", "robot.wheel_radius")
 _ALIKE = 0.1  # relative: a robot that was measured anew is the same
@@ -78,7 +78,7 @@ def _term(fields: Mapping[str, object], names: Sequence[str], place: str) -> Lea
         _knots(_numbers(fields, f"knots_{number}", place), f"{place}.knots_{number}")
         for number in range(1, len(family.axes) + 1)
     )
-    rows = {"torque": len(wheels), "driver": len(wheels), "force": 2, "supply": 1}[family.acts]
+    rows = LearntTerm.rows(family, len(wheels))
     table = _numbers(fields, "values", place)
     count = rows * int(np.prod([len(points) for points in knots]))
     if len(table) != count:

@@ -6,7 +6,7 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.unmodelled.motion import LONG_AGO, STANDING, Motion
+from tomr_power_model.unmodelled.motion import LONG_AGO, RESTED, STANDING, Motion, contacts_at
 from tomr_power_model.unmodelled.term import LearntTerm
 
 Array = NDArray[np.float64]
@@ -34,7 +34,9 @@ class _Memory:
     y: float = 0.0
     speed: Array = field(factory=lambda: np.zeros(3))  # of the wheels [rad/s]
     since: Array = field(factory=lambda: np.full(3, LONG_AGO))  # s
+    stood: Array = field(factory=lambda: np.full(3, LONG_AGO))  # s
     turned: Array = field(factory=lambda: np.full(3, LONG_AGO))  # rad
+    place: Array = field(factory=lambda: np.full(3, np.inf))  # angles at which they last rested
 
 
 class OnlineTerms:
@@ -60,39 +62,51 @@ class OnlineTerms:
         """What they do in the tick that begins with wheel speeds [rad/s], motor currents [A],
         wheel angles [rad] and a heading [rad].
         """
-        wheels, before, tick = np.array(speed, dtype=np.float64), self._memory, self._tick
+        wheels, angles = np.array(speed, dtype=np.float64), np.array(angle, dtype=np.float64)
+        before, tick = self._memory, self._tick
         vx, vy, wz = self._inverse @ wheels
         middle = heading + 0.5 * wz * tick
         cos, sin = np.cos(middle), np.sin(middle)
         velocity = cos * vx - sin * vy, sin * vx + cos * vy
         # A wheel that has turned about stood in between.
-        moves = (np.abs(wheels) >= STANDING) & (wheels * before.speed >= 0.0)
+        slow = np.abs(wheels) < STANDING
+        moves = ~slow & (wheels * before.speed >= 0.0)
+        stood = np.where(slow, before.stood + tick, 0.0)
+        turned = np.minimum(before.turned + tick * np.abs(wheels), LONG_AGO)
         now = _Memory(
             before.time + tick,
             before.x + tick * velocity[0],
             before.y + tick * velocity[1],
             wheels,
             np.where(moves, np.minimum(before.since + tick, LONG_AGO), 0.0),
-            np.where(moves, np.minimum(before.turned + tick * np.abs(wheels), LONG_AGO), 0.0),
+            stood,
+            np.where(stood < RESTED, turned, 0.0),
+            np.where(stood < RESTED, before.place, angles),
         )
         self._memory = now
 
         def body(value: float) -> Array:
             return np.array([[value]])
 
+        contact_x, contact_y = contacts_at(
+            self._inverse, np.array([now.x]), np.array([now.y]), np.array([middle])
+        )
         motion = Motion(
             time=body(now.time),
             speed=wheels[None],
             current=np.array([current], dtype=np.float64),
-            angle=np.array([angle], dtype=np.float64),
+            angle=angles[None],
             heading=body(middle),
             x=body(now.x),
             y=body(now.y),
+            contact_x=contact_x,
+            contact_y=contact_y,
             velocity_x=body(velocity[0]),
             velocity_y=body(velocity[1]),
             direction=body(float(np.arctan2(vy, vx))),
             since_stand=now.since[None],
             turned=now.turned[None],
+            from_rest=np.minimum(np.abs(angles - now.place), LONG_AGO)[None],
             to_wheels=self._inverse.T,
         )
         found = [term.actions(motion) for term in self._terms]

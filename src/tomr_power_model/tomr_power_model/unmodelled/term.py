@@ -35,12 +35,17 @@ class LearntTerm:
     family: type[Family]
     wheels: tuple[int, ...]
     knots: tuple[Array, ...]  # along each axis
-    values: Array  # (places or components, knots of all axes); force: x and y [N]
+    values: Array  # (rows, knots of all axes): of each wheel, all, x and y of a force [N], or one
 
     @property
     def unit(self) -> str:
         """Of the values."""
         return UNITS[self.family.acts]
+
+    @staticmethod
+    def rows(family: type[Family], wheels: int) -> int:
+        """Rows of a table's values, for as many wheels."""
+        return {"force": 2, "supply": 1}.get(family.acts, 1 if family.is_shared else wheels)
 
     def actions(self, motion: Motion) -> Actions:
         """What it does in a drive."""
@@ -55,7 +60,8 @@ class LearntTerm:
             supply = factor[:, 0] * self._at(self.values[0], coordinates[:, 0])
         else:
             found = torque if self.family.acts == "torque" else driver
-            for wheel, values in zip(self.wheels, self.values, strict=True):
+            rows = np.broadcast_to(self.values, (len(self.wheels), self.values.shape[1]))
+            for wheel, values in zip(self.wheels, rows, strict=True):
                 at = _of_place(coordinates, wheel)
                 found[:, wheel] = factor[:, wheel] * self._at(values, at)
         return Actions(torque, driver, supply)

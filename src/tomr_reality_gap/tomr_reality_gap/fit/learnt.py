@@ -17,11 +17,11 @@ from tomr_reality_gap.fit.dataset import Dataset
 
 Array = NDArray[np.float64]
 
-_EDGE = 0.005  # quantile of a variable at which its table begins
-_MOST_KNOTS = 90
+_MOST_KNOTS = {1: 90, 2: 24}  # by the number of variables
 _LENGTH = 1.5  # knots over which a table is smooth
 _LEAST_FLOOR = 0.2  # m: who goes no farther sees no floor
 _SMALL = 1e-9
+_ALL = -1  # wheels at once
 
 
 def with_terms(
@@ -62,6 +62,7 @@ class Table:
     family: type[Family]
     knots: tuple[Array, ...]
     root: Array  # values = root @ units of N(0, 1), (k, k)
+    size: float  # standard deviation of a value
 
     @classmethod
     def over(
@@ -74,10 +75,9 @@ class Table:
             values = np.concatenate([part[..., number].ravel() for part in parts])
             count, low, high = axis.knots, 0.0, 2.0 * np.pi
             if not axis.is_periodic:
-                low, high = np.quantile(values, [_EDGE, 1.0 - _EDGE]).tolist()
-            if axis.spacing:
-                count = min(int(np.ptp(values) / axis.spacing) + 2, _MOST_KNOTS)
                 low, high = float(values.min()), float(values.max())
+            if axis.spacing:
+                count = min(int(np.ptp(values) / axis.spacing) + 2, _MOST_KNOTS[len(family.axes)])
             if high - low < (_LEAST_FLOOR if axis.unit == "m" else _SMALL):
                 return None
             knots.append(np.linspace(low, high, count, endpoint=not axis.is_periodic))
@@ -89,15 +89,25 @@ class Table:
         }[family.acts]
         found = tuple(knots)
         root = np.linalg.cholesky(smoothness(family, found, _LENGTH))
-        return cls(family, found, np.asarray(size * root, dtype=np.float64))
+        return cls(family, found, np.asarray(size * root, dtype=np.float64), size)
 
     @property
-    def places(self) -> int:
-        """Wheels, components of a force, or one."""
-        return {"torque": WHEELS, "driver": WHEELS, "force": 2, "supply": 1}[self.family.acts]
+    def rows(self) -> int:
+        """Rows of values: of the wheels, one for all, components of a force, or one."""
+        return LearntTerm.rows(self.family, WHEELS)
+
+    def wheels(self, rows: Sequence[int]) -> tuple[int, ...]:
+        """Where a term of some rows acts; none: body or supply."""
+        if self.family.acts not in ("torque", "driver"):
+            return ()
+        return tuple(range(WHEELS)) if self.family.is_shared else tuple(rows)
+
+    def rows_of(self, term: LearntTerm) -> list[int]:
+        """The rows that a term has."""
+        return list(range(self.rows) if self.family.is_shared or not term.wheels else term.wheels)
 
     def term(self, units: Sequence[Array], wheels: tuple[int, ...]) -> LearntTerm:
-        """The term of some units, of each wheel or component."""
+        """The term of some units, of each row."""
         values = np.stack([self.root @ part for part in units])
         return LearntTerm(self.family, wheels, self.knots, values)
 
@@ -109,18 +119,18 @@ class Table:
         *,
         is_exact: bool = True,
     ) -> list[Array]:
-        """What the units of each place do to every value, (n, k) each.
+        """What the units of each row do to every value, (n, k) each.
 
-        Unless exact, torques are simulated at all wheels at once, and what one wheel's do to the
-        others is left out.
+        Unless exact, torques of each wheel are simulated at all wheels at once, and what one
+        wheel's do to the others is left out.
         """
         if self.family.acts in ("driver", "supply"):
-            return [self._drawn(dataset, motions, place) for place in range(self.places)]
-        if self.family.acts == "force":
-            return [self._responses(dataset, robot, motions, place) for place in range(2)]
-        if is_exact:
-            return [self._responses(dataset, robot, motions, place) for place in range(WHEELS)]
-        together = self._responses(dataset, robot, motions, -1)
+            return [self._drawn(dataset, motions, row) for row in range(self.rows)]
+        if self.family.is_shared:
+            return [self._responses(dataset, robot, motions, _ALL)]
+        if self.family.acts == "force" or is_exact:
+            return [self._responses(dataset, robot, motions, row) for row in range(self.rows)]
+        together = self._responses(dataset, robot, motions, _ALL)
         found = []
         for rows in own_rows(dataset):
             part = np.zeros_like(together)
@@ -145,23 +155,24 @@ class Table:
         return np.concatenate(found)
 
     def _responses(
-        self, dataset: Dataset, robot: Robot, motions: Sequence[Motion], place: int
+        self, dataset: Dataset, robot: Robot, motions: Sequence[Motion], row: int
     ) -> Array:
-        """Simulated: of a component of a force, of a wheel, or (-1) of all wheels at once."""
+        """Simulated: of a component of a force, of a wheel, or (`_ALL`) of all wheels at once."""
+        wheels = range(WHEELS) if row == _ALL else (0 if self.family.acts == "force" else row,)
+        basis = [np.stack([self._basis(item, wheel).T for wheel in wheels]) for item in motions]
+        # A map of a floor has many knots where no wheel ever was.
+        visited = np.any([item.any(axis=(0, 2)) for item in basis], axis=0)
         torques = []
-        for motion in motions:
-            nothing = np.zeros(len(motion.time))
+        for motion, part in zip(motions, basis, strict=True):
+            values = self.size * part[:, visited]
             if self.family.acts == "force":
-                basis = (self._basis(motion, 0) @ self.root).T
-                pairs = [(row, nothing) if place == 0 else (nothing, row) for row in basis]
+                pairs = [(x, 0.0 * x) if row == 0 else (0.0 * x, x) for x in values[0]]
                 torques.append(np.stack([motion.resisting(*pair) for pair in pairs]))
                 continue
-            wheels = np.zeros((len(self.root), *motion.speed.shape))
-            for wheel in range(WHEELS) if place < 0 else (place,):
-                wheels[..., wheel] = (self._basis(motion, wheel) @ self.root).T
-            torques.append(wheels)
+            torques.append(np.zeros((*values.shape[1:], WHEELS)))
+            torques[-1][..., list(wheels)] = np.moveaxis(values, 0, -1)
         response = dataset.respond(robot, torques) - dataset.predict([robot])[0]
-        return np.asarray(response.T)
+        return np.asarray(response.T @ (self.root[visited] / self.size))
 
     def _basis(self, motion: Motion, place: int) -> Array:
         coordinates, factor = self.family.coordinates(motion), self.family.factor(motion)

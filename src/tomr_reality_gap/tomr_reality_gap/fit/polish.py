@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 from tomr_power_model.robot import Robot
 from tomr_power_model.unmodelled import LearntTerm, Motion
 from tomr_reality_gap.fit.dataset import Dataset
+from tomr_reality_gap.fit.law_forms import SIZES
 from tomr_reality_gap.fit.laws import LawAt
 from tomr_reality_gap.fit.learnt import power_rows
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 4
+_ROUNDS = 8
 _STEP = 0.02  # of a parameter, for its derivative
 _LEAST = 0.005  # the same, in its unit, of what may be nothing: places, speeds, angles
-_SIZES = ("size", "coefficient", "stiffness")  # however small, a step is a part of them
 
 
 def changes_of(
@@ -66,8 +66,10 @@ def polished(
         """Without what the base makes of it."""
         return np.asarray(columns - base @ (inner @ (base.T @ columns)))
 
-    least = np.array([1e-12 if name in _SIZES else _LEAST for name in law.law.units])
+    # However small a size is, a step is a part of it.
+    least = np.array([1e-12 if name in SIZES else _LEAST for name in law.law.units])
     best, change, cost = law, np.zeros_like(residual), np.inf
+    step = np.zeros_like(law.parameters)
     for _ in range(_ROUNDS):
         steps = np.maximum(_STEP * np.abs(law.parameters), least)
         moved = [evolve(law, parameters=law.parameters + row) for row in np.diag(steps)]
@@ -76,11 +78,14 @@ def polished(
         left = beside(residual - rows[0])
         now = float(left @ left)
         if now >= cost:  # the last step was too long
-            break
+            step = 0.5 * step
+            law = evolve(best, parameters=best.parameters + step)
+            continue
         jacobian = beside(((rows[1:] - rows[0]).T) / steps)
         information = jacobian.T @ jacobian
         covariance = np.asarray(np.linalg.pinv(information), dtype=np.float64)
         best = evolve(law, covariance=covariance * inflation)
         change, cost = rows[0] / weight, now
-        law = evolve(law, parameters=law.parameters + covariance @ (jacobian.T @ left))
+        step = covariance @ (jacobian.T @ left)
+        law = evolve(law, parameters=law.parameters + step)
     return best, change

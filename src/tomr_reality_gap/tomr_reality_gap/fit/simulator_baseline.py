@@ -77,7 +77,7 @@ class SimulatorBaseline:
         robot, table, term = self.described, unmodelled.table, unmodelled.learnt
         motions = [motion_in(item, robot) for item in self.dataset.simulations]
         parts = table.columns(self.dataset, robot, motions)
-        chosen = [parts[number] for number in term.wheels or range(len(parts))]
+        chosen = [parts[number] for number in table.rows_of(term)]
         columns = np.concatenate(chosen, axis=1)
         theirs = columns @ self._fitted(columns) * self.weight
         units = [np.linalg.solve(table.root, values) for values in term.values]

@@ -111,7 +111,10 @@ class Tried:
     """A family and how well it predicts."""
 
     table: Table
-    share: float
+    share: float  # of stretches left out; of moments if it is an event
+    moments: float = (
+        -1.0
+    )  # of moments left out, where a drive's stretches are on ground of their own
 
 
 def predicted_share(rest: Remainder, columns: Sequence[Array], labels: NDArray[np.intp]) -> float:
@@ -161,8 +164,15 @@ def unmodelled_effect(
     tried = families_tried(rest, robot, scales, motions)
     if not tried:
         return None
+    event = next((item for item in tried if item.table.family.is_event), None)
+    # A map of ground that is never met again follows what only changes with time.
+    tried = [
+        item
+        for item in tried
+        if not (event and item.table.family.is_shared and item.moments < event.share)
+    ]
     lasting = _narrowest([item for item in tried if not item.table.family.is_event])
-    events = next((item for item in tried if item.table.family.is_event), None)
+    events = _by_moments(tried, event)
     best = lasting or events
     if lasting and events and lasting.share < max(_EVENT * events.share, _TOLD):
         best = events
@@ -174,6 +184,14 @@ def unmodelled_effect(
             if found.laws and found.explained > _LAW:
                 return found
     return fitted(rest, best, robot, motions)
+
+
+def _by_moments(tried: Sequence[Tried], event: Tried | None) -> Tried | None:
+    """The best event, or a map that tells more of moments: a drive shows most places but once."""
+    mapped = max(tried, key=lambda item: item.moments)
+    if mapped.moments < max(event.share if event else 0.0, _TOLD):
+        return event
+    return evolve(mapped, share=mapped.moments)
 
 
 def _narrowest(tried: Sequence[Tried]) -> Tried | None:
@@ -200,8 +218,11 @@ def families_tried(
         labels = moment if family.is_event else stretch
         columns = table.columns(rest.dataset, robot, motions, is_exact=False)
         share = predicted_share(rest, columns, labels)
-        if not math.isnan(share):
-            found.append(Tried(table, share))
+        if math.isnan(share):
+            continue
+        found.append(Tried(table, share))
+        if family.is_shared:
+            found[-1] = Tried(table, share, predicted_share(rest, columns, moment))
     most = max((item.share for item in found), default=0.0)
     for number, item in enumerate(found):
         family = item.table.family
@@ -227,8 +248,7 @@ def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]
     columns = [part * rest.weight[:, None] for part in table.columns(rest.dataset, robot, motions)]
     numbers, base = list(range(len(columns))), rest.base.shape[1]
     units, _, _ = _solved(rest, columns)
-    at_wheels = table.family.acts in ("torque", "driver")
-    if at_wheels:
+    if table.wheels(numbers) and not table.family.is_shared:
         energy = [float(((c @ u) ** 2).sum()) for c, u in zip(columns, units, strict=True)]
         numbers = [n for n in numbers if energy[n] > _WHEEL_SHARE * max(energy)]
     chosen = [columns[number] for number in numbers]
@@ -241,7 +261,7 @@ def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]
         for part in (slice(n * count, (n + 1) * count) for n in range(len(units)))
     ]
     joined = np.concatenate(chosen, axis=1)
-    own, term = joined @ np.concatenate(units), table.term(units, tuple(numbers) * at_wheels)
+    own, term = joined @ np.concatenate(units), table.term(units, table.wheels(numbers))
     equations, change = _normal_equations(rest, joined, left), own / rest.weight
     laws, simulated = laws_of(table, term, equations), term
     if laws:
@@ -262,7 +282,7 @@ def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]
         tuple(law.fitted for law in laws),
         simulated,
         best.share,
-        not table.family.is_event or bool(laws),
+        not table.family.is_event or (bool(laws) and len(motions) > 1),
         _evidence(rest.dataset, alone, left),
         _is_large(rest.dataset, change),
         change,

@@ -9,7 +9,7 @@ from attrs import frozen
 
 from tomr_power_model.errors import InputError
 from tomr_reality_gap.explanation import Estimate
-from tomr_reality_gap.fit.laws import SMOOTH
+from tomr_reality_gap.fit.law_forms import SMOOTH
 from tomr_reality_gap.promote.learnt_law import LearntLaw
 
 _REACH = 10.0  # half-widths of an interval to either side: what an effect's parameter may be

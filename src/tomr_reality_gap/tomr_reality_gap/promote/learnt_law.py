@@ -17,7 +17,8 @@ from tomr_power_model.robot import Robot, read_description, robot_from_parameter
 from tomr_power_model.unmodelled import Family, LearntTerm
 from tomr_power_model.unmodelled.described import PREFIX
 from tomr_reality_gap.explanation import Estimate
-from tomr_reality_gap.fit.laws import LAWS, Law, unit_of
+from tomr_reality_gap.fit.law_forms import LAWS, Law
+from tomr_reality_gap.fit.laws import unit_of
 
 _REPORT = "report.json"
 

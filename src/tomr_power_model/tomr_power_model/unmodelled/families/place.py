@@ -4,17 +4,23 @@ from typing import ClassVar
 
 from tomr_power_model.unmodelled.base import Axis, Family, Resistance, family
 
-_FLOOR = (Axis("x", "m", 7, lambda m: m.x), Axis("y", "m", 7, lambda m: m.y))
+_BODY = (Axis("x", "m", 7, lambda m: m.x), Axis("y", "m", 7, lambda m: m.y))
+_SPACING = 0.25  # m: a robot is about as wide
+_FLOOR = (
+    Axis("x of the wheel", "m", 7, lambda m: m.contact_x, spacing=_SPACING),
+    Axis("y of the wheel", "m", 7, lambda m: m.contact_y, spacing=_SPACING),
+)
 
 
 @family
 class TorqueByPlace(Resistance):
-    """A floor that is not the same everywhere."""
+    """A floor that is not the same everywhere, whichever wheel is there."""
 
     family_id = "torque.place"
     axes: ClassVar = _FLOOR
     words = "a resistance that depends on the place on the floor"
     is_strange = True
+    is_shared = True
 
 
 @family
@@ -23,6 +29,6 @@ class ForceByPlace(Family):
 
     family_id = "force.place"
     acts = "force"
-    axes: ClassVar = _FLOOR
+    axes: ClassVar = _BODY
     words = "a force on the body that depends on where it is"
     is_strange = True

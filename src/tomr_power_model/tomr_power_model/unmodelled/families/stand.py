@@ -28,7 +28,19 @@ class TorqueTurnedSinceStand(Resistance):
 
     family_id = "torque.turned"
     axes: ClassVar = (
-        Axis("angle turned since a stand", "rad", 24, lambda m: np.minimum(m.turned, _FARTHEST)),
+        Axis("angle turned since a rest", "rad", 24, lambda m: np.minimum(m.turned, _FARTHEST)),
     )
-    words = "a resistance that depends on how far the wheel has turned since it last stood"
+    words = "a resistance that depends on how far the wheel has turned since it last rested"
+    is_strange = True
+
+
+@family
+class TorqueFromRest(Resistance):
+    """A spot that a wheel has settled into, and comes back to."""
+
+    family_id = "torque.from_rest"
+    axes: ClassVar = (
+        Axis("angle from where it rested", "rad", 24, lambda m: np.minimum(m.from_rest, _FARTHEST)),
+    )
+    words = "a resistance that depends on the angle between the wheel and where it last rested"
     is_strange = True

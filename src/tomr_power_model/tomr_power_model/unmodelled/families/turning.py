@@ -16,6 +16,15 @@ class TorqueByAngle(Family):
 
 
 @family
+class DragByAngle(Resistance):
+    """A tight spot of a bearing or a toothing: it resists whichever way the wheel turns."""
+
+    family_id = "torque.tight_angle"
+    axes: ClassVar = (Axis("wheel angle", "rad", 36, lambda m: m.angle, is_periodic=True),)
+    words = "a resistance that depends on the wheel's angle"
+
+
+@family
 class TorqueByDirection(Resistance):
     """Rollers, or a load that leans on some wheels."""
 
