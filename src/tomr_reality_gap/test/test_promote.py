@@ -89,7 +89,7 @@ def _told(**values: float) -> dict[str, object]:
 def test_the_formula_of_a_law_is_the_law(law: object) -> None:
     at = np.linspace(0.0, 8.0, 33)
     values = {"size": 0.3, "exponent": 1.7, "threshold": 3.1, "decay": 1.3, "order": 2.0,
-              "phase": 0.4}  # fmt: skip
+              "phase": 0.4, "width": 0.7, "place": 2.0}  # fmt: skip
     p = [values[name] for name in law.units]  # type: ignore[attr-defined]
     expected = law.value(np.array(p), at[:, None])  # type: ignore[attr-defined]
     names = {**values, "math": math, "WIDTH": SMOOTH * 0.25}
@@ -105,6 +105,8 @@ def test_the_formula_of_a_law_is_the_law(law: object) -> None:
         ("torque.speed", "exponential", _told(size=0.1, decay=2.0), "exponential_by_speed"),
         ("driver.current", "square beyond a threshold", _told(size=0.2, threshold=3.0),
          "square_beyond_a_threshold_by_current"),
+        ("torque.tight_angle", "bump", _told(size=0.05, width=2.0, place=1.0),
+         "bump_by_tight_angle"),
         ("torque.angle", "periodic", _told(size=0.05, order=3.0, phase=-0.5),
          "periodic_by_angle"),
     ],

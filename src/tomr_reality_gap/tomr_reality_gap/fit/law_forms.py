@@ -234,6 +234,7 @@ LAWS: tuple[Law, ...] = (
         {"size": "*", "width": "rad", "place": "rad"},
         _bump_starts,
         _bump,
+        "size * math.exp(-((math.remainder(x - place, math.tau) / width) ** 2))",
     ),
     Law(
         "step",

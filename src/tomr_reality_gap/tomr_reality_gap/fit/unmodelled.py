@@ -112,9 +112,13 @@ class Tried:
 
     table: Table
     share: float  # of stretches left out; of moments if it is an event
-    moments: float = (
-        -1.0
-    )  # of moments left out, where a drive's stretches are on ground of their own
+    # Of moments left out, of a map: each stretch is on ground of its own.
+    moments: float = -1.0
+
+    @property
+    def best(self) -> float:
+        """The larger of the shares."""
+        return max(self.share, self.moments)
 
 
 def predicted_share(rest: Remainder, columns: Sequence[Array], labels: NDArray[np.intp]) -> float:
@@ -180,7 +184,7 @@ def unmodelled_effect(
         return None
     if best is events:  # few stretches may not meet again, but a law that holds for all is one
         for item in [item for item in tried if item.table.family.is_strange]:
-            found = fitted(rest, item, robot, motions)
+            found = fitted(rest, evolve(item, share=item.best), robot, motions)
             if found.laws and found.explained > _LAW:
                 return found
     return fitted(rest, best, robot, motions)
@@ -239,7 +243,8 @@ def refitted(rest: Remainder, effect: Unmodelled, robot: Robot) -> Unmodelled:
     stretch, moment = rest.blocks
     columns = table.columns(rest.dataset, robot, motions)
     share = predicted_share(rest, columns, moment if table.family.is_event else stretch)
-    return fitted(rest, Tried(table, share), robot, motions)
+    again = predicted_share(rest, columns, moment) if table.family.is_shared else share
+    return fitted(rest, Tried(table, max(share, again)), robot, motions)
 
 
 def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]) -> Unmodelled:

@@ -47,6 +47,14 @@ _HOOKS: Mapping[str, _Hook] = {
         "angle",
         "SPEEDS",
     ),
+    "torque.tight_angle": _Hook(
+        "moving_torque",
+        "wheel: Wheel",
+        "wheel.angle if wheel.angle == wheel.angle else 0.0",
+        " * math.tanh(wheel.speed / MOVING)",
+        "tight angle",
+        "SPEEDS",
+    ),
     "driver.current": _Hook(
         "driver_power", "current: float", "abs(current)", "", "current", "VARIED", False
     ),
