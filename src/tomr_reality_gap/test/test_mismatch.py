@@ -17,9 +17,10 @@ from tomr_reality_gap.fit.forward_selection import Selection
 from tomr_reality_gap.fit.jacobian import linearise
 from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.model import Model
+from tomr_reality_gap.fit.remainder import Remainder
 from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
 from tomr_reality_gap.fit.simulator_discrepancy import discrepancy_torques
-from tomr_reality_gap.fit.unmodelled import Remainder, shape_of, unmodelled_effect
+from tomr_reality_gap.fit.unmodelled import shape_of, unmodelled_effect
 from tomr_reality_gap.hypotheses.catalogue import nuisances
 from tomr_reality_gap.hypotheses.scales import scales_of
 from tomr_reality_gap.mismatch.locate import located

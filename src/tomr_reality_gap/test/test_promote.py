@@ -32,7 +32,8 @@ from tomr_reality_gap.explanation import FittedLaw
 from tomr_reality_gap.fit.jacobian import linearise
 from tomr_reality_gap.fit.law_forms import LAWS, SMOOTH
 from tomr_reality_gap.fit.learnt import Table
-from tomr_reality_gap.fit.unmodelled import Remainder, Tried, fitted
+from tomr_reality_gap.fit.remainder import Remainder
+from tomr_reality_gap.fit.unmodelled import Tried, fitted
 from tomr_reality_gap.hypotheses.scales import scales_of
 from tomr_reality_gap.promote.learnt_law import learnt_law
 

@@ -21,8 +21,9 @@ from tomr_reality_gap.fit.forward_selection import Selection, finding_cost, forw
 from tomr_reality_gap.fit.jacobian import linearise
 from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.model import Model
+from tomr_reality_gap.fit.remainder import Remainder
 from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
-from tomr_reality_gap.fit.unmodelled import Remainder, Unmodelled, refitted, unmodelled_effect
+from tomr_reality_gap.fit.unmodelled import Unmodelled, refitted, unmodelled_effect
 from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
 from tomr_reality_gap.mismatch.orders import ripple_orders
 from tomr_reality_gap.prepared import Prepared, prepared

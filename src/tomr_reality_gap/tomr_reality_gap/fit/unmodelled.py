@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tomr_power_model.effects.scales import Scales
 from tomr_power_model.estimation.linear_gaussian import Gram, solve
 from tomr_power_model.estimation.noise import rows_of
-from tomr_power_model.estimation.statistics import autocorrelation_time, robust_scale
+from tomr_power_model.estimation.statistics import autocorrelation_time
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_power_model.unmodelled import FAMILIES, Family, LearntTerm, Motion
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
@@ -24,17 +24,13 @@ from tomr_reality_gap.explanation import FittedLaw, Shape
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.laws import Evidence, laws_of
 from tomr_reality_gap.fit.learnt import Table
-from tomr_reality_gap.fit.polish import polished
+from tomr_reality_gap.fit.polish import changes_of, polished
+from tomr_reality_gap.fit.remainder import Remainder, predicted_share
 
 Array = NDArray[np.float64]
 
-_STRETCHES = 8  # of a recording, each left out once
-_MOMENT = 0.25  # s: of every four one is left out
-_MOMENTS = 4
-_INEXACT = 0.01  # of a channel's standard deviation, besides its noise
-_SHOWS = 1.0  # eigenvalue of a nuisance's information beyond which it is fitted
+_CLEARLY = 0.005  # of the squares that are left, that other wheels must explain
 _WHEEL_SHARE = 0.1  # of the wheel that shows most
-_SURELY = 3.0  # standard deviations of a sum of squares of noise
 _TOLD = 0.3  # share of what is left that a term must predict
 _SMALL = 0.02  # of a channel's standard deviation: less is not worth a word
 _LAGS = 80
@@ -42,46 +38,6 @@ _LAW = 0.8  # of the squares that are left: a law that explains so much is no ch
 _AS_MUCH = 0.95  # of what a wider family predicts
 _NEAR = 0.35  # of the best share: worth a closer look
 _EVENT = 0.45  # of what a term of time explains: as much of it, and it is repeatable
-
-
-@frozen
-class Remainder:
-    """What a model leaves of the recordings, and what it could still make of it."""
-
-    dataset: Dataset
-    residual: Array  # whitened by what differs from sample to sample, (n,)
-    base: Array  # derivatives by what is not exactly known, likewise, (n, q)
-    weight: Array  # (n,)
-
-    @classmethod
-    def of(cls, dataset: Dataset, value: Array, columns: Array) -> "Remainder":
-        """Of simulated values; `columns` are derivatives in prior standard deviations, (n, p)."""
-        residual = dataset.value - value
-        weight = np.empty_like(residual)
-        for channel, part in zip(dataset.channels, rows_of(dataset.channels), strict=True):
-            weight[part] = 1.0 / _scatter(channel.value, residual[part], channel.quantum)
-        gram = Gram.of(columns, residual, weight)
-        values, vectors = np.linalg.eigh(gram.matrix)
-        shown = (columns @ vectors[:, values > _SHOWS]) * weight[:, None]
-        return cls(dataset, residual * weight, np.asarray(shown, dtype=np.float64), weight)
-
-    @property
-    def blocks(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Stretch and moment of each row."""
-        stretch, moment = [], []
-        for simulation in self.dataset.simulations:
-            time = np.concatenate([channel.time for channel in simulation.channels])
-            share = _STRETCHES * time / (time.max() + 1e-9)
-            stretch.append(np.minimum(share.astype(np.intp), _STRETCHES - 1))
-            moment.append((time / _MOMENT).astype(np.intp) % _MOMENTS)
-        return np.concatenate(stretch), np.concatenate(moment)
-
-
-def _scatter(value: Array, residual: Array, quantum: float) -> float:
-    """Noise of a channel from one sample to the next, and what no simulator tells of it."""
-    steps = np.abs(np.diff(residual))
-    noise = max(0.5 * robust_scale(steps) ** 2, 0.5 * float(np.mean(steps**2)) / 4.0)
-    return float(np.sqrt(max(noise, quantum**2 / 12.0) + (_INEXACT * np.std(value)) ** 2)) + 1e-12
 
 
 @frozen
@@ -119,42 +75,6 @@ class Tried:
     def best(self) -> float:
         """The larger of the shares."""
         return max(self.share, self.moments)
-
-
-def predicted_share(rest: Remainder, columns: Sequence[Array], labels: NDArray[np.intp]) -> float:
-    """Share of what is left, beyond noise, that columns predict of blocks left out one by one.
-
-    At most 1, at least -1: predicted worse than by nothing. NaN where no more than noise is left.
-    """
-    own = np.concatenate(columns, axis=1) * rest.weight[:, None]
-    without, beside = (
-        _squares_unfitted(rest.residual, part, labels)
-        for part in (rest.base, np.concatenate([rest.base, own], axis=1))
-    )
-    # Channel by channel: one that the model knows better than its noise hides none of the others'.
-    parts = rows_of(rest.dataset.channels)
-    sums = [(float(without[part].sum()), int(part.stop - part.start)) for part in parts]
-    beyond = sum(
-        square - count
-        for square, count in sums
-        if square - count > _SURELY * math.sqrt(2.0 * count)
-    )
-    if not beyond:
-        return math.nan
-    return max(-1.0, min(1.0, float((without - beside).sum()) / beyond))
-
-
-def _squares_unfitted(residual: Array, columns: Array, labels: NDArray[np.intp]) -> Array:
-    """Squares of what columns leave of each block, fitted to the others, (n,)."""
-    blocks = [labels == label for label in np.unique(labels)]
-    grams = [Gram.of(columns[rows], residual[rows]) for rows in blocks]
-    matrix = np.sum([gram.matrix for gram in grams], axis=0)
-    vector = np.sum([gram.vector for gram in grams], axis=0)
-    left = residual.copy()
-    for rows, gram in zip(blocks, grams, strict=True):
-        others = Gram(matrix - gram.matrix, vector - gram.vector, 0.0)
-        left[rows] -= columns[rows] @ solve(others, range(columns.shape[1])).mean
-    return np.asarray(left**2)
 
 
 def unmodelled_effect(
@@ -248,25 +168,53 @@ def refitted(rest: Remainder, effect: Unmodelled, robot: Robot) -> Unmodelled:
 
 
 def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]) -> Unmodelled:
-    """A family's table, at the wheels that show it."""
-    table = best.table
-    columns = [part * rest.weight[:, None] for part in table.columns(rest.dataset, robot, motions)]
-    numbers, base = list(range(len(columns))), rest.base.shape[1]
+    """A family's table at the wheels that show it, or at all where its law holds for them too."""
+    columns = best.table.columns(rest.dataset, robot, motions)
+    columns = [part * rest.weight[:, None] for part in columns]
+    every = list(range(len(columns)))
+    rows = _rows_shown(rest, best.table, columns)
+    found = _fitted_at(rest, best, robot, motions, [columns[row] for row in rows], rows)
+    if not found.laws or len(rows) == len(every):
+        return found
+    # A wheel that turned slower than the others shows little of what grows with its speed.
+    term = found.term
+    wide = evolve(
+        term, wheels=best.table.wheels(every), values=np.tile(term.values[:1], (WHEELS, 1))
+    )
+    change = changes_of(rest.dataset, robot, motions, [wide])[0]
+    if _explained(rest, _alone(rest), change) < found.explained + _CLEARLY:
+        return found
+    return _fitted_at(rest, best, robot, motions, columns, every)
+
+
+def _rows_shown(rest: Remainder, table: Table, columns: Sequence[Array]) -> list[int]:
+    """Rows of a table at the wheels that show it; all where it acts elsewhere."""
+    rows = list(range(len(columns)))
+    if not table.wheels(rows) or table.family.is_shared:
+        return rows
     units, _, _ = _solved(rest, columns)
-    if table.wheels(numbers) and not table.family.is_shared:
-        energy = [float(((c @ u) ** 2).sum()) for c, u in zip(columns, units, strict=True)]
-        numbers = [n for n in numbers if energy[n] > _WHEEL_SHARE * max(energy)]
-    chosen = [columns[number] for number in numbers]
-    units, covariance, change = _solved(rest, chosen)
-    alone = rest.residual - rest.base @ solve(Gram.of(rest.base, rest.residual), range(base)).mean
-    left = rest.residual - change
-    count = len(units[0])
+    energy = [float(((c @ u) ** 2).sum()) for c, u in zip(columns, units, strict=True)]
+    return [row for row in rows if energy[row] > _WHEEL_SHARE * max(energy)]
+
+
+def _fitted_at(
+    rest: Remainder,
+    best: Tried,
+    robot: Robot,
+    motions: Sequence[Motion],
+    columns: Sequence[Array],
+    rows: Sequence[int],
+) -> Unmodelled:
+    """Of some rows, whose whitened columns are given."""
+    table = best.table
+    units, covariance, change = _solved(rest, columns)
+    alone, left, count = _alone(rest), rest.residual - change, len(units[0])
     sigma = [
         np.sqrt(np.einsum("ij,jk,ik->i", table.root, covariance[part, part], table.root))
         for part in (slice(n * count, (n + 1) * count) for n in range(len(units)))
     ]
-    joined = np.concatenate(chosen, axis=1)
-    own, term = joined @ np.concatenate(units), table.term(units, table.wheels(numbers))
+    joined = np.concatenate(columns, axis=1)
+    own, term = joined @ np.concatenate(units), table.term(units, table.wheels(rows))
     equations, change = _normal_equations(rest, joined, left), own / rest.weight
     laws, simulated = laws_of(table, term, equations), term
     if laws:
@@ -294,6 +242,12 @@ def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]
         _explained(rest, alone, change),
         np.stack(sigma),
     )
+
+
+def _alone(rest: Remainder) -> Array:
+    """What is left where only what is not exactly known is fitted, whitened, (n,)."""
+    gram = Gram.of(rest.base, rest.residual)
+    return np.asarray(rest.residual - rest.base @ solve(gram, range(rest.base.shape[1])).mean)
 
 
 def _explained(rest: Remainder, alone: Array, change: Array) -> float:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tomr_reality_gap.fit.unmodelled import Remainder, predicted_share
+from tomr_reality_gap.fit.remainder import Remainder, predicted_share
 
 SAMPLES, BLOCKS = 4000, 8
 LABELS = np.tile(np.arange(SAMPLES // 2) * 2 * BLOCKS // SAMPLES, 2)  # of two channels alike

@@ -1,0 +1,98 @@
+"""What a model leaves of recordings, and how much of it columns predict of what they never saw."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_power_model.estimation.linear_gaussian import Gram, solve
+from tomr_power_model.estimation.noise import rows_of
+from tomr_power_model.estimation.statistics import robust_scale
+from tomr_reality_gap.fit.dataset import Dataset
+
+Array = NDArray[np.float64]
+
+_STRETCHES = 8  # of a recording, each left out once
+_MOMENT = 0.25  # s: of every four one is left out
+_MOMENTS = 4
+_INEXACT = 0.01  # of a channel's standard deviation, besides its noise
+_SHOWS = 1.0  # eigenvalue of a nuisance's information beyond which it is fitted
+_SURELY = 3.0  # standard deviations of a sum of squares of noise
+
+
+@frozen
+class Remainder:
+    """What a model leaves of the recordings, and what it could still make of it."""
+
+    dataset: Dataset
+    residual: Array  # whitened by what differs from sample to sample, (n,)
+    base: Array  # derivatives by what is not exactly known, likewise, (n, q)
+    weight: Array  # (n,)
+
+    @classmethod
+    def of(cls, dataset: Dataset, value: Array, columns: Array) -> "Remainder":
+        """Of simulated values; `columns` are derivatives in prior standard deviations, (n, p)."""
+        residual = dataset.value - value
+        weight = np.empty_like(residual)
+        for channel, part in zip(dataset.channels, rows_of(dataset.channels), strict=True):
+            weight[part] = 1.0 / _scatter(channel.value, residual[part], channel.quantum)
+        gram = Gram.of(columns, residual, weight)
+        values, vectors = np.linalg.eigh(gram.matrix)
+        shown = (columns @ vectors[:, values > _SHOWS]) * weight[:, None]
+        return cls(dataset, residual * weight, np.asarray(shown, dtype=np.float64), weight)
+
+    @property
+    def blocks(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Stretch and moment of each row."""
+        stretch, moment = [], []
+        for simulation in self.dataset.simulations:
+            time = np.concatenate([channel.time for channel in simulation.channels])
+            share = _STRETCHES * time / (time.max() + 1e-9)
+            stretch.append(np.minimum(share.astype(np.intp), _STRETCHES - 1))
+            moment.append((time / _MOMENT).astype(np.intp) % _MOMENTS)
+        return np.concatenate(stretch), np.concatenate(moment)
+
+
+def _scatter(value: Array, residual: Array, quantum: float) -> float:
+    """Noise of a channel from one sample to the next, and what no simulator tells of it."""
+    steps = np.abs(np.diff(residual))
+    noise = max(0.5 * robust_scale(steps) ** 2, 0.5 * float(np.mean(steps**2)) / 4.0)
+    return float(np.sqrt(max(noise, quantum**2 / 12.0) + (_INEXACT * np.std(value)) ** 2)) + 1e-12
+
+
+def predicted_share(rest: Remainder, columns: Sequence[Array], labels: NDArray[np.intp]) -> float:
+    """Share of what is left, beyond noise, that columns predict of blocks left out one by one.
+
+    At most 1, at least -1: predicted worse than by nothing. NaN where no more than noise is left.
+    """
+    own = np.concatenate(columns, axis=1) * rest.weight[:, None]
+    without, beside = (
+        _squares_unfitted(rest.residual, part, labels)
+        for part in (rest.base, np.concatenate([rest.base, own], axis=1))
+    )
+    # Channel by channel: one that the model knows better than its noise hides none of the others'.
+    parts = rows_of(rest.dataset.channels)
+    sums = [(float(without[part].sum()), int(part.stop - part.start)) for part in parts]
+    beyond = sum(
+        square - count
+        for square, count in sums
+        if square - count > _SURELY * math.sqrt(2.0 * count)
+    )
+    if not beyond:
+        return math.nan
+    return max(-1.0, min(1.0, float((without - beside).sum()) / beyond))
+
+
+def _squares_unfitted(residual: Array, columns: Array, labels: NDArray[np.intp]) -> Array:
+    """Squares of what columns leave of each block, fitted to the others, (n,)."""
+    blocks = [labels == label for label in np.unique(labels)]
+    grams = [Gram.of(columns[rows], residual[rows]) for rows in blocks]
+    matrix = np.sum([gram.matrix for gram in grams], axis=0)
+    vector = np.sum([gram.vector for gram in grams], axis=0)
+    left = residual.copy()
+    for rows, gram in zip(blocks, grams, strict=True):
+        others = Gram(matrix - gram.matrix, vector - gram.vector, 0.0)
+        left[rows] -= columns[rows] @ solve(others, range(columns.shape[1])).mean
+    return np.asarray(left**2)
