@@ -9,18 +9,20 @@ from tomr_power_model.effects.scales import Scales
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.parameter import ParameterisedRobot, per_wheel
 from tomr_power_model.robot import read_description, shipped_robot
+from tomr_power_model.unmodelled import FAMILIES
 from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.alignment.motion import motion_in
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
+from tomr_reality_gap.fit import unmodelled
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection
 from tomr_reality_gap.fit.jacobian import linearise
-from tomr_reality_gap.fit.learnt import with_terms
+from tomr_reality_gap.fit.learnt import Table, with_terms
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.remainder import Remainder
 from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
 from tomr_reality_gap.fit.simulator_discrepancy import discrepancy_torques
-from tomr_reality_gap.fit.unmodelled import shape_of, unmodelled_effect
+from tomr_reality_gap.fit.unmodelled import Tried, fitted, shape_of, unmodelled_effect
 from tomr_reality_gap.hypotheses.catalogue import nuisances
 from tomr_reality_gap.hypotheses.scales import scales_of
 from tomr_reality_gap.mismatch.locate import located
@@ -108,6 +110,49 @@ def test_what_has_no_name_is_found_with_its_wheel_and_variable(
     # It is laid on any drive beside what is named.
     termed = with_terms(simulation, robot, (effect.term,)).predict([robot])[0]
     assert (termed - resisting).std() < 0.4 * (plain - resisting).std()
+
+
+@pytest.mark.parametrize(("wheels", "expected"), [((0, 1, 2), (0, 1, 2)), ((1,), (1,))])
+def test_a_law_holds_at_wheels_that_hardly_show_it_but_not_where_it_is_not(
+    simulation: RecordingSimulation,  # noqa: F811
+    monkeypatch: pytest.MonkeyPatch,
+    wheels: tuple[int, ...],
+    expected: tuple[int, ...],
+) -> None:
+    """A cubic drag, of which only the wheel that shows most of it is looked at first."""
+    monkeypatch.setattr(unmodelled, "_WHEEL_SHARE", 0.99)
+    robot = simulation.robot
+    speed = simulation.run(robot).speed
+    torque = np.zeros((1, *speed.shape))
+    torque[0][:, list(wheels)] = 3e-4 * speed[:, list(wheels)] ** 3
+    dataset, found = searched(simulation, next(simulation.respond(robot, torque)), ())
+    motions = [motion_in(simulation, robot)]
+    table = Table.over(FAMILIES["torque.speed"], motions, _scales(simulation))
+    assert table is not None
+    effect = fitted(_rest(dataset, found), Tried(table, 1.0), robot, motions)
+    assert effect.term.wheels == expected
+    assert effect.laws[0].name == "power law"
+    assert effect.laws[0].parameters["exponent"].value == pytest.approx(3.0, abs=0.1)
+
+
+@pytest.mark.parametrize("recordings", [1, 2])
+def test_what_runs_in_is_repeatable_only_if_it_does_so_in_several_recordings(
+    simulation: RecordingSimulation,  # noqa: F811
+    recordings: int,
+) -> None:
+    """0.2 N m that dies out over 8 s."""
+    robot, motion = simulation.robot, motion_in(simulation, simulation.robot)
+    torque = 0.2 * np.exp(-motion.time / 8.0) * motion.sign
+    _, found = searched(simulation, next(simulation.respond(robot, torque[None])), ())
+    value = next(simulation.respond(robot, torque[None]))
+    dataset = Dataset((as_recorded(simulation, value),) * recordings)
+    motions = [motion] * recordings
+    table = Table.over(FAMILIES["torque.time"], motions, _scales(simulation))
+    assert table is not None
+    effect = fitted(_rest(dataset, found), Tried(table, 1.0), robot, motions)
+    assert effect.laws[0].name == "exponential"
+    assert effect.laws[0].parameters["decay"].value == pytest.approx(8.0, rel=0.1)
+    assert effect.is_repeatable == (recordings > 1)
 
 
 def test_a_tether_is_told_with_its_anchor_and_a_gust_as_what_comes_and_goes(
