@@ -12,11 +12,17 @@ import pytest
 from attrs import evolve
 
 from tomr_power_model.effects import EFFECTS
-from tomr_reality_gap.explanation import Estimate, Explanation, Shape
+from tomr_power_model.unmodelled import FAMILIES, LearntTerm
+from tomr_reality_gap.explanation import Estimate, Explanation, Learnt, Shape
 from tomr_reality_gap.report.html import channel_lines, picture_count, report_page
 from tomr_reality_gap.report.json import report_json
 from tomr_reality_gap.report.showing import best_view
-from tomr_reality_gap.report.words import effect_words, estimate_words, percent_words
+from tomr_reality_gap.report.words import (
+    effect_words,
+    estimate_words,
+    percent_words,
+    shortened,
+)
 
 VOID = {"meta", "img", "br", "link", "hr", "input"}
 
@@ -136,12 +142,22 @@ def test_page_of_a_match_speaks_of_no_explanation(match: Explanation) -> None:
 def test_page_shows_the_shape_of_what_has_no_name(with_rest: Callable[..., Explanation]) -> None:
     at = np.linspace(-3.0, 3.0, 7)
     shape = Shape("wheel speed [rad/s]", "wheel_2_joint", at, 0.01 * at, at - 1.0, at + 1.0)
-    explanation = with_rest(effect="unknown", parameters={}, rivals=(), shape=shape)
+    term = LearntTerm(FAMILIES["torque.speed"], (1,), (np.abs(at[3:]),), np.zeros((1, 4)))
+    learnt = Learnt(term, np.zeros((1, 4)), 0.9, is_repeatable=True)
+    explanation = with_rest(effect="unknown", parameters={}, rivals=(), shape=shape, learnt=learnt)
     explanation = evolve(explanation, comparisons=(), maps=())
     page = Page(report_page(explanation, "my_robot.yaml"))
     assert "Something outside the vocabulary" in page.words
     assert "The unnamed effect at wheel_2_joint" in page.words
+    assert "Of what has no name, look at the wheel's bearings, seal and grease" in page.words
     assert len(page.pictures) == picture_count(explanation) == 1
+
+
+def test_long_lists_of_a_description_show_their_beginning() -> None:
+    numbers = ", ".join(str(number) for number in range(1000))
+    text = f"wheels: [left, right]\nvalues: [{numbers}]\n"
+    expected = "wheels: [left, right]\nvalues: [0, 1, 2, 3, 4, ... 1000 numbers in all]\n"
+    assert shortened(text) == expected
 
 
 def test_page_stands_without_drives_and_maps(match: Explanation) -> None:

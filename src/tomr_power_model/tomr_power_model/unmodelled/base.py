@@ -38,6 +38,7 @@ class Family:
     acts: ClassVar[Acts]
     axes: ClassVar[tuple[Axis, ...]]
     words: ClassVar[str]  # what it is, for a person
+    look: ClassVar[str]  # what to look at first
     is_strange: ClassVar[bool] = False  # whether no effect of the vocabulary depends on the like
     is_event: ClassVar[bool] = False  # whether it says when, not why: no other drive repeats it
     is_shared: ClassVar[bool] = False  # whether one table holds for all wheels

@@ -32,7 +32,7 @@ _POSITIVE = ("slack", "radius", "decay", "width")
 _WHOLE = ("order",)  # parameters that are whole numbers
 _BEYOND = 1.0  # of the range, on either side, that a law is trusted beyond the table
 _FINER = {1: 4, 2: 2}  # knots of a law's table for each of the learnt one, by its axes
-_FLOOR = (4, 0.5)  # the same of a map of the floor, and how far it is trusted beyond it
+_FLOOR = (4, 0.25)  # the same of a map of the floor, and how far it is trusted beyond it
 _STARTS = 12  # of a fit, at most
 
 

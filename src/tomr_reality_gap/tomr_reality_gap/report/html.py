@@ -19,6 +19,7 @@ from tomr_reality_gap.report.words import (
     number_words,
     percent_words,
     place_words,
+    shortened,
     title,
 )
 
@@ -102,7 +103,11 @@ def rendered(template: str, **values: object) -> str:
     """A page of this package from its template and what that shows."""
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     environment.filters.update(
-        number=number_words, percent=percent_words, effect=effect_words, place=place_words
+        number=number_words,
+        percent=percent_words,
+        effect=effect_words,
+        place=place_words,
+        shortened=shortened,
     )
     text = files("tomr_reality_gap").joinpath(template).read_text(encoding="utf-8")
     return environment.from_string(text).render(values)

@@ -82,6 +82,7 @@ def _learnt(learnt: Learnt) -> Mapping[str, Value]:
     return {
         "family": term.family.family_id,
         "words": term.family.words,
+        "look_at": term.family.look,
         "variables": [axis.title for axis in term.family.axes],
         "repeatable": learnt.is_repeatable,
         "laws": [

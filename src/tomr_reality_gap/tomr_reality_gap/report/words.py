@@ -1,11 +1,13 @@
 """Effects, places and numbers as a person reads them."""
 
 import math
+import re
 from collections.abc import Sequence
 
 from tomr_power_model.effects import EFFECTS
 from tomr_reality_gap.explanation import Estimate, Finding
 
+_SHOWN = 5  # numbers of a long list
 _ALIKE = 0.2  # of the width, by which the halves of an interval shown as ± may differ
 
 
@@ -16,6 +18,16 @@ def effect_words(effect: str) -> str:
     if effect == "unknown":
         return "Something outside the vocabulary"
     return EFFECTS[effect].label if effect in EFFECTS else effect
+
+
+def shortened(text: str) -> str:
+    """A description whose long lists of numbers show their beginning only."""
+
+    def begun(found: re.Match[str]) -> str:
+        numbers = found[1].split(",")
+        return f"[{','.join(numbers[:_SHOWN])}, ... {len(numbers)} numbers in all]"
+
+    return re.sub(r"\[([^\[\]]{400,})\]", begun, text)
 
 
 def place_words(where: Sequence[str]) -> str:

@@ -19,6 +19,7 @@ class TorqueByCurrent(Resistance):
     family_id = "torque.current"
     axes: ClassVar = (Axis("motor current", "A", 10, _flowing),)
     words = "a torque that depends on the motor's load"
+    look = "the gear: its teeth and bearings under load"
 
 
 @family
@@ -29,6 +30,7 @@ class DriverByCurrent(Family):
     acts = "driver"
     axes: ClassVar = (Axis("motor current", "A", 12, _flowing),)
     words = "power lost in a driver that depends on its motor's current"
+    look = "the driver: its bridge, its current sensor, the leads to the motor"
 
 
 @family
@@ -43,3 +45,4 @@ class SupplyByCurrent(Family):
         ),
     )
     words = "power lost at the supply that depends on what the motors carry"
+    look = "leads, plugs and fuse between the supply and the drivers"

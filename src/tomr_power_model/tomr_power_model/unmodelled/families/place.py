@@ -19,6 +19,7 @@ class TorqueByPlace(Resistance):
     family_id = "torque.place"
     axes: ClassVar = _FLOOR
     words = "a resistance that depends on the place on the floor"
+    look = "the floor where the map shows it: another covering, a cable, dirt"
     is_strange = True
     is_shared = True
 
@@ -31,4 +32,5 @@ class ForceByPlace(Family):
     acts = "force"
     axes: ClassVar = _BODY
     words = "a force on the body that depends on where it is"
+    look = "what holds the robot: a cable, a rope, a wall that it rubs along; a floor that slopes"
     is_strange = True

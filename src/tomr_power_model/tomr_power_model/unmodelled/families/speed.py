@@ -17,6 +17,7 @@ class TorqueBySpeed(Resistance):
     family_id = "torque.speed"
     axes: ClassVar = _SPEED
     words = "a torque that depends on the wheel's speed"
+    look = "the wheel's bearings, seal and grease, and whether something rubs on it"
 
 
 @family
@@ -27,6 +28,7 @@ class TorqueBySignedSpeed(Family):
     acts = "torque"
     axes: ClassVar = (Axis("signed wheel speed", "rad/s", 16, lambda m: m.speed),)
     words = "a torque that depends on the wheel's speed and the way it turns"
+    look = "the gear and what rubs on the wheel in one direction only"
     holds = "torque.speed"
 
     @staticmethod
@@ -42,3 +44,4 @@ class DriverBySpeed(Family):
     acts = "driver"
     axes: ClassVar = _SPEED
     words = "power drawn by a driver that depends on its wheel's speed"
+    look = "the driver: its switching, and what else hangs on its supply line"

@@ -19,6 +19,7 @@ class TorqueSinceStand(Resistance):
         Axis("time since a stand", "s", 24, lambda m: np.minimum(m.since_stand, _LATEST)),
     )
     words = "a resistance that depends on the time since the wheel last stood"
+    look = "grease and seals of the gear; let the robot warm up and drive again"
     is_strange = True
 
 
@@ -31,6 +32,7 @@ class TorqueTurnedSinceStand(Resistance):
         Axis("angle turned since a rest", "rad", 24, lambda m: np.minimum(m.turned, _FARTHEST)),
     )
     words = "a resistance that depends on how far the wheel has turned since it last rested"
+    look = "grease of the gear; a brake that lets go late"
     is_strange = True
 
 
@@ -43,4 +45,5 @@ class TorqueFromRest(Resistance):
         Axis("angle from where it rested", "rad", 24, lambda m: np.minimum(m.from_rest, _FARTHEST)),
     )
     words = "a resistance that depends on the angle between the wheel and where it last rested"
+    look = "bearings and rollers for dents, tyres for flat spots where the robot was parked"
     is_strange = True

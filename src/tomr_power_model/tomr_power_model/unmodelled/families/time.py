@@ -14,6 +14,7 @@ class TorqueByTime(Resistance):
     family_id = "torque.time"
     axes: ClassVar = _TIME
     words = "a resistance that changes with time"
+    look = "what the robot met at the times shown: something that rubs, a part that runs in"
     is_event = True
 
 
@@ -25,6 +26,7 @@ class ForceByTime(Family):
     acts = "force"
     axes: ClassVar = _TIME
     words = "a force on the body that changes with time"
+    look = "what pushed the robot at the times shown: wind, people, a door"
     is_event = True
 
 
@@ -36,6 +38,7 @@ class DriverByTime(Family):
     acts = "driver"
     axes: ClassVar = _TIME
     words = "power drawn by a driver that changes with time"
+    look = "what the driver did at the times shown, in its log"
     is_event = True
 
 
@@ -47,4 +50,5 @@ class SupplyByTime(Family):
     acts = "supply"
     axes: ClassVar = _TIME
     words = "power drawn at the supply that changes with time"
+    look = "what else hangs on the supply and was switched at the times shown"
     is_event = True

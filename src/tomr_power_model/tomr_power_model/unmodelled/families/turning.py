@@ -13,6 +13,7 @@ class TorqueByAngle(Family):
     acts = "torque"
     axes: ClassVar = (Axis("wheel angle", "rad", 36, lambda m: m.angle, is_periodic=True),)
     words = "a torque that depends on the wheel's angle"
+    look = "teeth, magnets and rollers at the angles shown"
 
 
 @family
@@ -22,6 +23,7 @@ class DragByAngle(Resistance):
     family_id = "torque.tight_angle"
     axes: ClassVar = (Axis("wheel angle", "rad", 36, lambda m: m.angle, is_periodic=True),)
     words = "a resistance that depends on the wheel's angle"
+    look = "the wheel at the angle shown: a bent shaft, a chipped tooth, a roller that jams"
 
 
 @family
@@ -33,6 +35,7 @@ class TorqueByDirection(Resistance):
         Axis("direction of travel", "rad", 12, lambda m: m.direction, is_periodic=True),
     )
     words = "a resistance that depends on the direction of travel"
+    look = "the rollers, and how the load rests on the wheels"
 
 
 @family
@@ -42,3 +45,4 @@ class TorqueByHeading(Resistance):
     family_id = "torque.heading"
     axes: ClassVar = (Axis("heading", "rad", 12, lambda m: m.heading, is_periodic=True),)
     words = "a resistance that depends on the heading"
+    look = "the floor: a nap, grooves, a slope"

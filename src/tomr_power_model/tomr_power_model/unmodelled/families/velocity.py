@@ -16,4 +16,5 @@ class ForceByVelocity(Family):
         Axis("velocity along y", "m/s", 5, lambda m: m.velocity_y),
     )
     words = "a force on the body that depends on its velocity in the world"
+    look = "what moves against the floor: wind, a fan, a conveyor, the nap of a carpet"
     is_strange = True
