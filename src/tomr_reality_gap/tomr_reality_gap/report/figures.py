@@ -19,7 +19,7 @@ from tomr_power_model.canvas import (
     smooth,
 )
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
-from tomr_reality_gap.explanation import Comparison, Explanation, Map, Shape
+from tomr_reality_gap.explanation import Comparison, Explanation, Map
 from tomr_reality_gap.report.showing import View, leading
 
 Array = NDArray[np.float64]
@@ -182,16 +182,4 @@ def map_picture(item: Map, found: bool) -> str:
             panel.set_xlabel(item.variable, fontsize=8)
         panels[0].set_ylabel("RMS residual, in units of noise", fontsize=8)
         panels[0].legend(fontsize=7, framealpha=0.8)
-        return png(page)
-
-
-def shape_picture(shape: Shape) -> str:
-    """What an unknown effect looks like, with its interval."""
-    with sheet(1, 1, 2.6) as (page, panels):
-        panel = panels[0]
-        panel.fill_between(shape.at, shape.low, shape.high, color=AFTER, alpha=0.2, lw=0)
-        panel.plot(shape.at, shape.value, color=AFTER, lw=_WIDE)
-        panel.axhline(0.0, color="black", lw=0.6)
-        panel.set_xlabel(shape.variable, fontsize=8)
-        panel.set_ylabel(f"{shape.wheel}\n{shape.unit}", fontsize=8)
         return png(page)

@@ -13,6 +13,7 @@ from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.explanation import Comparison, Explanation, Finding
 from tomr_reality_gap.report import figures, residuals
 from tomr_reality_gap.report.showing import best_view
+from tomr_reality_gap.report.unnamed import unnamed_picture
 from tomr_reality_gap.report.words import (
     effect_words,
     estimate_words,
@@ -149,7 +150,7 @@ def _pictures(explanation: Explanation, found: bool, tick: Tick) -> dict[str, ob
         "view": view,
         "picture": drawn(figures.show(view, explanation)) if view is not None else "",
         "shapes": [
-            (finding.shape, drawn(figures.shape_picture(finding.shape)))
+            (finding.shape, drawn(unnamed_picture(finding.shape, finding.learnt)))
             for finding in explanation.findings
             if finding.shape is not None
         ],
