@@ -41,6 +41,7 @@ def searched(
     value: np.ndarray,
     tried: tuple[str, ...] = TRIED,
     without: tuple[str, ...] = (),
+    beside: float = 0.0,
 ) -> tuple[Dataset, Selection]:
     """Record values with noise, and search with the description of the reference robot, but for
     what is left out of it.
@@ -64,7 +65,7 @@ def searched(
     dataset = Dataset((evolve(made, channels=channels),))
     basis = basis_responses(dataset, base.robot, scales.torque)
     model = Model(base, parameters, (0.0,) * len(parameters))
-    found = forward_selection(dataset, model, candidates, basis)
+    found = forward_selection(dataset, model, candidates, basis, beside=beside)
     return dataset, backward_elimination(dataset, found, candidates)
 
 
@@ -87,6 +88,23 @@ def test_a_concealed_friction_is_named_with_its_wheel_and_size(
     value, sigma = found.model.offsets[0][0], found.own_sigma[0]
     assert abs(value - 0.02) < 4.0 * sigma
     assert sigma < 0.004
+
+
+def test_beside_what_explains_far_more_a_small_finding_is_none(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    """It must bring a hundredth of what the other brings: a term without a name is not exact."""
+    robot = simulation.robot
+    real = evolve(robot, physics={**robot.physics, "friction.asymmetric": ({"torque": 0.02},) * 3})
+    value = simulation.predict([real])[0]
+    _, alone = searched(simulation, value)
+    brings = alone.best.evidence - alone.without.evidence
+    taken, dropped = (
+        searched(simulation, value, beside=times * brings)[1].best.model.hypotheses
+        for times in (50.0, 150.0)
+    )
+    assert len(taken) == 1
+    assert dropped == ()
 
 
 def test_deviations_within_the_tolerance_are_no_finding(

@@ -1,6 +1,7 @@
 """From recordings to an explanation: align, compare, name, model, show."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 from attrs import evolve
@@ -39,6 +40,12 @@ _MORE = 1.2  # times noise, or what another model leaves
 _LITTLE = 0.15  # of the noise: what is left of what is drawn is not looked into
 
 
+class _Named(Protocol):
+    """Finds names for recordings, beside what else brings a log evidence."""
+
+    def __call__(self, data: Dataset, beside: float = 0.0) -> Selection: ...
+
+
 def explain(request: Request, progress: Progress = lambda stage, part: None) -> Explanation:
     """Explain where reality differs. Raises InputError with one line for bad input."""
     progress("reading", 0.0)
@@ -69,8 +76,8 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
     basis = basis_responses(dataset, base.robot, ready.scales.torque, orders)
     start = Model(base, parameters, (0.0,) * len(parameters))
 
-    def named(data: Dataset) -> Selection:
-        found = forward_selection(data, start, candidates, basis, tick=tick)
+    def named(data: Dataset, beside: float = 0.0) -> Selection:
+        found = forward_selection(data, start, candidates, basis, beside=beside, tick=tick)
         return backward_elimination(data, found, candidates, tick)
 
     found = named(dataset)
@@ -106,7 +113,7 @@ def _beside(
     plain: Dataset,
     found: Selection,
     effect: Unmodelled,
-    named: Callable[[Dataset], Selection],
+    named: _Named,
     scales: Scales,
 ) -> tuple[Dataset, Selection, Unmodelled]:
     """Names sought once more, beside an unnamed term, and the term fitted anew beside them.
@@ -131,7 +138,7 @@ def _beside(
 
 
 def _instead(
-    plain: Dataset, found: Selection, named: Callable[[Dataset], Selection], scales: Scales
+    plain: Dataset, found: Selection, named: _Named, scales: Scales
 ) -> tuple[Dataset, Selection, Unmodelled] | None:
     """A law without a name in the place of several names, if it leaves much less than they do."""
     names, sigma = len(found.best.model.hypotheses), found.noise.sigma
@@ -150,12 +157,12 @@ def _instead(
 def _settled(
     plain: Dataset,
     effect: Unmodelled,
-    named: Callable[[Dataset], Selection],
+    named: _Named,
     model: Model | None = None,
 ) -> tuple[Dataset, Selection, Unmodelled]:
     """Recordings with a term, the names beside it, and the term as fitted beside these."""
     robot = plain.simulations[0].robot if model is None else model.described.robot
-    found = named(_with_term(plain, robot, effect))
+    found = named(_with_term(plain, robot, effect), effect.evidence)
     effect = _refitted(plain, found.best.model, effect)
     return _with_term(plain, found.best.model.described.robot, effect), found, effect
 

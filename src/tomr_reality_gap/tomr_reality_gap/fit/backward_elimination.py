@@ -46,7 +46,7 @@ def backward_elimination(
     responses = Responses(dataset, found, candidates)
     groups = _alternatives(responses, best, tick)
     for _ in range(_SWAPS):
-        cost = _cost(dataset, found, best)
+        cost = found.cost(len(dataset.value), best)
         better = max((item for group in groups for item in group), key=lambda m: _worth(m, cost))
         if _worth(better, cost) <= _worth(best, cost):
             break
@@ -55,13 +55,9 @@ def backward_elimination(
     return evolve(found, best=best, alternatives=tuple(groups))
 
 
-def _cost(dataset: Dataset, found: Selection, best: FittedModel) -> float:
-    return finding_cost(len(dataset.value), best.evidence - found.without.evidence)
-
-
 def _costs(dataset: Dataset, found: Selection, best: FittedModel) -> list[float]:
     """What each finding must bring; friction's two parts at one place count as one finding."""
-    usual, least = _cost(dataset, found, best), finding_cost(len(dataset.value))
+    usual, least = found.cost(len(dataset.value), best), finding_cost(len(dataset.value))
     parts = [item for item in best.model.hypotheses if item.effect in _FRICTION]
     return [
         least

@@ -52,6 +52,11 @@ class Selection:
     rounds: tuple[Round, ...]
     noise: Noise
     alternatives: tuple[tuple[FittedModel, ...], ...] = field(factory=tuple)  # for each finding
+    beside: float = 0.0  # log evidence of what else explains the recordings
+
+    def cost(self, samples: int, best: FittedModel) -> float:
+        """Log evidence that a finding must bring beside all others of a model."""
+        return finding_cost(samples, best.evidence - self.without.evidence + self.beside)
 
 
 def forward_selection(
@@ -60,9 +65,13 @@ def forward_selection(
     candidates: Sequence[Hypothesis],
     basis: BasisResponses,
     *,
+    beside: float = 0.0,
     tick: Tick = lambda done: None,
 ) -> Selection:
-    """Add hypotheses while they bring evidence; what has no name is not mistaken for noise."""
+    """Add hypotheses while they bring evidence; what has no name is not mistaken for noise.
+
+    `beside`: log evidence of a term without a name that the recordings are simulated with.
+    """
     rounds: list[Round] = []
     without: FittedModel | None = None
     local = basis.local
@@ -76,7 +85,7 @@ def forward_selection(
         start, screened = screen(dataset, jacobian, noise, open_ones)
         current, tried = _tried(dataset, start, screened, jacobian, noise, tick)
         without = without or current
-        cost = finding_cost(len(dataset.value), current.evidence - without.evidence)
+        cost = finding_cost(len(dataset.value), current.evidence - without.evidence + beside)
         tried.sort(key=lambda item: item.model.weight * cost - item.evidence)
         rounds.append(Round(jacobian, noise, tuple(tried)))
         added = tried[0].model.weight - model.weight if tried else 0
@@ -85,7 +94,7 @@ def forward_selection(
         model = tried[0].model
         if len(model.hypotheses) > _MOST_FINDINGS:
             break
-    return Selection(current, without, tuple(rounds), noise)
+    return Selection(current, without, tuple(rounds), noise, beside=beside)
 
 
 def _tried(
