@@ -8,11 +8,13 @@ import pytest
 from tomr_power_model.unmodelled import FAMILIES
 from tomr_reality_gap import explain
 from tomr_reality_gap.fit import unmodelled
+from tomr_reality_gap.fit.forward_selection import Selection
 from tomr_reality_gap.fit.unmodelled import Tried, unmodelled_effect
 
 PLACE, SPEED, TIME = "force.place", "torque.speed", "supply.time"
 SIGNED = "torque.signed_speed"
 FLOOR = "torque.place"
+DRIVER = "driver.speed"
 
 
 def _chosen(
@@ -22,13 +24,16 @@ def _chosen(
     law: float = 0.0,
     is_sure: bool = False,
     moments: Mapping[str, float] = MappingProxyType({}),
+    explained: Mapping[str, float] = MappingProxyType({}),
 ) -> str | None:
     """The family that is fitted; what depends on place is a law that explains `law`."""
 
     def fitted(rest: object, item: SimpleNamespace, *_: object) -> SimpleNamespace:
         family = item.table.family
         laws = ("a law",) if family.is_strange and law else ()
-        return SimpleNamespace(family=family, laws=laws, explained=law)
+        return SimpleNamespace(
+            family=family, laws=laws, explained=explained.get(family.family_id, law)
+        )
 
     tried = [
         Tried(SimpleNamespace(family=FAMILIES[name]), share, moments.get(name, -1.0))  # type: ignore[arg-type]
@@ -94,6 +99,52 @@ def test_a_map_of_the_floor_is_one_where_it_tells_more_than_time_does(
 ) -> None:
     shares = {FLOOR: stretches, TIME: 0.9}
     assert _chosen(monkeypatch, shares, moments={FLOOR: moments}) == expected
+
+
+@pytest.mark.parametrize(("time", "expected"), [(0.9, FLOOR), (0.96, TIME)])
+def test_a_law_of_the_floor_that_explains_more_than_a_table_over_time_is_no_event(
+    monkeypatch: pytest.MonkeyPatch, time: float, expected: str
+) -> None:
+    found = _chosen(
+        monkeypatch,
+        {FLOOR: -0.5, TIME: 0.9},
+        law=0.95,
+        moments={FLOOR: 0.8},
+        explained={FLOOR: 0.95, TIME: time},
+    )
+    assert found == expected
+
+
+@pytest.mark.parametrize(
+    ("share", "speed", "expected"),
+    [(0.98, 0.9, SPEED), (0.98, 0.8, DRIVER), (0.96, 0.9, DRIVER), (0.98, 0.803, DRIVER)],
+)
+def test_of_families_that_predict_alike_the_one_that_explains_clearly_more_is_taken(
+    monkeypatch: pytest.MonkeyPatch, share: float, speed: float, expected: str
+) -> None:
+    """What a driver draws by speed and what resists by speed: power tells them apart in turns."""
+    explained = {DRIVER: 0.8, SPEED: speed}
+    assert _chosen(monkeypatch, {DRIVER: 0.99, SPEED: share}, explained=explained) == expected
+
+
+@pytest.mark.parametrize(("keeps", "names"), [(True, "with"), (False, "without")])
+def test_names_that_take_the_law_from_a_term_are_dropped(
+    monkeypatch: pytest.MonkeyPatch, keeps: bool, names: str
+) -> None:
+    """A term that was fitted without any name; beside names it may have no law any more."""
+    law = SimpleNamespace(laws=("a law",), evidence=9.0)
+    again = law if keeps else SimpleNamespace(laws=())
+    states = {
+        key: SimpleNamespace(model=SimpleNamespace(described=SimpleNamespace(robot=key)), key=key)
+        for key in ("with", "without")
+    }
+    made = Selection(states["with"], states["without"], (), None)  # type: ignore[arg-type]
+    monkeypatch.setattr(explain, "_with_term", lambda *_: "data")
+    monkeypatch.setattr(explain, "_refitted", lambda *_: again)
+    plain = SimpleNamespace(simulations=(SimpleNamespace(robot=None),))
+    _, found, effect = explain._settled(plain, law, lambda *_: made)  # type: ignore[arg-type]
+    assert found.best.key == names  # type: ignore[attr-defined]
+    assert effect.laws == ("a law",)
 
 
 @pytest.mark.parametrize(

@@ -163,7 +163,15 @@ def _settled(
     """Recordings with a term, the names beside it, and the term as fitted beside these."""
     robot = plain.simulations[0].robot if model is None else model.described.robot
     found = named(_with_term(plain, robot, effect), effect.evidence)
-    effect = _refitted(plain, found.best.model, effect)
+    again = _refitted(plain, found.best.model, effect)
+    if effect.laws and not again.laws and model is None:
+        # Names that take the law away only made up for what it was off by.
+        return (
+            _with_term(plain, robot, effect),
+            evolve(found, best=found.without, alternatives=()),
+            effect,
+        )
+    effect = again
     return _with_term(plain, found.best.model.described.robot, effect), found, effect
 
 

@@ -36,6 +36,7 @@ _SMALL = 0.02  # of a channel's standard deviation: less is not worth a word
 _LAGS = 80
 _LAW = 0.8  # of the squares that are left: a law that explains so much is no chance
 _AS_MUCH = 0.95  # of what a wider family predicts
+_ALIKE = 0.02  # shares that tell no more of one family than of another
 _NEAR = 0.35  # of the best share: worth a closer look
 _EVENT = 0.45  # of what a term of time explains: as much of it, and it is repeatable
 
@@ -90,24 +91,45 @@ def unmodelled_effect(
         return None
     event = next((item for item in tried if item.table.family.is_event), None)
     # A map of ground that is never met again follows what only changes with time.
-    tried = [
-        item
-        for item in tried
-        if not (event and item.table.family.is_shared and item.moments < event.share)
-    ]
-    lasting = _narrowest([item for item in tried if not item.table.family.is_event])
+    lasting = _narrowest(
+        [
+            item
+            for item in tried
+            if not item.table.family.is_event
+            and not (event and item.table.family.is_shared and item.moments < event.share)
+        ]
+    )
     events = _by_moments(tried, event)
     best = lasting or events
     if lasting and events and lasting.share < max(_EVENT * events.share, _TOLD):
         best = events
     if best is None or (best.share < _TOLD and not is_sure):
         return None
-    if best is events:  # few stretches may not meet again, but a law that holds for all is one
-        for item in [item for item in tried if item.table.family.is_strange]:
-            found = fitted(rest, evolve(item, share=item.best), robot, motions)
-            if found.laws and found.explained > _LAW:
-                return found
-    return fitted(rest, best, robot, motions)
+    if best is not events:
+        alike = [item for item in tried if not item.table.family.is_event and item is not best]
+        alike = [item for item in alike if item.share > best.share - _ALIKE]
+        return _most(rest, [best, *alike], robot, motions)
+    found = fitted(rest, best, robot, motions)
+    # Few stretches may not meet again, but a law that holds for all is one.
+    for item in [item for item in tried if item.table.family.is_strange and item is not best]:
+        other = fitted(rest, evolve(item, share=item.best), robot, motions)
+        least = found.explained if item.table.family.is_shared else 0.0
+        if other.laws and other.explained > max(least, _LAW):
+            return other
+    return found
+
+
+def _most(
+    rest: Remainder, tried: Sequence[Tried], robot: Robot, motions: Sequence[Motion]
+) -> Unmodelled:
+    """The first, or another that acts elsewhere, predicts as much, and explains clearly more."""
+    found = fitted(rest, tried[0], robot, motions)
+    for item in tried[1:]:
+        if item.table.family.acts != found.family.acts:
+            other = fitted(rest, item, robot, motions)
+            if other.explained > found.explained + _CLEARLY:
+                found = other
+    return found
 
 
 def _by_moments(tried: Sequence[Tried], event: Tried | None) -> Tried | None:
