@@ -30,7 +30,7 @@ PROGRESS := while read -r first name _; do case $$first in \
 
 # Versions stay as they are where they may; `make lock ARGS=--upgrade` takes the newest.
 LOCK := .venv/lock/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
-    --no-annotate --no-emit-index-url --custom-compile-command 'make lock'
+    --no-strip-extras --no-annotate --no-emit-index-url --custom-compile-command 'make lock'
 
 # Small recordings that come with the repository, by the mission that they record.
 BAGS := square circle_encoder_lost
