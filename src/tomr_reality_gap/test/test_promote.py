@@ -30,7 +30,7 @@ from tomr_reality_gap.arguments import add_inputs, inputs_of
 from tomr_reality_gap.cli import main
 from tomr_reality_gap.explanation import FittedLaw
 from tomr_reality_gap.fit.jacobian import linearise
-from tomr_reality_gap.fit.law_forms import LAWS, SMOOTH
+from tomr_reality_gap.fit.law_forms import LAWS, SMOOTH, Law
 from tomr_reality_gap.fit.learnt import Table
 from tomr_reality_gap.fit.remainder import Remainder
 from tomr_reality_gap.fit.unmodelled import Tried, fitted
@@ -86,15 +86,15 @@ def _told(**values: float) -> dict[str, object]:
     }
 
 
-@pytest.mark.parametrize("law", [law for law in LAWS if law.formula], ids=lambda law: law.name)
-def test_the_formula_of_a_law_is_the_law(law: object) -> None:
+@pytest.mark.parametrize("law", [law for law in LAWS.values() if law.formula])
+def test_the_formula_of_a_law_is_the_law(law: Law) -> None:
     at = np.linspace(0.0, 8.0, 33)
     values = {"size": 0.3, "exponent": 1.7, "threshold": 3.1, "decay": 1.3, "order": 2.0,
               "phase": 0.4, "width": 0.7, "place": 2.0}  # fmt: skip
-    p = [values[name] for name in law.units]  # type: ignore[attr-defined]
-    expected = law.value(np.array(p), at[:, None])  # type: ignore[attr-defined]
+    p = [values[name] for name in law.units]
+    expected = law.value(np.array(p), at[:, None])
     names = {**values, "math": math, "WIDTH": SMOOTH * 0.25}
-    found = [eval(law.formula, {**names, "x": x}) for x in at]  # type: ignore[attr-defined]
+    found = [eval(law.formula, {**names, "x": x}) for x in at]
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-7)
 
 

@@ -1,4 +1,4 @@
-"""Short laws by what they depend on: adding one is one entry of `LAWS`."""
+"""Short laws by what they depend on: adding one is one entry of `_FORMS`."""
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
@@ -145,7 +145,7 @@ _SPEEDS = ("torque.speed", "driver.speed", "driver.current", "torque.current", "
 _MEMORY = ("torque.since_stand", "torque.turned", "torque.from_rest", "torque.time")
 _STEP = "/ (1.0 + math.exp(min((threshold - x) / WIDTH, 50.0)))"
 _X, _Y = {"x": "m", "y": "m"}, {"x": "m/s", "y": "m/s"}
-LAWS: tuple[Law, ...] = (
+_FORMS = (
     Law(
         "spring",
         "pulled to a point at ({x}, {y}) from the start with {stiffness} beyond {slack}",
@@ -264,6 +264,9 @@ LAWS: tuple[Law, ...] = (
         "size * math.sin(order * x + phase)",
     ),
 )
+
+
+LAWS: Mapping[str, Law] = {law.name: law for law in _FORMS}
 
 
 def _above(values: Array, threshold: float) -> Array:

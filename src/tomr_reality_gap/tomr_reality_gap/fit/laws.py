@@ -105,7 +105,7 @@ def unit_of(unit: str, term: LearntTerm) -> str:
 
 def laws_of(table: Table, learnt: LearntTerm, evidence: Evidence) -> list[LawAt]:
     """Laws that explain about as much as the table, simplest first."""
-    known = [law for law in LAWS if table.family.family_id in law.families]
+    known = [law for law in LAWS.values() if table.family.family_id in law.families]
     found = [item for law in known if (item := _fitted(law, table, learnt, evidence)) is not None]
     found = [item for item in found if item.share > _AS_WELL]
     whole = 0.5 * _explained(_units(table, learnt), evidence) / evidence.inflation

@@ -62,7 +62,6 @@ class Table:
     family: type[Family]
     knots: tuple[Array, ...]
     root: Array  # values = root @ units of N(0, 1), (k, k)
-    size: float  # standard deviation of a value
 
     @classmethod
     def over(
@@ -89,7 +88,12 @@ class Table:
         }[family.acts]
         found = tuple(knots)
         root = np.linalg.cholesky(smoothness(family, found, _LENGTH))
-        return cls(family, found, np.asarray(size * root, dtype=np.float64), size)
+        return cls(family, found, np.asarray(size * root, dtype=np.float64))
+
+    @property
+    def size(self) -> float:
+        """Standard deviation of a value, in the term's unit."""
+        return float(np.linalg.norm(self.root[0]))
 
     @property
     def rows(self) -> int:

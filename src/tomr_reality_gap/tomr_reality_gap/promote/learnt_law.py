@@ -43,14 +43,13 @@ def learnt_law(explained: Path, term: str = "", law: str = "") -> LearntLaw:
     chosen = _term(robot, values, term, str(explained))
     report = explained.with_name(_REPORT)
     told = _laws_told(report, chosen.family)
-    known = {item.name: item for item in LAWS if chosen.family.family_id in item.families}
-    wanted = law or next((name for name in told if name in known), "")
-    if wanted not in told or wanted not in known:
-        listed = ", ".join(name for name in told if name in known) or "none"
-        raise InputError(
-            f"{report}: no law {wanted!r} of {chosen.family.family_id}: it has {listed}"
-        )
-    found = known[wanted]
+    family = chosen.family.family_id
+    known = [name for name in told if name in LAWS and family in LAWS[name].families]
+    wanted = law or next(iter(known), "")
+    if wanted not in known:
+        listed = ", ".join(known) or "none"
+        raise InputError(f"{report}: no law {wanted!r} of {family}: it has {listed}")
+    found = LAWS[wanted]
     parameters = {
         name: _estimate(told[wanted].get(name), unit_of(unit, chosen), f"{report}: {wanted}.{name}")
         for name, unit in found.units.items()

@@ -42,7 +42,7 @@ def unnamed_picture(shape: Shape, learnt: Learnt | None) -> str:
 
 def law_values(fitted: FittedLaw, at: Array) -> Array:
     """A law with its parameters at some places (k, axes): (1, k), or x and y of a force, (2, k)."""
-    law = next(item for item in LAWS if item.name == fitted.name)
+    law = LAWS[fitted.name]
     parameters = np.array([fitted.parameters[name].value for name in law.units])
     return np.atleast_2d(law.value(parameters, at))
 
