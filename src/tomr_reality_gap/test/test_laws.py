@@ -127,8 +127,36 @@ def test_maps_are_told_as_the_laws_that_they_are(
     assert told == pytest.approx(parameters, abs=0.01)
 
 
-def _on_it(law: str, p: dict[str, float], x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """How far a place is on what resists, its edges as soft as a quarter of the table's 0.25 m."""
+@pytest.mark.parametrize(("width", "azimuth"), [(0.87, 0.31), (1.4, 2.6), (0.75, 1.1)])
+def test_stripes_are_told_on_a_large_floor(width: float, azimuth: float) -> None:
+    """Ten of them: half a stripe more or less at the other end is another fit altogether."""
+    line = np.linspace(-4.0, 4.0, 24)
+    x, y = (grid.ravel() for grid in np.meshgrid(line, line, indexing="ij"))
+    p = {"size": 0.3, "width": width, "azimuth": azimuth, "phase": 1.0}
+    soft = 0.25 * float(line[1] - line[0])
+    values = p["size"] * _on_it("stripes", p, x, y, soft)[None]
+    told, _ = _laws(_table("torque.place", line, line), values)["stripes"]
+    assert told == pytest.approx(p, abs=0.01)
+
+
+def test_a_parameter_more_must_bring_its_price(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two forms that fit alike: the one with less to choose is told first."""
+    short = LAWS["power law"]
+    long = evolve(
+        short,
+        name="long",
+        units={**short.units, "idle": ""},
+        starts=lambda at, values: [[*start, 0.0] for start in short.starts(at, values)],
+    )
+    monkeypatch.setattr(laws, "LAWS", {"long": long, "power law": short})
+    knots = np.linspace(0.0, 8.0, 24)
+    assert list(_laws(_table("torque.speed", knots), 0.01 * knots**2)) == ["power law", "long"]
+
+
+def _on_it(
+    law: str, p: dict[str, float], x: np.ndarray, y: np.ndarray, soft: float = 0.25 * 0.25
+) -> np.ndarray:
+    """How far a place is on what resists; its edges are `soft` [m]: a quarter of a table's step."""
     if law == "patch":
         inside = p["radius"] - np.hypot(p["x"] - x, p["y"] - y)
     else:
@@ -137,7 +165,7 @@ def _on_it(law: str, p: dict[str, float], x: np.ndarray, y: np.ndarray) -> np.nd
     if law == "stripes":
         turns = np.pi / p["width"]
         inside = np.sin(turns * along + p["phase"]) / turns
-    return np.asarray(1.0 / (1.0 + np.exp(-inside / (0.25 * 0.25))))
+    return np.asarray(1.0 / (1.0 + np.exp(-inside / soft)))
 
 
 def test_every_law_belongs_to_families_that_are_known_and_is_told_with_all_its_parameters() -> None:

@@ -1,5 +1,7 @@
 """Where a mismatch is, and what depends on what: on series made by hand."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from attrs import evolve
@@ -22,7 +24,13 @@ from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.remainder import Remainder
 from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
 from tomr_reality_gap.fit.simulator_discrepancy import discrepancy_torques
-from tomr_reality_gap.fit.unmodelled import Tried, fitted, shape_of, unmodelled_effect
+from tomr_reality_gap.fit.unmodelled import (
+    Tried,
+    fitted,
+    refitted,
+    shape_of,
+    unmodelled_effect,
+)
 from tomr_reality_gap.hypotheses.catalogue import nuisances
 from tomr_reality_gap.hypotheses.scales import scales_of
 from tomr_reality_gap.mismatch.locate import located
@@ -133,6 +141,32 @@ def test_a_law_holds_at_wheels_that_hardly_show_it_but_not_where_it_is_not(
     assert effect.term.wheels == expected
     assert effect.laws[0].name == "power law"
     assert effect.laws[0].parameters["exponent"].value == pytest.approx(3.0, abs=0.1)
+
+
+def test_a_patch_of_the_floor_is_one_for_all_wheels_and_the_users_simulation_may_have_it(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    """0.2 N m more within 0.3 m of a place where wheel 1 has been."""
+    robot, motion = simulation.robot, motion_in(simulation, simulation.robot)
+    place = motion.contact_x[2000, 0], motion.contact_y[2000, 0]
+    near = np.hypot(motion.contact_x - place[0], motion.contact_y - place[1])
+    torque = 0.2 * motion.sign / (1.0 + np.exp((near - 0.3) / 0.02))
+    value = next(simulation.respond(robot, torque[None]))
+    dataset, found = searched(simulation, value, ())
+    table = Table.over(FAMILIES["torque.place"], [motion], _scales(simulation))
+    assert table is not None
+    rest = _rest(dataset, found)
+    effect = refitted(rest, SimpleNamespace(table=table), robot)  # type: ignore[arg-type]
+    assert effect.term.wheels == (0, 1, 2)
+    assert effect.share > 0.8  # by moments: each stretch is on ground of its own
+    told = {name: item.value for name, item in effect.laws[0].parameters.items()}
+    expected = {"size": 0.2, "radius": 0.3, "x": place[0], "y": place[1]}
+    assert told == pytest.approx(expected, abs=0.02)
+    for theirs, expected in ((value, True), (simulation.predict([robot])[0], False)):
+        recorded = [as_recorded(simulation, theirs)]
+        baseline = SimulatorBaseline.of(recorded, dataset, found.noise, robot)
+        assert baseline is not None
+        assert baseline.shows(effect) is expected
 
 
 @pytest.mark.parametrize("recordings", [1, 2])

@@ -105,61 +105,72 @@ def unit_of(unit: str, term: LearntTerm) -> str:
 
 def laws_of(table: Table, learnt: LearntTerm, evidence: Evidence) -> list[LawAt]:
     """Laws that explain about as much as the table, simplest first."""
+    misfit = _Misfit.of(table, evidence)
     known = [law for law in LAWS.values() if table.family.family_id in law.families]
-    found = [item for law in known if (item := _fitted(law, table, learnt, evidence)) is not None]
+    found = [_fitted(law, table, learnt, misfit) for law in known]
     found = [item for item in found if item.share > _AS_WELL]
-    whole = 0.5 * _explained(_units(table, learnt), evidence) / evidence.inflation
+    whole = 0.5 * misfit.explained(learnt.values) / evidence.inflation
     found.sort(key=lambda item: _COST * len(item.parameters) - whole * item.share)
     return found[:_LISTED]
 
 
-def _explained(units: Array, evidence: Evidence) -> float:
-    return float(2.0 * units @ evidence.vector - units @ evidence.matrix @ units)
+@frozen
+class _Misfit:
+    """Of values at a table's knots, in standard deviations; of m that the recordings tell."""
+
+    matrix: Array  # of the values of all rows, (m, c k)
+    target: Array  # (m,)
+    inflation: float  # see `Evidence`
+
+    @classmethod
+    def of(cls, table: Table, evidence: Evidence) -> "_Misfit":
+        values, vectors = np.linalg.eigh(evidence.matrix)
+        kept = values > _NEGLIGIBLE * values.max()
+        root = np.sqrt(values[kept])
+        units = vectors[:, kept].T.reshape(len(root), -1, len(table.root))
+        matrix = root[:, None, None] * (units @ np.linalg.inv(table.root))
+        target = (vectors[:, kept].T @ evidence.vector) / root
+        return cls(matrix.reshape(len(root), -1), target, evidence.inflation)
+
+    def shown(self, values: Array) -> Array:
+        """What values (..., c k) show, (..., m)."""
+        return np.asarray(values @ self.matrix.T)
+
+    def explained(self, values: Array) -> float:
+        """By how much values (c, k) lessen the sum of squares."""
+        shown = self.shown(values.ravel())
+        return float(2.0 * shown @ self.target - shown @ shown)
 
 
-def _fitted(law: Law, table: Table, learnt: LearntTerm, evidence: Evidence) -> LawAt | None:
+def _fitted(law: Law, table: Table, learnt: LearntTerm, misfit: _Misfit) -> LawAt:
     at, count = _places(table.knots), len(learnt.values)
-    values, vectors = np.linalg.eigh(evidence.matrix)
-    kept = values > _NEGLIGIBLE * values.max()
-    root = np.sqrt(values[kept])
-    target = (vectors[:, kept].T @ evidence.vector) / root
-    inverse = np.linalg.inv(table.root)
 
-    def units_at(p: Array) -> Array:
-        rows = np.broadcast_to(np.atleast_2d(law.value(p, at)), (count, len(at)))
-        return np.asarray((rows @ inverse.T).ravel())
+    def values_at(p: Array) -> Array:
+        return np.broadcast_to(np.atleast_2d(law.value(p, at)), (count, len(at))).ravel()
 
-    def misfit(p: Array) -> Array:
-        return np.asarray(root * (vectors[:, kept].T @ units_at(p)) - target)
-
-    def sized(start: Sequence[float]) -> tuple[float, Array]:
-        """A start at the size that fits best, and its sum of squares."""
-        p = np.array(start)
-        if next(iter(law.units)) in SIZES:
-            shown = misfit(p) + target
-            p[0] *= float(shown @ target) / max(float(shown @ shown), TINY)
-        left = misfit(p)
-        return float(left @ left), p
-
-    starts = sorted((sized(start) for start in law.starts(at, learnt.values)), key=lambda s: s[0])
+    starts = np.array(law.starts(at, learnt.values), dtype=np.float64)
+    shown = misfit.shown(np.stack([values_at(start) for start in starts]))
+    if next(iter(law.units)) in SIZES:
+        size = shown @ misfit.target / np.maximum((shown**2).sum(axis=1), TINY)
+        starts[:, 0] *= size
+        shown *= size[:, None]
+    left = ((shown - misfit.target) ** 2).sum(axis=1)
     tried = [
-        least_squares(misfit, start, x_scale=np.abs(start) + 0.1, max_nfev=60)
-        for _, start in starts[:_STARTS]
+        least_squares(
+            lambda p: misfit.shown(values_at(p)) - misfit.target,
+            start,
+            x_scale=np.abs(start) + 0.1,
+            max_nfev=60,
+        )
+        for start in starts[np.argsort(left, kind="stable")[:_STARTS]]
     ]
-    if not tried:
-        return None
     best = min(tried, key=lambda item: float(item.cost))
     p = np.asarray(best.x, dtype=np.float64)
     # Only the whole part of these counts, so that nothing kept the fit from drifting within it.
     p = np.where([name in _WHOLE for name in law.units], np.round(p), p)
-    whole = _explained(_units(table, learnt), evidence)
-    share = _explained(units_at(p), evidence) / max(whole, TINY)
-    covariance = np.linalg.pinv(best.jac.T @ best.jac) * evidence.inflation
-    return LawAt(law, p, covariance, share, table, learnt)
-
-
-def _units(table: Table, learnt: LearntTerm) -> Array:
-    return np.asarray(np.linalg.solve(table.root, learnt.values.T).T.ravel(), dtype=np.float64)
+    whole = max(misfit.explained(learnt.values), TINY)
+    covariance = np.linalg.pinv(best.jac.T @ best.jac) * misfit.inflation
+    return LawAt(law, p, covariance, misfit.explained(values_at(p)) / whole, table, learnt)
 
 
 def _places(knots: Sequence[Array]) -> Array:
