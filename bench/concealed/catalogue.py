@@ -65,6 +65,7 @@ _LETTERS: Mapping[str, str] = {
     "hidden_state": "b",
     "closed_loop": "c",
     "two": "d",
+    "frictionless": "d",
     "cancelling": "l",
     "masked": "e",
     "seldom": "f",
@@ -192,6 +193,9 @@ _PARTICULAR = (
     Case("total, roller drag", "total_only", (_C(_DRAG),), total_only=True),
 )
 _NULLS = 5  # of each noise
+# A description without any friction, which many are.
+_FRICTION = (_C("friction.coulomb"), _C("friction.viscous", ALL, "medium"))
+_FRICTIONLESS = 20
 
 
 def _all_cases() -> Iterator[Case]:
@@ -200,6 +204,8 @@ def _all_cases() -> Iterator[Case]:
         for name, effects in named.items():
             yield Case(name, group, effects)
     yield from _PARTICULAR
+    for number in range(1, _FRICTIONLESS + 1):
+        yield Case(f"no friction {number}", "frictionless", _FRICTION)
     for number in range(1, _NULLS + 1):
         yield Case(f"null, white {number}", "null_white")
         yield Case(f"null, autocorrelated {number}", "null_autocorrelated", noise="autocorrelated")

@@ -42,20 +42,18 @@ def test_of_several_tries_of_a_rival_the_best_counts() -> None:
     assert [(odd, other.effect) for odd, other in found] == [(-3.0, "b")]
 
 
-def test_each_finding_has_the_evidence_that_is_lost_without_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_each_finding_has_the_evidence_that_is_lost_without_it() -> None:
     """Half of the energy that nothing else explains; the other finding explains half of each."""
     random = np.random.default_rng(3)
     columns = random.standard_normal((SAMPLES, 3))  # one nuisance, two findings
     columns[:, 2] += columns[:, 1]
     residual = 0.1 * random.standard_normal(SAMPLES)
     jacobian = SimpleNamespace(own=(slice(1, 2), slice(2, 3)), matrix=columns)
-    monkeypatch.setattr(verdict, "linearise", lambda *_: jacobian)
     changes = [4.0 * columns[:, 1], 2.0 * columns[:, 2]]
     zero = np.zeros(SAMPLES)
     analysis = SimpleNamespace(
         dataset=SimpleNamespace(value=residual),
+        jacobian=jacobian,
         found=SimpleNamespace(
             best=SimpleNamespace(model=None, value=zero),
             noise=SimpleNamespace(weight=np.ones(SAMPLES)),

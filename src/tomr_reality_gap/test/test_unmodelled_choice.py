@@ -147,6 +147,121 @@ def test_names_that_take_the_law_from_a_term_are_dropped(
     assert effect.laws == ("a law",)
 
 
+def _instead(
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    names: int = 3,
+    beside: int = 0,
+    left: float = 200.0,
+    then: float = 110.0,
+    effect: SimpleNamespace | None,
+) -> bool:
+    """Whether a term takes the place of `names` that leave `left` of 100 values; with it `then`."""
+    made = [
+        SimpleNamespace(
+            best=SimpleNamespace(model=SimpleNamespace(hypotheses=("a name",) * count)),
+            without=SimpleNamespace(
+                model=SimpleNamespace(described=SimpleNamespace(robot=None)),
+            ),
+            noise=SimpleNamespace(sigma=None),
+        )
+        for count in (names, beside)
+    ]
+    plain = SimpleNamespace(value=(0.0,) * 100)
+    monkeypatch.setattr(explain, "_remainder", lambda *_: None)
+    monkeypatch.setattr(explain, "unmodelled_effect", lambda *_: effect)
+    monkeypatch.setattr(explain, "_settled", lambda *_: (None, made[1], effect))
+    monkeypatch.setattr(explain, "_left", lambda data, *_: left if data is plain else then)
+    tried = explain._instead(plain, made[0], lambda *_: made[1], None)  # type: ignore[arg-type,return-value]
+    return tried is not None
+
+
+LAW = SimpleNamespace(laws=("a law",), is_repeatable=True)
+
+
+@pytest.mark.parametrize(
+    ("names", "beside", "left", "then", "expected"),
+    [
+        (3, 0, 200.0, 110.0, True),
+        (3, 1, 200.0, 110.0, True),
+        (3, 2, 200.0, 110.0, False),  # as many names in all
+        (2, 0, 200.0, 110.0, True),
+        (1, 0, 200.0, 110.0, False),
+        (3, 0, 119.0, 90.0, False),  # they leave hardly more than noise
+        (3, 0, 121.0, 90.0, True),
+        (3, 0, 200.0, 166.0, True),  # a sixth less
+        (3, 0, 200.0, 167.0, False),
+    ],
+)
+def test_one_law_takes_the_place_of_several_names_if_it_leaves_much_less(
+    monkeypatch: pytest.MonkeyPatch,
+    names: int,
+    beside: int,
+    left: float,
+    then: float,
+    expected: bool,
+) -> None:
+    found = _instead(monkeypatch, names=names, beside=beside, left=left, then=then, effect=LAW)
+    assert found == expected
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        None,
+        SimpleNamespace(laws=(), is_repeatable=True),
+        SimpleNamespace(laws=("a law",), is_repeatable=False),
+    ],
+)
+def test_what_is_no_law_or_not_repeatable_takes_no_names_place(
+    monkeypatch: pytest.MonkeyPatch, effect: SimpleNamespace | None
+) -> None:
+    assert not _instead(monkeypatch, effect=effect)
+
+
+@pytest.mark.parametrize(
+    ("family", "names", "left", "first"),
+    [
+        ("force.place", 1, 90.0, True),  # sought without any name: fewer names leave less
+        ("force.place", 2, 90.0, False),
+        ("force.place", 1, 100.0, False),
+        ("torque.speed", 1, 90.0, True),  # what names depend on too is taken as it was found
+    ],
+)
+def test_a_term_is_sought_without_names_that_stood_in_for_it(
+    monkeypatch: pytest.MonkeyPatch, family: str, names: int, left: float, first: bool
+) -> None:
+    """Two names leave 100; a term sought without them has some beside it."""
+    found, fewer = (
+        SimpleNamespace(
+            best=SimpleNamespace(model=SimpleNamespace(hypotheses=("a name",) * count)),
+            without=SimpleNamespace(
+                model=SimpleNamespace(described=SimpleNamespace(robot=None)),
+            ),
+            noise=SimpleNamespace(sigma=None),
+        )
+        for count in (2, names)
+    )
+    beside, alone = SimpleNamespace(key="beside"), SimpleNamespace(
+        key="alone", family=FAMILIES[family]
+    )  # fmt: skip
+    settled: list[tuple[str, bool]] = []
+
+    def _settled(_: object, effect: SimpleNamespace, *rest: object) -> tuple[object, ...]:
+        settled.append((effect.key, len(rest) == 1))
+        return "data", fewer, effect
+
+    monkeypatch.setattr(explain, "_remainder", lambda *_: None)
+    monkeypatch.setattr(explain, "unmodelled_effect", lambda *_: alone)
+    monkeypatch.setattr(explain, "_refitted", lambda _, __, effect: effect)
+    monkeypatch.setattr(explain, "_settled", _settled)
+    monkeypatch.setattr(explain, "_left", lambda data, *_: left if data == "data" else 100.0)
+    *_, effect = explain._beside(None, found, beside, None, None)  # type: ignore[arg-type]
+    own = "alone" if FAMILIES[family].is_strange else "beside"
+    assert effect.key == own
+    assert settled == [(own, True)] if first else [(own, True), (own, False)]
+
+
 @pytest.mark.parametrize(
     ("share", "size", "has_names", "looked"),
     [

@@ -16,7 +16,9 @@ from tomr_reality_gap.alignment.simulation import Run
 from tomr_reality_gap.fit.basis_responses import BasisResponses
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection, finding_cost
+from tomr_reality_gap.fit.jacobian import Jacobian, linearise
 from tomr_reality_gap.fit.simulator_baseline import Offsets, SimulatorBaseline
+from tomr_reality_gap.fit.uncertainty import own_sigma
 from tomr_reality_gap.fit.unmodelled import Unmodelled
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 from tomr_reality_gap.rules import Residuals
@@ -50,6 +52,16 @@ class AnalysisResult:
         robots = [item.described.robot for item in (model, *fewer)]
         described = (self.plain or self.dataset).predict([self.base.robot])
         return (*described, *self.dataset.predict(robots))
+
+    @cached_property
+    def jacobian(self) -> Jacobian:
+        """Of the best model."""
+        return linearise(self.dataset, self.found.best.model, ())
+
+    @cached_property
+    def own_sigma(self) -> Array:
+        """Standard deviations of the parameters of the best model's hypotheses, in their units."""
+        return own_sigma(self.dataset, self.found, self.jacobian)
 
     @cached_property
     def runs(self) -> tuple[Run, ...]:

@@ -97,10 +97,10 @@ class Findings:
 
     def _parameters(self, number: int) -> dict[str, Estimate]:
         """Values with their intervals; of a wrong parameter what it is, tolerance included."""
-        best, model = self.analysis.found.best, self.analysis.found.best.model
+        model = self.analysis.found.best.model
         hypothesis, offsets = model.hypotheses[number], model.offsets[number]
         first = sum(len(item.parameters) for item in model.hypotheses[:number])
-        sigma = best.own_sigma[first : first + len(offsets)].tolist()
+        sigma = self.analysis.own_sigma[first : first + len(offsets)].tolist()
         shared = self.analysis.shared[number] if self.analysis.shared else (0.0,) * len(offsets)
         nuisances = zip(model.nuisances, model.nuisance_offsets, strict=True)
         nuisance = {parameter.keys[0]: offset for parameter, offset in nuisances}

@@ -16,7 +16,6 @@ from tomr_reality_gap.analysis import AnalysisResult, detection_limits, residual
 from tomr_reality_gap.described import described, for_users
 from tomr_reality_gap.explanation import Comparison, Explanation, Finding, Learnt
 from tomr_reality_gap.findings import Findings
-from tomr_reality_gap.fit.jacobian import linearise
 from tomr_reality_gap.fit.laws import words_of
 from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.unmodelled import Unmodelled
@@ -80,7 +79,7 @@ def _term_notes(effect: Unmodelled | None, robot: Robot) -> tuple[str, ...]:
 def gains(analysis: AnalysisResult) -> list[float]:
     """Log evidence that each named finding brings, all else fitted anew without it."""
     dataset, found = analysis.dataset, analysis.found
-    jacobian = linearise(dataset, found.best.model, ())
+    jacobian = analysis.jacobian
     weight = found.noise.weight
     base = jacobian.matrix * weight[:, None]
     residual = (dataset.value - found.best.value) * weight

@@ -84,22 +84,36 @@ def block_jackknife(
 
 
 def _sandwich(scores: Array, informed: Array, length: float) -> Uncertainty:
-    number, values = scores.shape
-    prior = np.eye(values)
-    information = informed.sum(axis=0) + prior
-    moved = np.linalg.solve(information - informed, scores[:, :, None])[:, :, 0]
-    bread = np.linalg.inv(information)
-    covariance = (number - 1) / number * moved.T @ moved + bread @ prior @ bread
+    bread = np.linalg.inv(informed.sum(axis=0) + np.eye(scores.shape[1]))
     naive = np.sqrt(np.diag(bread))
-    deviation = np.sqrt(np.diag(covariance))
+    deviation = np.sqrt(np.diag(jackknife_covariance(scores, informed)))
     return Uncertainty(
         deviation=deviation,
-        factor=float(student.ppf(0.5 + _LEVEL / 2.0, max(number - 1, 1))),
+        factor=interval_factor(len(scores)),
         correlation=bread / np.outer(naive, naive),
         shrinkage=np.minimum(np.maximum(naive, deviation), 1.0),
-        blocks=number,
+        blocks=len(scores),
         block_length=length,
     )
+
+
+def jackknife_covariance(scores: Array, informed: Array) -> Array:
+    """Of unknowns in prior standard deviations, (p, p).
+
+    Args:
+        scores: of each block's data at the optimum, (b, p).
+        informed: information of each block's data, (b, p, p).
+    """
+    number, values = scores.shape
+    information = informed.sum(axis=0) + np.eye(values)
+    moved = np.linalg.solve(information - informed, scores[:, :, None])[:, :, 0]
+    bread = np.linalg.inv(information)
+    return np.asarray((number - 1) / number * moved.T @ moved + bread @ bread)
+
+
+def interval_factor(blocks: int) -> float:
+    """Times the standard deviation that many blocks tell it is half of the 95 % interval."""
+    return float(student.ppf(0.5 + _LEVEL / 2.0, max(blocks - 1, 1)))
 
 
 def block_length(recordings: Sequence[Sampled], psi: Array) -> float:
