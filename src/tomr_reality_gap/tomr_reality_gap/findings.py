@@ -132,12 +132,13 @@ def log_odds_of(found: Hypothesis, group: Sequence[FittedModel]) -> list[tuple[f
     """
     odds: dict[str, tuple[float, Hypothesis]] = {}
     for item in group[1:]:
-        place = [known.name for known in group[0].model.hypotheses].index(found.name)
-        other = item.model.hypotheses[place]
-        if other.name != found.name:
-            odd = item.evidence - group[0].evidence
-            if other.name not in odds or odd > odds[other.name][0]:
-                odds[other.name] = (odd, other)
+        if found.name in item.model.names:
+            continue
+        names = group[0].model.names
+        other = next((known for known in item.model.hypotheses if known.name not in names), None)
+        odd = item.evidence - group[0].evidence
+        if other is not None and (other.name not in odds or odd > odds[other.name][0]):
+            odds[other.name] = (odd, other)
     return list(odds.values())
 
 

@@ -61,7 +61,8 @@ class HypothesisPrior:
     shapes: Callable[[Scales], Sequence[Mapping[str, float]]] = _no_shape
     sign: int = 1  # of the permitted side of the sizes; 0: both
     least: Size = lambda scales: 0.0  # size below which sampling cannot tell it from none
-    stands_for: int = 1  # effects whose work it does alone: it must bring the evidence of as many
+    # Effects whose work it does alone: it must bring the evidence of as many.
+    stands_for: tuple[str, ...] = ()
     log_prior: float = 0.0  # against the usual effects
 
 

@@ -1,9 +1,9 @@
 """Backward elimination: whether each finding is still needed, and what could take its place."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-from attrs import evolve
+from attrs import evolve, frozen
 
 from tomr_reality_gap.alignment.simulation import Tick
 from tomr_reality_gap.fit.dataset import Dataset
@@ -35,10 +35,8 @@ def backward_elimination(
         count = len(best.model.hypotheses)
         fewer = [(best.model.without(number), best.sensors) for number in range(count)]
         shorter = refine(dataset, fewer, jacobian, noise, tick=tick)
-        gains = [
-            _worth(best, cost) - _worth(item, cost)
-            for item, cost in zip(shorter, _costs(dataset, found, best), strict=True)
-        ]
+        price = _Price.of(dataset, found, best)
+        gains = [price.worth(best) - price.worth(item) for item in shorter]
         weakest = int(np.argmin(gains))
         if gains[weakest] > 0.0:
             break
@@ -46,31 +44,32 @@ def backward_elimination(
     responses = Responses(dataset, found, candidates)
     groups = _alternatives(responses, best, tick)
     for _ in range(_SWAPS):
-        cost = found.cost(len(dataset.value), best)
-        better = max((item for group in groups for item in group), key=lambda m: _worth(m, cost))
-        if _worth(better, cost) <= _worth(best, cost):
+        price = _Price.of(dataset, found, best)
+        better = max((item for group in groups for item in group), key=price.worth)
+        if price.worth(better) <= price.worth(best):
             break
         best = better
         groups = _alternatives(responses, best, tick)
     return evolve(found, best=best, alternatives=tuple(groups))
 
 
-def _costs(dataset: Dataset, found: Selection, best: FittedModel) -> list[float]:
-    """What each finding must bring; friction's two parts at one place count as one finding."""
-    usual, least = found.cost(len(dataset.value), best), finding_cost(len(dataset.value))
-    parts = [item for item in best.model.hypotheses if item.effect in _FRICTION]
-    return [
-        least
-        if any(one is not item and one.where == item.where for one in parts)
-        and item.effect in _FRICTION
-        else usual
-        for item in best.model.hypotheses
-    ]
+@frozen
+class _Price:
+    """Log evidence that effects must bring."""
 
+    usual: float  # a finding
+    least: float  # the second of friction's parts at one place, which are one finding
 
-def _worth(item: FittedModel, cost: float) -> float:
-    """Log evidence less what so many effects must bring."""
-    return item.evidence - cost * item.model.weight
+    @classmethod
+    def of(cls, dataset: Dataset, found: Selection, best: FittedModel) -> "_Price":
+        samples = len(dataset.value)
+        return cls(found.cost(samples, best), finding_cost(samples))
+
+    def worth(self, item: FittedModel) -> float:
+        """Log evidence less what so many effects must bring."""
+        places = [part.where for part in item.model.hypotheses if part.effect in _FRICTION]
+        seconds = len(places) - len(set(places))
+        return item.evidence - self.usual * item.model.weight + (self.usual - self.least) * seconds
 
 
 def _alternatives(
@@ -104,4 +103,31 @@ def _stand_ins(responses: Responses, best: FittedModel, number: int) -> list[Mod
     # What was worked out beside the other findings is the better start.
     calculated = {item.hypotheses[number].name: item for item in nearest[:_STAND_INS]}
     tried = dict(list(candidates.items())[:_STAND_INS])
-    return list({**tried, **calculated}.values())
+    return [*{**tried, **calculated}.values(), *_together(responses, model, number)]
+
+
+def _together(responses: Responses, model: Model, number: int) -> Iterator[Model]:
+    """Models with the effects whose work another does alone, in its place or in that of one of
+    them; or with that other in the place of them all.
+
+    Coulomb friction alone is too large where viscous friction is left out too.
+    """
+    where, known = model.hypotheses[number].where, model.hypotheses[number].name
+    here = {item.effect: item for item in responses.candidates if item.where == where}
+    sizes = _sizes_tried(responses.found)
+    for whole in here.values():
+        parts = {here[effect].name: here[effect] for effect in whole.stands_for if effect in here}
+        if len(parts) < 2 or known not in (whole.name, *parts):
+            continue
+        given = [whole] if parts.keys() <= model.names else parts.values()
+        yield model.exchanged({whole.name, *parts}, given, sizes)
+
+
+def _sizes_tried(found: Selection) -> dict[str, tuple[float, ...]]:
+    """Offsets at which each hypothesis was tried first, by its name."""
+    return {
+        known.name: offsets
+        for step in reversed(found.rounds)
+        for item in reversed(step.tried)
+        for known, offsets in zip(item.model.hypotheses, item.model.offsets, strict=True)
+    }

@@ -1,6 +1,6 @@
 """A description and what has been changed in it so far."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 from attrs import evolve, frozen
@@ -50,7 +50,7 @@ class Model:
     @property
     def weight(self) -> int:
         """Effects whose evidence it must bring."""
-        return sum(hypothesis.stands_for for hypothesis in self.hypotheses)
+        return sum(max(1, len(hypothesis.stands_for)) for hypothesis in self.hypotheses)
 
     def joined(self, hypothesis: Hypothesis) -> "Model":
         """With one more hypothesis, at no offset yet."""
@@ -78,6 +78,24 @@ class Model:
         hypotheses, all_offsets = list(self.hypotheses), list(self.offsets)
         hypotheses[number], all_offsets[number] = hypothesis, offsets
         return evolve(self, hypotheses=tuple(hypotheses), offsets=tuple(all_offsets))
+
+    def exchanged(
+        self,
+        names: Collection[str],
+        given: Iterable[Hypothesis],
+        sizes: Mapping[str, tuple[float, ...]],
+    ) -> "Model":
+        """With some hypotheses in the place of those of some names.
+
+        Their offsets are those that they have here, or else of `sizes`, or nothing.
+        """
+        own = {**sizes, **dict(zip((h.name for h in self.hypotheses), self.offsets, strict=True))}
+        model = self.kept([item.name not in names for item in self.hypotheses])
+        for item in given:
+            offsets = own.get(item.name, (0.0,) * len(item.parameters))
+            model = model.joined(item)
+            model = model.swapped(len(model.hypotheses) - 1, item, offsets)
+        return model
 
     def moved(self, nuisance: Array, own: Array) -> "Model":
         """With all parameters at new offsets, within their bounds."""

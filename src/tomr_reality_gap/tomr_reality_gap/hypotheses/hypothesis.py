@@ -18,7 +18,7 @@ class Hypothesis:
     log_prior: float = field(kw_only=True, default=0.0)
     # Smallest size that data sampled like these can show.
     least: float = field(kw_only=True, default=0.0)
-    stands_for: int = field(kw_only=True, default=1)  # effects whose work it does alone
+    stands_for: tuple[str, ...] = field(kw_only=True, default=())  # whose work it does alone
 
     @property
     def name(self) -> str:

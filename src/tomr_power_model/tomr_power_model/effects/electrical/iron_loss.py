@@ -31,7 +31,7 @@ class IronLoss(Effect):
             "eddy": lambda scales: 0.3 * scales.torque / scales.speed / scales.gear**2,
         },
         # It brakes as Coulomb and viscous friction together do, which every robot has.
-        stands_for=2,
+        stands_for=("friction.coulomb", "friction.viscous"),
         log_prior=-3.0,
     )
     shown_by = "steady speeds under several loads: empty and with a payload"
