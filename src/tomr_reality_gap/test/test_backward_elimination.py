@@ -90,3 +90,63 @@ def test_needed_findings_stay_and_their_rivals_are_named(second) -> None:  # typ
     found = second("ab", ("", "ab"), ("a", "bc"))
     assert _letters(found.best.model) == "ac"  # 905 against 900
     assert _letters(found.alternatives[0][0].model) == "ac"
+
+
+@pytest.mark.parametrize(
+    ("known", "expected"),
+    [
+        ("c", ["cv"]),  # a part: all of them
+        ("i", ["cv"]),  # what does the work of all
+        ("cv", ["i"]),  # all of them: what does their work
+        ("ac", ["acv"]),
+        ("a", []),
+    ],
+)
+def test_what_does_the_work_of_several_stands_in_for_them_together(
+    known: str, expected: list[str]
+) -> None:
+    """i does that of c and v, at one place alone; what was tried starts from where it came to."""
+    parameter = Parameter("size", ("made",), "", 1.0)
+    here, there = ("body",), ("supply",)
+    candidates = (
+        *(Hypothesis(name, here, (parameter,)) for name in "acv"),
+        Hypothesis("i", here, (parameter,), stands_for=("c", "v")),
+        Hypothesis("i", there, (parameter,), stands_for=("c", "v")),
+    )
+    model = EMPTY
+    for name in known:
+        model = model.joined(next(item for item in candidates if item.effect == name))
+        model = model.moved(np.empty(0), np.full(len(model.hypotheses), 0.7))
+    tried = _model("v").moved(np.empty(0), np.array([0.3]))
+    responses = SimpleNamespace(
+        candidates=candidates,
+        found=SimpleNamespace(rounds=(SimpleNamespace(tried=(SimpleNamespace(model=tried),)),)),
+    )
+    last = len(model.hypotheses) - 1
+    found = list(backward_elimination._together(responses, model, last))  # type: ignore[arg-type]
+    assert ["".join(sorted(_letters(item))) for item in found] == expected
+    for item in found:
+        sizes = dict(zip(_letters(item), (own[0] for own in item.offsets), strict=True))
+        assert sizes == {
+            name: 0.7 if name in known else {"v": 0.3}.get(name, 0.0) for name in sizes
+        }
+
+
+def test_the_second_part_of_friction_at_a_place_costs_the_least() -> None:
+    """Coulomb and viscous friction of one wheel; iron loss costs as two findings."""
+    price = backward_elimination._Price(usual=100.0, least=20.0)
+
+    def worth(*effects: tuple[str, str]) -> float:
+        model = EMPTY
+        for effect, where in effects:
+            whole = ("friction.coulomb", "friction.viscous") if effect == "iron" else ()
+            model = model.joined(Hypothesis(effect, (where,), (), stands_for=whole))
+        none = np.empty(0)
+        return price.worth(FittedModel(model, 0.0, 0.0, none, none, none))
+
+    coulomb, viscous = ("friction.coulomb", "wheel_1"), ("friction.viscous", "wheel_1")
+    assert worth(coulomb) == -100.0
+    assert worth(coulomb, viscous) == -120.0
+    assert worth(coulomb, ("friction.viscous", "wheel_2")) == -200.0
+    assert worth(coulomb, viscous, ("a", "body")) == -220.0
+    assert worth(("iron", "wheel_1")) == -200.0

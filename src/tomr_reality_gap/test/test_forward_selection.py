@@ -139,6 +139,21 @@ def test_friction_left_out_altogether_is_friction_and_iron_loss_its_rival(
         assert -5.0 < odds["electrical.iron_loss at all_wheels"] < 0.0
 
 
+def test_friction_is_told_in_both_its_parts_however_much_it_explains(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    """Beside what explains a hundred times more than all that viscous friction does."""
+    robot = simulation.robot
+    value = simulation.predict([robot])[0]
+    left_out = tuple(f"physics.{name}" for name in FRICTION)
+    _, found = searched(simulation, value, FRICTION, left_out, beside=1e6)
+    model = found.best.model
+    assert model.names == {"friction.coulomb at all_wheels", "friction.viscous at all_wheels"}
+    for hypothesis, group in zip(model.hypotheses, found.alternatives, strict=True):
+        odds = {other.name: odd for odd, other in log_odds_of(hypothesis, group)}
+        assert -5.0 < odds["electrical.iron_loss at all_wheels"] < 0.0
+
+
 def test_coulomb_friction_alone_is_not_taken_for_iron_loss(
     simulation: RecordingSimulation,  # noqa: F811
 ) -> None:
