@@ -231,12 +231,12 @@ def test_time_and_angle_count_since_the_last_stand() -> None:
 
 
 def test_who_turns_about_has_stood_but_not_rested() -> None:
-    """There and back at 2 rad/s: a rest of 0.3 s, 1 rad forth, 1.6 rad back."""
+    """A rest of 0.3 s, 1 rad forth at 2 rad/s, 1.6 rad back at 1.6: never slow in between."""
     time = np.arange(0.0, 2.0, 0.01)
-    pace = np.select([time < 0.3, time < 0.8], [0.0, 2.0], -2.0)
+    pace = np.select([time < 0.3, time < 0.8], [0.0, 2.0], -1.6)
     motion = _driven(time, pace[:, None] * np.ones(3))
-    half, last = 129, 159  # after 1.3 s where it rested, and after 1.6 s beyond it
-    assert motion.since_stand[half] == pytest.approx([0.5] * 3, abs=0.03)
+    half, last = 142, 179  # after 1.425 s where it rested, and after 1.8 s beyond it
+    assert motion.since_stand[half] == pytest.approx([0.625] * 3, abs=0.03)
     assert motion.turned[half] == pytest.approx([2.0] * 3, abs=0.05)
     assert motion.from_rest[half] == pytest.approx([0.0] * 3, abs=0.05)
     assert motion.from_rest[last] == pytest.approx([0.6] * 3, abs=0.05)

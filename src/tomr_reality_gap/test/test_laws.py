@@ -153,6 +153,19 @@ def test_a_parameter_more_must_bring_its_price(monkeypatch: pytest.MonkeyPatch) 
     assert list(_laws(_table("torque.speed", knots), 0.01 * knots**2)) == ["power law", "long"]
 
 
+def test_a_law_of_the_floor_is_drawn_finer_than_its_table_and_little_beyond_it() -> None:
+    """Four knots for one, and a quarter of the map to either side; an edge is softer else."""
+    line = np.linspace(-1.0, 1.0, 9)
+    x, y = (grid.ravel() for grid in np.meshgrid(line, line, indexing="ij"))
+    p = {"size": 0.3, "radius": 0.6, "x": -0.2, "y": 0.3}
+    _, term = _laws(_table("torque.place", line, line), 0.3 * _on_it("patch", p, x, y)[None])[
+        "patch"
+    ]
+    for points in term.knots:
+        assert np.diff(points) == pytest.approx(np.full(len(points) - 1, 0.25 / 4))
+        assert (points[0], points[-1]) == (-1.5, pytest.approx(1.5, abs=0.07))
+
+
 def _on_it(
     law: str, p: dict[str, float], x: np.ndarray, y: np.ndarray, soft: float = 0.25 * 0.25
 ) -> np.ndarray:

@@ -57,6 +57,21 @@ def test_what_no_wheel_has_met_is_left_blank() -> None:
     assert blank[1] > blank[0] + 0.05
 
 
+def test_the_law_that_comes_first_is_drawn_over_the_curve_and_beside_the_map() -> None:
+    """Whoever moves it sees it move."""
+    family = FAMILIES["torque.speed"]
+    term = LearntTerm(family, (0,), (AT,), AT[None])
+    powers = [_law("power law", size=size, exponent=2.0) for size in (0.5, 1.0)]
+    curves = [Learnt(term, np.ones((1, 5)), 1.0, True, (law,)) for law in powers]
+    moved = _law("patch", size=0.3, radius=0.5, x=-0.6, y=0.6)
+    sigma = np.append(np.full((1, 80), 0.1), [[1.0]], axis=1)
+    maps = [_map("torque.place", law, sigma=sigma) for law in (PATCH, moved)]
+    for pair in (curves, maps):
+        one, other = (_pixels(unnamed_picture(SHAPE, item)) for item in pair)
+        assert one.shape == other.shape
+        assert (np.abs(one - other) > 0.1).any(axis=-1).mean() > 0.001
+
+
 @pytest.mark.parametrize(
     "learnt",
     [None, _map("torque.place", PATCH), _map("torque.place"), _map("force.place", SPRING)],
