@@ -150,3 +150,16 @@ def test_the_second_part_of_friction_at_a_place_costs_the_least() -> None:
     assert worth(coulomb, ("friction.viscous", "wheel_2")) == -200.0
     assert worth(coulomb, viscous, ("a", "body")) == -220.0
     assert worth(("iron", "wheel_1")) == -200.0
+
+
+def test_friction_of_one_place_is_one_finding() -> None:
+    coulomb, viscous, other = (
+        Hypothesis(effect, (where,), ())
+        for effect, where in (
+            ("friction.coulomb", "all_wheels"),
+            ("friction.viscous", "all_wheels"),
+            ("friction.viscous", "wheel_1"),
+        )
+    )
+    model = EMPTY.joined(coulomb).joined(viscous)
+    assert (EMPTY.findings, model.findings, model.joined(other).findings) == (0, 1, 2)

@@ -233,6 +233,13 @@ def test_a_curve_that_is_no_law_stays_a_table() -> None:
     assert _laws(_table("torque.speed", knots), values) == {}
 
 
+def test_a_threshold_that_was_never_met_is_none() -> None:
+    """A parabola about -20 rad/s, at speeds from 0 on."""
+    knots = np.linspace(0.0, 8.0, 24)
+    found = _laws(_table("torque.speed", knots), 1e-3 * (knots + 20.0) ** 2)
+    assert "square of the excess" not in found
+
+
 def test_a_law_is_told_in_words_with_its_numbers() -> None:
     knots = np.linspace(0.0, 8.0, 24)
     table = _table("torque.since_stand", knots)

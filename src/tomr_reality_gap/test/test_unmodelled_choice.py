@@ -159,7 +159,9 @@ def _instead(
     """Whether a term takes the place of `names` that leave `left` of 100 values; with it `then`."""
     made = [
         SimpleNamespace(
-            best=SimpleNamespace(model=SimpleNamespace(hypotheses=("a name",) * count)),
+            best=SimpleNamespace(
+                model=SimpleNamespace(hypotheses=("a name",) * count, findings=count)
+            ),
             without=SimpleNamespace(
                 model=SimpleNamespace(described=SimpleNamespace(robot=None)),
             ),
@@ -234,7 +236,9 @@ def test_a_term_is_sought_without_names_that_stood_in_for_it(
     """Two names leave 100; a term sought without them has some beside it."""
     found, fewer = (
         SimpleNamespace(
-            best=SimpleNamespace(model=SimpleNamespace(hypotheses=("a name",) * count)),
+            best=SimpleNamespace(
+                model=SimpleNamespace(hypotheses=("a name",) * count, findings=count)
+            ),
             without=SimpleNamespace(
                 model=SimpleNamespace(described=SimpleNamespace(robot=None)),
             ),

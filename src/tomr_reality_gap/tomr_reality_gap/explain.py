@@ -129,7 +129,7 @@ def _beside(
             effect = alone
         first = _refitted(plain, bare, effect)
         tried = _settled(plain, first, named)
-        names = [len(item.best.model.hypotheses) for item in (found, tried[1])]
+        names = [item.best.model.findings for item in (found, tried[1])]
         sigma = tried[1].noise.sigma
         left = [_left(data, item, sigma) for data, item in ((plain, found), tried[:2])]
         if names[1] < names[0] and left[1] < left[0]:
@@ -141,7 +141,7 @@ def _instead(
     plain: Dataset, found: Selection, named: _Named, scales: Scales
 ) -> tuple[Dataset, Selection, Unmodelled] | None:
     """A law without a name in the place of several names, if it leaves much less than they do."""
-    names, sigma = len(found.best.model.hypotheses), found.noise.sigma
+    names, sigma = found.best.model.findings, found.noise.sigma
     left = _left(plain, found, sigma)
     if names < _SEVERAL or left < _MORE * len(plain.value):
         return None
@@ -150,7 +150,7 @@ def _instead(
     if alone is None or not alone.laws or not alone.is_repeatable:
         return None
     tried = _settled(plain, alone, named)
-    fewer = len(tried[1].best.model.hypotheses) + 1 < names
+    fewer = tried[1].best.model.findings + 1 < names
     return tried if fewer and _left(*tried[:2], sigma) < left / _MORE else None
 
 

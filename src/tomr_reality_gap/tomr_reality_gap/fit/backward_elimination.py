@@ -15,7 +15,6 @@ from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 
 _STAND_INS = 4  # alternatives that are tried for each finding
 _SWAPS = 3  # at most
-_FRICTION = ("friction.coulomb", "friction.viscous")
 
 
 def backward_elimination(
@@ -67,8 +66,7 @@ class _Price:
 
     def worth(self, item: FittedModel) -> float:
         """Log evidence less what so many effects must bring."""
-        places = [part.where for part in item.model.hypotheses if part.effect in _FRICTION]
-        seconds = len(places) - len(set(places))
+        seconds = len(item.model.hypotheses) - item.model.findings
         return item.evidence - self.usual * item.model.weight + (self.usual - self.least) * seconds
 
 

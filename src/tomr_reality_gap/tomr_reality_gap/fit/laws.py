@@ -29,6 +29,7 @@ _COST = 10.0  # log evidence that a parameter must bring
 _NOTHING = 1e-300  # variance of a parameter that the data do not tell
 _NEGLIGIBLE = 1e-6  # of the largest eigenvalue
 _POSITIVE = ("slack", "radius", "decay", "width")
+_THRESHOLD = "threshold"
 _WHOLE = ("order",)  # parameters that are whole numbers
 _BEYOND = 1.0  # of the range, on either side, that a law is trusted beyond the table
 _FINER = {1: 4, 2: 2}  # knots of a law's table for each of the learnt one, by its axes
@@ -85,6 +86,13 @@ class LawAt:
         return FittedLaw(self.law.name, self.law.words, estimates, self.share)
 
     @property
+    def is_within(self) -> bool:
+        """Whether what it sets in at was met; a threshold beyond is another law in disguise."""
+        at = dict(zip(self.law.units, self.parameters.tolist(), strict=True)).get(_THRESHOLD)
+        points = self.table.knots[0]
+        return at is None or float(points[0]) <= at <= float(points[-1])
+
+    @property
     def _sigma(self) -> Array:
         """Standard deviations of the parameters but for what is never known of each itself.
 
@@ -108,7 +116,7 @@ def laws_of(table: Table, learnt: LearntTerm, evidence: Evidence) -> list[LawAt]
     misfit = _Misfit.of(table, evidence)
     known = [law for law in LAWS.values() if table.family.family_id in law.families]
     found = [_fitted(law, table, learnt, misfit) for law in known]
-    found = [item for item in found if item.share > _AS_WELL]
+    found = [item for item in found if item.share > _AS_WELL and item.is_within]
     whole = 0.5 * misfit.explained(learnt.values) / evidence.inflation
     found.sort(key=lambda item: _COST * len(item.parameters) - whole * item.share)
     return found[:_LISTED]

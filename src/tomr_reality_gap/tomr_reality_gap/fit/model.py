@@ -11,6 +11,8 @@ from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 
 Array = NDArray[np.float64]
 
+_FRICTION = ("friction.coulomb", "friction.viscous")
+
 
 @frozen
 class Model:
@@ -46,6 +48,12 @@ class Model:
     def names(self) -> frozenset[str]:
         """Names of the hypotheses."""
         return frozenset(hypothesis.name for hypothesis in self.hypotheses)
+
+    @property
+    def findings(self) -> int:
+        """How many hypotheses; Coulomb and viscous friction of one place are one finding."""
+        parts = [item.where for item in self.hypotheses if item.effect in _FRICTION]
+        return len(self.hypotheses) - len(parts) + len(set(parts))
 
     @property
     def weight(self) -> int:
