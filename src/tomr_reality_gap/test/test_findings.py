@@ -35,6 +35,13 @@ def test_rivals_stand_in_the_place_of_the_finding_whatever_else_was_kept() -> No
     assert log_odds_of(alone, ()) == []
 
 
+def test_what_keeps_the_finding_beside_another_is_no_rival_of_it() -> None:
+    """Coulomb with viscous friction is none of Coulomb friction; who does the work of both is."""
+    group = [_fitted(100.0, "a", "b"), _fitted(99.0, "b", "a", "c"), _fitted(97.0, "i")]
+    alone = group[0].model.hypotheses[0]
+    assert [(odd, other.effect) for odd, other in log_odds_of(alone, group)] == [(-3.0, "i")]
+
+
 def test_of_several_tries_of_a_rival_the_best_counts() -> None:
     """b was tried from two shapes; the last ended in a worse place."""
     group = [_fitted(100.0, "a"), _fitted(97.0, "b"), _fitted(20.0, "b")]

@@ -263,7 +263,7 @@ def test_a_term_is_sought_without_names_that_stood_in_for_it(
     *_, effect = explain._beside(None, found, beside, None, None)  # type: ignore[arg-type]
     own = "alone" if FAMILIES[family].is_strange else "beside"
     assert effect.key == own
-    assert settled == [(own, True)] if first else [(own, True), (own, False)]
+    assert settled == ([(own, True)] if first else [(own, True), (own, False)])
 
 
 @pytest.mark.parametrize(
