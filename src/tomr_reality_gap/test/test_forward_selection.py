@@ -122,33 +122,23 @@ def test_deviations_within_the_tolerance_are_no_finding(
 FRICTION = ("friction.coulomb", "friction.viscous", "electrical.iron_loss")
 
 
+@pytest.mark.parametrize("beside", [0.0, 1e6])
 def test_friction_left_out_altogether_is_friction_and_iron_loss_its_rival(
     simulation: RecordingSimulation,  # noqa: F811
+    beside: float,
 ) -> None:
-    """Iron loss brakes as Coulomb and viscous friction do together: no data tell them apart."""
+    """Iron loss brakes as Coulomb and viscous friction do together: no data tell them apart.
+
+    Nor does what viscous friction brings count for less beside what explains far more.
+    """
     robot = simulation.robot
     value = simulation.predict([robot])[0]
     left_out = tuple(f"physics.{name}" for name in FRICTION)
-    _, found = searched(simulation, value, FRICTION, left_out)
+    _, found = searched(simulation, value, FRICTION, left_out, beside=beside)
     model = found.best.model
     assert model.names == {"friction.coulomb at all_wheels", "friction.viscous at all_wheels"}
     sizes = {item.effect: own[0] for item, own in zip(model.hypotheses, model.offsets, strict=True)}
     assert sizes == pytest.approx({"friction.coulomb": 0.06, "friction.viscous": 0.004}, rel=0.1)
-    for hypothesis, group in zip(model.hypotheses, found.alternatives, strict=True):
-        odds = {other.name: odd for odd, other in log_odds_of(hypothesis, group)}
-        assert -5.0 < odds["electrical.iron_loss at all_wheels"] < 0.0
-
-
-def test_friction_is_told_in_both_its_parts_however_much_it_explains(
-    simulation: RecordingSimulation,  # noqa: F811
-) -> None:
-    """Beside what explains a hundred times more than all that viscous friction does."""
-    robot = simulation.robot
-    value = simulation.predict([robot])[0]
-    left_out = tuple(f"physics.{name}" for name in FRICTION)
-    _, found = searched(simulation, value, FRICTION, left_out, beside=1e6)
-    model = found.best.model
-    assert model.names == {"friction.coulomb at all_wheels", "friction.viscous at all_wheels"}
     for hypothesis, group in zip(model.hypotheses, found.alternatives, strict=True):
         odds = {other.name: odd for odd, other in log_odds_of(hypothesis, group)}
         assert -5.0 < odds["electrical.iron_loss at all_wheels"] < 0.0

@@ -147,6 +147,15 @@ def test_names_that_take_the_law_from_a_term_are_dropped(
     assert effect.laws == ("a law",)
 
 
+def _selection(names: int) -> Selection:
+    """Of so many names."""
+    model = SimpleNamespace(hypotheses=("a name",) * names, findings=names)
+    bare = SimpleNamespace(described=SimpleNamespace(robot=None))
+    best, without = (SimpleNamespace(model=item) for item in (model, bare))
+    noise = SimpleNamespace(sigma=None)
+    return Selection(best, without, (), noise)  # type: ignore[arg-type]
+
+
 def _instead(
     monkeypatch: pytest.MonkeyPatch,
     *,
@@ -157,18 +166,7 @@ def _instead(
     effect: SimpleNamespace | None,
 ) -> bool:
     """Whether a term takes the place of `names` that leave `left` of 100 values; with it `then`."""
-    made = [
-        SimpleNamespace(
-            best=SimpleNamespace(
-                model=SimpleNamespace(hypotheses=("a name",) * count, findings=count)
-            ),
-            without=SimpleNamespace(
-                model=SimpleNamespace(described=SimpleNamespace(robot=None)),
-            ),
-            noise=SimpleNamespace(sigma=None),
-        )
-        for count in (names, beside)
-    ]
+    made = [_selection(count) for count in (names, beside)]
     plain = SimpleNamespace(value=(0.0,) * 100)
     monkeypatch.setattr(explain, "_remainder", lambda *_: None)
     monkeypatch.setattr(explain, "unmodelled_effect", lambda *_: effect)
@@ -234,18 +232,7 @@ def test_a_term_is_sought_without_names_that_stood_in_for_it(
     monkeypatch: pytest.MonkeyPatch, family: str, names: int, left: float, first: bool
 ) -> None:
     """Two names leave 100; a term sought without them has some beside it."""
-    found, fewer = (
-        SimpleNamespace(
-            best=SimpleNamespace(
-                model=SimpleNamespace(hypotheses=("a name",) * count, findings=count)
-            ),
-            without=SimpleNamespace(
-                model=SimpleNamespace(described=SimpleNamespace(robot=None)),
-            ),
-            noise=SimpleNamespace(sigma=None),
-        )
-        for count in (2, names)
-    )
+    found, fewer = _selection(2), _selection(names)
     beside, alone = SimpleNamespace(key="beside"), SimpleNamespace(
         key="alone", family=FAMILIES[family]
     )  # fmt: skip
