@@ -18,7 +18,7 @@ from tomr_power_model.estimation.gauss_newton import (
     Start,
     maximise,
 )
-from tomr_power_model.estimation.intervals import block_length
+from tomr_power_model.estimation.intervals import block_jackknife, block_length
 from tomr_power_model.estimation.linear_gaussian import Gram, solve
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, per_wheel
 from tomr_power_model.estimation.robust import soft_l1
@@ -177,12 +177,25 @@ def test_a_derivative_steps_to_the_permitted_side() -> None:
 
 
 def test_blocks_are_long_against_correlation_and_drives_where_there_are_many() -> None:
+    """Seven drives of 9.9 s leave blocks of 5.775 s, if there are to be twelve."""
+    assert block_length([9.9] * 8, 0.1) == 9.9
+    lengths = [block_length([9.9] * 7, time) for time in (0.1, 0.5, 1.0)]
+    assert lengths == pytest.approx([1.0, 4.0, 5.775])
+
+
+def test_the_longest_correlation_of_any_channel_makes_the_blocks() -> None:
     random = np.random.default_rng(2)
-    drive = SimpleNamespace(time=0.1 * np.arange(100), stretch=np.zeros(100, dtype=int))
-    lasting = np.repeat(random.normal(size=200), 10)[:, None]  # for 1 s
-    assert block_length([drive] * 20, lasting) == pytest.approx(9.9)
-    assert 5.0 < block_length([drive] * 19, lasting[:1900]) < 9.9
-    assert block_length([drive] * 19, random.normal(size=(1900, 1))) < 1.5
+    drive = SimpleNamespace(time=0.1 * np.arange(1000), stretch=np.zeros(1000, dtype=int))
+    white, lasting = random.normal(size=1000), np.repeat(random.normal(size=100), 10)  # for 1 s
+    told = block_jackknife(
+        [drive],
+        np.stack([white, lasting], axis=1),
+        np.ones((1000, 2, 1)),
+        np.ones(2),
+        robust=False,
+    )
+    assert told.block_length == pytest.approx(8.0, rel=0.3)
+    assert told.blocks == pytest.approx(100.0 / told.block_length, abs=1)
 
 
 def test_coordinates_of_the_mass_centre_are_set_one_by_one() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tomr_power_model.estimation.parameter import Parameter
-from tomr_reality_gap.fit.uncertainty import own_sigma, parts_of
+from tomr_reality_gap.fit.uncertainty import blocks_of, own_sigma
 
 STD = 0.5  # N m, prior standard deviation of the one parameter
 
@@ -60,22 +60,22 @@ def test_what_each_drive_says_otherwise_makes_it_as_uncertain_as_their_mean_is(
     assert sigma == pytest.approx(factor * 0.2 / np.sqrt(recordings), rel=0.02)
 
 
-def test_parts_are_as_long_as_what_is_left_is_correlated_and_no_fewer_than_twelve() -> None:
+def test_blocks_are_as_long_as_what_is_left_is_correlated_and_no_fewer_than_twelve() -> None:
     dataset = _dataset(2)
     white = np.random.default_rng(3).standard_normal(len(dataset.value))
     slow = np.concatenate([np.sin(0.5 * item.time) for item in dataset.channels])
     for residual, count in ((white, 60), (slow, 12)):
-        part = parts_of(dataset, residual)  # type: ignore[arg-type]
-        assert part.max() + 1 == pytest.approx(count, abs=2)
+        block = blocks_of(dataset, residual)  # type: ignore[arg-type]
+        assert block.max() + 1 == pytest.approx(count, abs=2)
         ends = np.cumsum([len(item.time) for item in dataset.channels])
-        first, second = part[: ends[0]], part[ends[0] : ends[1]]
-        # Both channels of a moment are in one part; no part reaches into another recording.
+        first, second = block[: ends[0]], block[ends[0] : ends[1]]
+        # Both channels of a moment are in one block; no block reaches into another recording.
         np.testing.assert_array_equal(first[::2], second)
-        assert set(part[: ends[1]]).isdisjoint(part[ends[1] :])
+        assert set(block[: ends[1]]).isdisjoint(block[ends[1] :])
 
 
-def test_of_many_recordings_each_is_a_part() -> None:
+def test_of_many_recordings_each_is_a_block() -> None:
     dataset = _dataset(8)
-    part = parts_of(dataset, np.ones(len(dataset.value)))  # type: ignore[arg-type]
+    block = blocks_of(dataset, np.ones(len(dataset.value)))  # type: ignore[arg-type]
     rows = len(dataset.value) // 8
-    np.testing.assert_array_equal(part, np.arange(8).repeat(rows))
+    np.testing.assert_array_equal(block, np.arange(8).repeat(rows))

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 _SHORTEST_BLOCK = 1.0  # s
 _TIMES_PER_BLOCK = 8.0  # correlation times in a block
 _FEWEST_BLOCKS = 12
-_MANY_RECORDINGS = 20
+_MANY_RECORDINGS = 8
 _LEVEL = 0.95
 
 
@@ -70,7 +70,8 @@ def block_jackknife(
     push = np.where(known, psi, 0.0) * heavy
     slope = np.where(known[:, :, None], slope, 0.0)
     pull = np.where(known, curvature, 0.0) * heavy
-    length = block_length(recordings, psi)
+    durations = [float(item.time[-1] - item.time[0]) for item in recordings]
+    length = block_length(durations, _correlation_time(recordings, psi))
     block = blocks(recordings, length)
     number = int(block[-1]) + 1
     values = slope.shape[-1]
@@ -116,24 +117,31 @@ def interval_factor(blocks: int) -> float:
     return float(student.ppf(0.5 + _LEVEL / 2.0, max(blocks - 1, 1)))
 
 
-def block_length(recordings: Sequence[Sampled], psi: Array) -> float:
+def block_length(durations: Sequence[float], correlation_time: float) -> float:
     """Length of the blocks [s]: several correlation times, but leaving enough blocks.
 
     Of many recordings each is a block: what a model misses at one heading lasts a whole drive, and
     is lost among the noise where correlation is measured within drives.
+
+    Args:
+        durations: of the recordings [s].
+        correlation_time: of the residuals [s].
     """
-    durations = [float(item.time[-1] - item.time[0]) for item in recordings]
     if len(durations) >= _MANY_RECORDINGS:
         return max(durations)
+    wanted = max(_SHORTEST_BLOCK, _TIMES_PER_BLOCK * correlation_time)
+    return min(wanted, max(_SHORTEST_BLOCK, sum(durations) / _FEWEST_BLOCKS))
+
+
+def _correlation_time(recordings: Sequence[Sampled], psi: Array) -> float:
+    """Longest of the channels' [s]."""
     period = float(np.median(np.concatenate([np.diff(item.time) for item in recordings])))
     times = [
         autocorrelation_time(uninterrupted(recordings, series))
         for series in psi.T
         if np.isfinite(series).any()
     ]
-    total = sum(len(item.time) for item in recordings) * period
-    wanted = max(_SHORTEST_BLOCK, _TIMES_PER_BLOCK * max(times) * period)
-    return min(wanted, max(_SHORTEST_BLOCK, total / _FEWEST_BLOCKS))
+    return max(times) * period
 
 
 def blocks(recordings: Sequence[Sampled], length: float) -> NDArray[np.int64]:

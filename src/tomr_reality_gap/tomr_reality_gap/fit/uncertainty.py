@@ -1,13 +1,17 @@
-"""How well the values of findings are known: by how leaving out parts of the data moves them.
+"""How well the values of findings are known: by how leaving out blocks of the data moves them.
 
 Whatever the model lacks is no noise: it is wrong for a whole straight, or a whole drive. What each
-part of the recordings pulls the values towards tells how wrong they may be for it.
+block of the recordings pulls the values towards tells how wrong they may be for it.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tomr_power_model.estimation.intervals import interval_factor, jackknife_covariance
+from tomr_power_model.estimation.intervals import (
+    block_length,
+    interval_factor,
+    jackknife_covariance,
+)
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.parameter import prior_stds
 from tomr_power_model.estimation.statistics import autocorrelation_time
@@ -17,10 +21,6 @@ from tomr_reality_gap.fit.jacobian import Jacobian
 
 Array = NDArray[np.float64]
 
-_SHORTEST = 1.0  # s, of a part
-_TIMES = 8.0  # correlation times in a part
-_FEWEST = 12  # parts
-_MANY = 8  # recordings: each is a part
 _NORMAL = 1.96
 
 
@@ -32,8 +32,8 @@ def own_sigma(dataset: Dataset, found: Selection, jacobian: Jacobian) -> Array:
     best, weight = found.best, found.noise.weight
     columns = np.asarray(jacobian.matrix * weight[:, None], dtype=np.float64)
     residual = (dataset.value - best.value) * weight
-    part = parts_of(dataset, residual)
-    rows = [part == number for number in range(int(part.max()) + 1)]
+    block = blocks_of(dataset, residual)
+    rows = [block == number for number in range(int(block.max()) + 1)]
     scores = np.stack([columns[row].T @ residual[row] for row in rows])
     informed = np.stack([columns[row].T @ columns[row] for row in rows])
     deviation = np.sqrt(np.diag(jackknife_covariance(scores, informed)))
@@ -42,17 +42,15 @@ def own_sigma(dataset: Dataset, found: Selection, jacobian: Jacobian) -> Array:
     return np.maximum(best.own_sigma, deviation[len(deviation) - len(own) :] * prior_stds(own))
 
 
-def parts_of(dataset: Dataset, residual: Array) -> NDArray[np.intp]:
-    """The part of the recordings that each row belongs to, (n,)."""
-    channels, slices = dataset.channels, rows_of(dataset.channels)
+def blocks_of(dataset: Dataset, residual: Array) -> NDArray[np.intp]:
+    """Number of the block of each row, (n,)."""
+    channels, parts = dataset.channels, rows_of(dataset.channels)
     ends = [max(float(c.time[-1]) for c in item.channels) for item in dataset.simulations]
-    length = max(ends)
-    if len(ends) < _MANY:
-        times = [
-            autocorrelation_time([residual[part]]) * float(np.median(np.diff(channel.time)))
-            for channel, part in zip(channels, slices, strict=True)
-        ]
-        length = max(_SHORTEST, min(_TIMES * max(times), sum(ends) / _FEWEST))
+    times = [
+        autocorrelation_time([residual[part]]) * float(np.median(np.diff(channel.time)))
+        for channel, part in zip(channels, parts, strict=True)
+    ]
+    length = block_length(ends, max(times))
     found, first = [], 0
     for item, end in zip(dataset.simulations, ends, strict=True):
         count = max(1, round(end / length))
