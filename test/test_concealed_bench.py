@@ -5,6 +5,7 @@ import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -549,3 +550,23 @@ def test_the_unnamed_are_scored_by_variable_place_law_and_prediction() -> None:
         "not repeatable, said so": (1, 2),
         "a right law among those told": (1, 3),
     }
+
+
+@pytest.mark.parametrize(
+    ("draws", "sizes"),
+    [(0.5, (1.0, -0.5)), (0.9, (1.0, -0.9)), (1.8, (0.5, -0.9))],
+)
+def test_what_cancels_an_effect_loses_no_more_than_it_has(
+    monkeypatch: pytest.MonkeyPatch, draws: float, sizes: tuple[float, float]
+) -> None:
+    """The first draws so much of what all of the second's value does."""
+    key = "parameter.physics.friction.viscous.coefficient"
+    first, second = (
+        Hidden(effect, (0, 1, 2), ("all_wheels",), size, "", {})
+        for effect, size in (("contact.roller_drag", 1.0), (key, -0.1))
+    )
+    shifts = {first.effect: draws, second.effect: -0.1}
+    robot = SimpleNamespace(drive=lambda hidden, _: [item.effect for item in hidden])
+    monkeypatch.setattr(oracle, "mean_shift", lambda driven, _: shifts[driven[0]])
+    found = make._balanced(robot, [first, second], None)  # type: ignore[arg-type]
+    assert [item.size for item in found] == pytest.approx(sizes)

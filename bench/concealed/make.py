@@ -37,6 +37,7 @@ from tomr_power_model.messages.plain import NANOSECONDS
 
 REAL_SECONDS, HOLDOUT_SECONDS = (60.0, 85.0), (42.0, 48.0)
 _FIRST_START_S, _LAST_START_S = 1_700_000_000, 1_730_000_000
+_LARGEST_LOSS = 0.9  # of a value
 _LARGEST_BALANCE = 20.0  # times an effect may be scaled to cancel another
 
 
@@ -149,7 +150,12 @@ def _balanced(robot: _Robot, hidden: Sequence[Hidden], mission: _Mission) -> lis
     none = robot.drive((), mission)
     first, second = (oracle.mean_shift(robot.drive([item], mission), none) for item in hidden)
     factor = min(abs(first / second), _LARGEST_BALANCE) * -np.sign(first * second)
-    return [hidden[0], rescaled(hidden[1], float(factor))]
+    # What has less to lose than the first effect draws gets a smaller first effect.
+    share = min(1.0, _LARGEST_LOSS / abs(factor * hidden[1].size))
+    return [
+        rescaled(hidden[0], share) if share < 1.0 else hidden[0],
+        rescaled(hidden[1], float(share * factor)),
+    ]
 
 
 def _recorded(
