@@ -280,3 +280,33 @@ def test_what_is_left_is_looked_into_where_it_is_large_or_names_leave_much(
     monkeypatch.setattr(explain, "unmodelled_effect", lambda *_, is_sure: asked.append(is_sure))
     assert explain._unmodelled(dataset, found, ready) is None  # type: ignore[arg-type]
     assert asked == [False] * looked
+
+
+@pytest.mark.parametrize(
+    ("share", "has_names", "is_repeatable", "told"),
+    [
+        (0.02, True, False, False),  # names explain nearly all
+        (0.04, True, False, True),
+        (0.02, True, True, True),
+        (0.02, False, False, True),
+    ],
+)
+def test_a_little_that_comes_and_goes_beside_names_is_no_finding(
+    monkeypatch: pytest.MonkeyPatch,
+    share: float,
+    has_names: bool,
+    is_repeatable: bool,
+    told: bool,
+) -> None:
+    found = _selection(int(has_names))
+    for state in (found.best, found.without):
+        state.evidence = 0.0  # type: ignore[misc]
+    found.best.model.described = SimpleNamespace(robot=None)  # type: ignore[misc]
+    effect = SimpleNamespace(is_repeatable=is_repeatable, is_large=True, evidence=1e6)
+    dataset = SimpleNamespace(predict=lambda _: (None, None), value=())
+    ready = SimpleNamespace(base=SimpleNamespace(robot=None), scales=None)
+    monkeypatch.setattr(explain, "residuals_of", lambda *_: ())
+    monkeypatch.setattr(explain, "unexplained", lambda _: (share, 0.5))
+    monkeypatch.setattr(explain, "_remainder", lambda *_: None)
+    monkeypatch.setattr(explain, "unmodelled_effect", lambda *_, is_sure: effect)
+    assert (explain._unmodelled(dataset, found, ready) is effect) == told  # type: ignore[arg-type]

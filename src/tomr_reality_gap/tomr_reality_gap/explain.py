@@ -37,6 +37,7 @@ Array = NDArray[np.float64]
 
 _SEVERAL = 2  # names, that one law may stand behind
 _MORE = 1.2  # times noise, or what another model leaves
+_SLIGHT = 0.03  # of the mismatch: where names leave less, what comes and goes is no finding
 _LITTLE = 0.15  # of the noise: what is left of what is drawn is not looked into
 
 
@@ -202,6 +203,8 @@ def _unmodelled(dataset: Dataset, found: Selection, ready: Prepared) -> Unmodell
     gross = is_doubted(share, size, has_names)
     rest = _remainder(dataset, found.best.model)
     effect = unmodelled_effect(rest, robot, ready.scales, is_sure=gross)
+    if effect is not None and has_names and share < _SLIGHT and not effect.is_repeatable:
+        return None
     cost = finding_cost(len(dataset.value))
     named = found.best.evidence - found.without.evidence
     if effect is None or gross:
