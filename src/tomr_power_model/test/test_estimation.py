@@ -19,7 +19,7 @@ from tomr_power_model.estimation.gauss_newton import (
     maximise,
 )
 from tomr_power_model.estimation.intervals import block_jackknife, block_length
-from tomr_power_model.estimation.linear_gaussian import Gram, solve
+from tomr_power_model.estimation.linear_gaussian import Gram, solve, transposed_product
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, per_wheel
 from tomr_power_model.estimation.robust import soft_l1
 from tomr_power_model.robot import read_description
@@ -57,6 +57,10 @@ def test_normal_equations_of_many_rows_weigh_each() -> None:
     np.testing.assert_allclose(found.matrix, whitened.T @ whitened)
     np.testing.assert_allclose(found.vector, whitened.T @ (residual * weight))
     assert found.square == pytest.approx(((residual * weight) ** 2).sum())
+    second = Gram.of(columns, residual, weight, np.array([1]))
+    np.testing.assert_allclose(second.matrix, found.matrix[1:, 1:])
+    np.testing.assert_allclose(second.vector, found.vector[1:])
+    np.testing.assert_allclose(transposed_product(columns, residual), columns.T @ residual)
 
 
 def test_a_linear_problem_takes_one_step(linear: tuple[Array, Array]) -> None:

@@ -26,7 +26,7 @@ from tomr_power_model.unmodelled import FAMILIES, LearntTerm, Motion, motion_of
 from tomr_power_model.unmodelled.described import parameters_of, terms_of
 from tomr_power_model.unmodelled.motion import contacts_at
 from tomr_power_model.unmodelled.online import OnlineTerms
-from tomr_power_model.unmodelled.term import basis_at
+from tomr_power_model.unmodelled.term import value_at
 
 ROBOT = shipped_robot("reference")
 NAMES = ROBOT.wheel_names
@@ -55,7 +55,7 @@ def test_a_table_is_linear_between_its_knots_and_fades_beyond_them() -> None:
     family = FAMILIES["torque.speed"]
     knots = (np.array([1.0, 3.0, 5.0]),)
     at = np.array([[2.0], [5.0], [6.0], [7.0], [0.0], [-9.0]])
-    found = basis_at(family, knots, at) @ np.array([10.0, 20.0, 40.0])
+    found = value_at(family, knots, np.array([10.0, 20.0, 40.0]), at)
     np.testing.assert_allclose(found, [15.0, 40.0, 20.0, 0.0, 5.0, 0.0])
 
 
@@ -63,7 +63,7 @@ def test_a_table_is_linear_between_its_knots_and_fades_beyond_them() -> None:
 def test_a_periodic_table_has_no_end(angle: float) -> None:
     knots = (np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False),)
     rows = np.array([[angle], [angle + 2.0 * np.pi]])
-    found = basis_at(FAMILIES["torque.angle"], knots, rows)
+    found = value_at(FAMILIES["torque.angle"], knots, np.eye(12), rows)
     np.testing.assert_allclose(found[0], found[1], atol=1e-6)
     assert found.sum(axis=1) == pytest.approx([1.0, 1.0])
 

@@ -13,6 +13,8 @@ from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import Channel, channels_of
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
+from tomr_reality_gap.fit.basis_responses import basis_responses
+from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.prepared import integrator_of
 
 
@@ -201,6 +203,33 @@ def test_torques_resist_beside_those_of_the_users_simulation(
     np.testing.assert_array_equal(next(theirs.respond(robot, nothing)), expected)
     np.testing.assert_array_equal(theirs.predict([robot])[0], expected)
     assert np.abs(expected - simulation.predict([robot])[0]).max() > 0.01
+
+
+def test_torques_change_each_recording_by_its_own_however_they_are_portioned(
+    simulation: RecordingSimulation,
+) -> None:
+    count, robot = simulation.timeline.count, simulation.robot
+    first, second = np.random.default_rng(3).normal(0.0, 0.02, (2, 4, count, 3))
+    both = Dataset((simulation, simulation))
+    found = both.changes(robot, [iter([first]), iter([second[:1], second[1:]])])
+    for changes, torques in zip(np.hsplit(found, 2), (first, second), strict=True):
+        plain = simulation.predict([robot])[0]
+        expected = np.stack(list(simulation.respond(robot, torques))) - plain
+        np.testing.assert_allclose(changes, expected, rtol=1e-6, atol=1e-6)
+
+
+def test_responses_to_smooth_torques_are_those_of_each_recordings_own_motion(
+    simulation: RecordingSimulation,
+) -> None:
+    """Of a drive of other commands, beside another or by itself, over the same knots."""
+    drive = simulation.recorded
+    halved = evolve(simulation, recorded=evolve(drive, command=0.5 * drive.command))
+    robot, speed = simulation.robot, ("wheel speed [rad/s]",)
+    pair = basis_responses(Dataset((simulation, halved)), robot, 0.1, only=speed)
+    turned = basis_responses(Dataset((halved, simulation)), robot, 0.1, only=speed)
+    first, second = np.vsplit(pair.responses[0], 2)
+    np.testing.assert_array_equal(np.vsplit(turned.responses[0], 2), [second, first])
+    assert np.abs(first - second).max() > 1e-3
 
 
 def test_power_is_a_mean_over_the_window_of_its_sensor(simulation: RecordingSimulation) -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from tomr_power_model.effects.scales import Scales
 from tomr_power_model.unmodelled import FAMILIES, LearntTerm
+from tomr_power_model.unmodelled.term import smoothness
 from tomr_reality_gap.fit.learnt import Table
 
 SCALES = Scales(
@@ -53,8 +54,30 @@ def test_values_are_as_large_as_what_they_act_on_makes_likely(family: str, size:
     """0.2 N m at each of three wheels of 0.05 m; 2 W at each of three drivers."""
     table = _table(family, SimpleNamespace(time=np.arange(0.0, 30.0, 0.1)[:, None]))
     assert table is not None
-    assert table.size == pytest.approx(size, rel=1e-3)
+    values = np.linalg.norm(table.root, axis=1)
+    np.testing.assert_allclose(values, size, rtol=0.02)  # but for shapes that are too rough
     assert len(table.knots[0]) == 31
+
+
+@pytest.mark.parametrize("family", ["torque.time", "torque.angle", "force.place"])
+def test_the_shapes_of_a_table_make_up_its_smooth_values(family: str) -> None:
+    """Fewer than knots; what is left out of the prior is next to nothing of its largest."""
+    around = np.linspace(-3.0, 3.0, 300)[:, None]
+    motion = SimpleNamespace(time=around + 3.0, angle=around, x=around, y=around)
+    table = _table(family, motion)
+    assert table is not None
+    known, knots, size = FAMILIES[family], table.knots, float(np.linalg.norm(table.root[0]))
+    prior = smoothness(known, knots, 1.5)
+    lacking = prior - table.root @ table.root.T / size**2
+    assert np.linalg.norm(lacking, 2) < 0.02 * np.linalg.norm(prior, 2)
+    assert table.root.shape[1] < 0.9 * len(table.root)
+
+
+def test_units_of_a_term_are_those_that_it_was_made_of() -> None:
+    table = _table("torque.time", SimpleNamespace(time=np.arange(0.0, 30.0, 0.1)[:, None]))
+    assert table is not None
+    units = np.random.default_rng(1).standard_normal((2, table.root.shape[1]))
+    np.testing.assert_allclose(table.units_of(table.term(units, (0, 2))), units, atol=1e-9)
 
 
 @pytest.mark.parametrize(

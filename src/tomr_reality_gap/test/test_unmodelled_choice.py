@@ -5,7 +5,7 @@ from types import MappingProxyType, SimpleNamespace
 
 import pytest
 
-from tomr_power_model.unmodelled import FAMILIES
+from tomr_power_model.unmodelled import FAMILIES, Family
 from tomr_reality_gap import explain
 from tomr_reality_gap.fit import unmodelled
 from tomr_reality_gap.fit.forward_selection import Selection
@@ -39,7 +39,7 @@ def _chosen(
         Tried(SimpleNamespace(family=FAMILIES[name]), share, moments.get(name, -1.0))  # type: ignore[arg-type]
         for name, share in sorted(shares.items(), key=lambda item: -item[1])
     ]
-    monkeypatch.setattr(unmodelled, "families_tried", lambda *_: tried)
+    monkeypatch.setattr(unmodelled, "families_tried", lambda *_, **__: tried)
     monkeypatch.setattr(unmodelled, "fitted", fitted)
     rest = SimpleNamespace(dataset=SimpleNamespace(simulations=()))
     found = unmodelled_effect(rest, None, None, is_sure=is_sure)  # type: ignore[arg-type]
@@ -243,7 +243,7 @@ def test_a_term_is_sought_without_names_that_stood_in_for_it(
         return "data", fewer, effect
 
     monkeypatch.setattr(explain, "_remainder", lambda *_: None)
-    monkeypatch.setattr(explain, "unmodelled_effect", lambda *_: alone)
+    monkeypatch.setattr(explain, "unmodelled_effect", lambda *_, is_repeatable: alone)
     monkeypatch.setattr(explain, "_refitted", lambda _, __, effect: effect)
     monkeypatch.setattr(explain, "_settled", _settled)
     monkeypatch.setattr(explain, "_left", lambda data, *_: left if data == "data" else 100.0)
@@ -310,3 +310,56 @@ def test_a_little_that_comes_and_goes_beside_names_is_no_finding(
     monkeypatch.setattr(explain, "_remainder", lambda *_: None)
     monkeypatch.setattr(explain, "unmodelled_effect", lambda *_, is_sure: effect)
     assert (explain._unmodelled(dataset, found, ready) is effect) == told  # type: ignore[arg-type]
+
+
+def _glanced(
+    monkeypatch: pytest.MonkeyPatch, shares: Mapping[str, float], *, is_repeatable: bool
+) -> tuple[list[str], list[str]]:
+    """Families that were looked at, and those that were looked at closely."""
+    glanced: list[str] = []
+    closely: list[str] = []
+
+    def at_a_glance(*given: object) -> list[Tried]:
+        families: list[type[Family]] = given[-1]  # type: ignore[assignment]
+        glanced.extend(item.family_id for item in families)
+        return [
+            Tried(
+                SimpleNamespace(
+                    family=item, columns=lambda *_, name=item.family_id: closely.append(name)
+                ),  # type: ignore[arg-type]
+                shares.get(item.family_id, 0.0),
+            )
+            for item in families
+        ]
+
+    monkeypatch.setattr(unmodelled, "_at_a_glance", at_a_glance)
+    monkeypatch.setattr(unmodelled, "predicted_share", lambda *_: 0.0)
+    rest = SimpleNamespace(blocks=(None, None), dataset=None)
+    unmodelled.families_tried(
+        rest,
+        None,
+        None,
+        (),
+        least=0.1,
+        is_repeatable=is_repeatable,  # type: ignore[arg-type]
+    )
+    return glanced, closely
+
+
+def test_nothing_but_a_hint_is_looked_into(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Closely: within 0.35 of the best, and 0.1 at least."""
+    shares = {SPEED: 0.3, "torque.current": 0.11, "torque.angle": 0.09}
+    glanced, closely = _glanced(monkeypatch, shares, is_repeatable=False)
+    assert sorted(glanced) == sorted(FAMILIES)
+    assert sorted(closely) == ["torque.current", SPEED]
+    _, closely = _glanced(monkeypatch, {SPEED: 0.5, "torque.current": 0.14}, is_repeatable=False)
+    assert closely == [SPEED]
+
+
+@pytest.mark.parametrize(("share", "is_looked_on"), [(0.09, False), (0.11, True)])
+def test_maps_and_events_are_looked_at_where_a_law_may_stand_behind_names(
+    monkeypatch: pytest.MonkeyPatch, share: float, is_looked_on: bool
+) -> None:
+    glanced, _ = _glanced(monkeypatch, {SPEED: share, FLOOR: 0.9}, is_repeatable=True)
+    assert (FLOOR in glanced) == is_looked_on
+    assert (TIME in glanced) == is_looked_on

@@ -147,7 +147,8 @@ def _instead(
     if names < _SEVERAL or left < _MORE * len(plain.value):
         return None
     bare = found.without.model
-    alone = unmodelled_effect(_remainder(plain, bare), bare.described.robot, scales)
+    rest = _remainder(plain, bare)
+    alone = unmodelled_effect(rest, bare.described.robot, scales, is_repeatable=True)
     if alone is None or not alone.laws or not alone.is_repeatable:
         return None
     tried = _settled(plain, alone, named)

@@ -32,18 +32,25 @@ class Gram:
     square: float  # r^T r
 
     @classmethod
-    def of(cls, columns: Matrix, residual: Array, weight: Array | None = None) -> "Gram":
+    def of(
+        cls,
+        columns: Matrix,
+        residual: Array,
+        weight: Array | None = None,
+        chosen: NDArray[np.intp] | None = None,
+    ) -> "Gram":
         """From columns (n, p), in prior standard deviations, and residuals (n,).
 
-        Both are whitened already, or to be multiplied by `weight`, (n,).
+        Both are whitened already, or to be multiplied by `weight`, (n,); `chosen`: of some columns.
         """
-        count = columns.shape[1]
+        count = columns.shape[1] if chosen is None else len(chosen)
         matrix, vector = np.zeros((count, count)), np.zeros(count)
         weight = np.ones(len(residual)) if weight is None else weight
         whitened = residual * weight
         for first in range(0, len(residual), _ROWS):
             rows = slice(first, first + _ROWS)
-            part = columns[rows] * weight[rows, None]
+            own = columns[rows] if chosen is None else columns[rows, chosen]
+            part = own * weight[rows, None]
             matrix += part.T @ part
             vector += part.T @ whitened[rows]
         return cls(matrix, vector, float(whitened @ whitened))
@@ -53,6 +60,14 @@ def product(columns: Matrix, units: Array) -> Array:
     """Columns (n, p) times units (p,), in double precision."""
     parts = [columns[row : row + _ROWS] @ units for row in range(0, len(columns), _ROWS)]
     return np.concatenate([np.empty(0), *parts])
+
+
+def transposed_product(columns: Matrix, values: Array) -> Array:
+    """Columns (n, p), transposed, times values (n,), in double precision."""
+    found = np.zeros(columns.shape[1])
+    for row in range(0, len(columns), _ROWS):
+        found += values[row : row + _ROWS] @ columns[row : row + _ROWS]
+    return found
 
 
 @frozen

@@ -59,7 +59,7 @@ class Local:
     """Columns that show in some rows only."""
 
     rows: NDArray[np.intp]  # (m,)
-    matrix: Array  # (m, k)
+    matrix: Matrix  # (m, k)
 
 
 def rows_of(channels: Sequence[Channel]) -> list[slice]:
@@ -95,10 +95,10 @@ def noise_of(
         variance[part] = _scale(residual[part], least[-1]) ** 2
     times = np.ones(len(rows))
     outlier = np.ones_like(residual)
-    columns = columns[:, _distinct(columns, _weight(rows, variance, times, outlier))]
+    chosen = _distinct(columns, _weight(rows, variance, times, outlier))
     for _ in range(_ROUNDS):
         weight = _weight(rows, variance, times, outlier)
-        left = _left(columns, residual, weight, local)
+        left = _left(columns, chosen, residual, weight, local)
         for number, (channel, part) in enumerate(zip(channels, rows, strict=True)):
             noise = left[part]
             variance[part] = _variance(
@@ -127,25 +127,33 @@ def _distinct(columns: Matrix, weight: Array) -> NDArray[np.intp]:
     return np.sort(pivots[:rank] - 1)
 
 
-def _left(columns: Matrix, residual: Array, weight: Array, local: Sequence[Local]) -> Array:
-    """What a ridge regression on all columns leaves.
+def _left(
+    columns: Matrix,
+    chosen: NDArray[np.intp],
+    residual: Array,
+    weight: Array,
+    local: Sequence[Local],
+) -> Array:
+    """What a ridge regression on chosen columns and on local ones leaves.
 
     Local columns of different rows meet in the others only, so their blocks are eliminated:
     (A - sum C_w D_w^-1 C_w^T) x = a - sum C_w D_w^-1 d_w.
     """
-    wanted, gram = residual * weight, Gram.of(columns, residual, weight)
-    matrix, vector = gram.matrix + _RIDGE * np.eye(columns.shape[1]), gram.vector.copy()
+    wanted, gram = residual * weight, Gram.of(columns, residual, weight, chosen)
+    matrix, vector = gram.matrix + _RIDGE * np.eye(len(chosen)), gram.vector.copy()
     blocks = []
     for item in local:
         own = item.matrix * weight[item.rows, None]
-        cross = columns[item.rows].T @ (own * weight[item.rows, None])
+        cross = columns[np.ix_(item.rows, chosen)].T @ (own * weight[item.rows, None])
         inner = own.T @ own + _RIDGE * np.eye(own.shape[1])
         solved = np.linalg.solve(inner, np.column_stack([cross.T, own.T @ wanted[item.rows]]))
         matrix -= cross @ solved[:, :-1]
         vector -= cross @ solved[:, -1]
         blocks.append(solved)
     found = np.asarray(np.linalg.solve(matrix, vector), dtype=np.float64)
-    left = residual - product(columns, found)
+    everywhere = np.zeros(columns.shape[1])
+    everywhere[chosen] = found
+    left = residual - product(columns, everywhere)
     for item, solved in zip(local, blocks, strict=True):
         left[item.rows] -= item.matrix @ (solved[:, -1] - solved[:, :-1] @ found)
     return np.asarray(left)

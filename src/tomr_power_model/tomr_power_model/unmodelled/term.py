@@ -88,17 +88,11 @@ def _of_place(coordinates: Array, wheel: int) -> Array:
     return coordinates[:, min(wheel, coordinates.shape[1] - 1)]
 
 
-def basis_at(family: type[Family], knots: tuple[Array, ...], at: Array) -> Array:
-    """Weights of a table's values at some coordinates (m, axes), (m, k): the last axis fastest."""
-    found = np.zeros((len(at), math.prod(len(points) for points in knots)))
-    for index, weight in _corners(family, knots, at):
-        np.add.at(found, (np.arange(len(at)), index), weight)
-    return found
-
-
 def value_at(family: type[Family], knots: tuple[Array, ...], values: Array, at: Array) -> Array:
-    """A table (k,) at some coordinates (m, axes), (m,)."""
-    return np.asarray(sum(weight * values[index] for index, weight in _corners(family, knots, at)))
+    """A table (k,), or several of them (k, r), at some coordinates (m, axes), (m,) or (m, r)."""
+    wide = (..., *(None for _ in values.shape[1:]))
+    corners = _corners(family, knots, at)
+    return np.asarray(sum(weight[wide] * values[index] for index, weight in corners))
 
 
 def _corners(

@@ -172,6 +172,14 @@ class RecordingSimulation:
             torques = torques + self.resisting
         return self._shown([evolve(one, resisting=torque) for torque in torques])
 
+    def changes(self, robot: Robot, torques: Array) -> NDArray[np.float32]:
+        """What such torques change in the values, (v, n)."""
+        found = np.empty((len(torques), self.size), dtype=np.float32)
+        plain = self.predict([robot])[0]
+        for row, value in enumerate(self.respond(robot, torques)):
+            found[row] = value - plain
+        return found
+
     def run(self, robot: Robot) -> Run:
         """What happens to a robot in the drive."""
         steps, line = drive(self._variant(robot), self.excitation, WHEELS), self.timeline

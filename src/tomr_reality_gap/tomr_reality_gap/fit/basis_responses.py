@@ -1,6 +1,6 @@
 """What smooth torques of one variable would show: radial basis functions for unmodelled effects."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tomr_power_model.estimation.noise import Local, rows_of
 from tomr_power_model.robot import WHEELS, Robot
+from tomr_power_model.unmodelled import Motion
 from tomr_reality_gap.alignment.channels import MOTOR_KINDS
 from tomr_reality_gap.alignment.motion import motion_in
 from tomr_reality_gap.fit.dataset import Dataset
@@ -24,7 +25,9 @@ class BasisResponses:
     """Families of torques and what they do to every channel."""
 
     families: tuple[Family, ...]
-    responses: tuple[Array, ...]  # of each family, all wheels resisting at once, (n, k)
+    responses: tuple[
+        NDArray[np.float32], ...
+    ]  # of each family, all wheels resisting at once, (n, k)
     size: float  # N m, of each basis function
     rows: tuple[NDArray[np.intp], ...]  # of each wheel's own channels; the total's without any
 
@@ -58,11 +61,16 @@ def basis_responses(
         family for family in families(motions, orders) if only is None or family.variable in only
     )
     size = _SIZE * torque
-    torques = [np.concatenate([size * item.torques(one) for item in tried]) for one in motions]
-    response = dataset.respond(robot, torques) - dataset.predict([robot])[0]
+    response = dataset.changes(robot, [_torques(tried, one, size) for one in motions])
     edges = np.cumsum([0, *(len(item.knots) for item in tried)])
     parts = tuple(response[first:last].T for first, last in pairwise(edges))
     return BasisResponses(tried, parts, size, tuple(own_rows(dataset)))
+
+
+def _torques(tried: Sequence[Family], motion: Motion, size: float) -> Iterator[Array]:
+    """Family by family, (k, count, 3): memory holds one at a time."""
+    for family in tried:
+        yield size * family.torques(motion)
 
 
 def own_rows(dataset: Dataset) -> Sequence[NDArray[np.intp]]:

@@ -1,6 +1,6 @@
 """Recordings to be explained, as numbers."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from attrs import field, frozen
@@ -11,7 +11,6 @@ from tomr_reality_gap.alignment.channels import DRAWN_KINDS, Channel
 from tomr_reality_gap.alignment.simulation import (
     RecordingSimulation,
     Tick,
-    filled,
     predict_all,
 )
 
@@ -48,32 +47,51 @@ class Dataset:
         return predict_all(self.simulations, robots, tick, later)
 
     def with_time_derivative(
-        self, robot: Robot, others: Sequence[Robot], scale: Array, tick: Tick = lambda done: None
-    ) -> tuple[Array, Array, NDArray[np.float32]]:
-        """Values of a robot, their derivative in time, (n,) each, and what others change in them.
+        self,
+        robot: Robot,
+        others: Sequence[Robot],
+        *,
+        scale: Array,
+        into: Sequence[NDArray[np.float32]],
+        tick: Tick = lambda done: None,
+    ) -> tuple[Array, Array]:
+        """Values of a robot and their derivative in time, (n,) each.
 
         Args:
             robot: the robot.
             others: others.
             scale: what each of them changes is multiplied by this, (v,).
+            into: where that goes, of each of them, (n,).
             tick: called for each simulated robot.
         """
         value, slope, first = np.empty_like(self.value), np.empty_like(self.value), 0
-        changes = np.empty((len(others), len(value)), dtype=np.float32)
         for item in self.simulations:
             part = slice(first, first := first + item.size)
             shown = item.predicted([robot, *others], tick, (_DELAY_STEP,))
             value[part] = next(shown)
-            for row in range(len(others)):
-                changes[row, part] = (next(shown) - value[part]) * scale[row]
+            for factor, row in zip(scale, into, strict=True):
+                row[part] = (next(shown) - value[part]) * factor
             slope[part] = (value[part] - next(shown)) / _DELAY_STEP
-        return value, slope, changes
+        return value, slope
 
-    def respond(self, robot: Robot, torques: Sequence[Array]) -> Array:
-        """As `RecordingSimulation.respond`, torques one array (v, count, 3) per recording."""
-        found = np.empty((len(torques[0]), len(self.value)))
-        pairs = zip(self.simulations, torques, strict=True)
-        return filled(found, (item.respond(robot, torque) for item, torque in pairs))
+    def changes(self, robot: Robot, torques: Sequence[Iterable[Array]]) -> NDArray[np.float32]:
+        """What torques that resist besides change in all values, (v, n).
+
+        Args:
+            robot: one robot.
+            torques: one iterable per recording, of portions (any, count, 3) that make v in all.
+        """
+        columns = [
+            np.concatenate([item.changes(robot, portion) for portion in portions])
+            for item, portions in zip(self.simulations, torques, strict=True)
+        ]
+        return np.concatenate(columns, axis=1)
+
+    @property
+    def sensor_count(self) -> int:
+        """How many `sensor_nuisances` there are."""
+        own = {**dict.fromkeys(DRAWN_KINDS, 1), "yaw": 2}
+        return len(self.simulations) + sum(own.get(channel.kind, 0) for channel in self.channels)
 
     def sensor_nuisances(self, value: Array, time_derivative: Array) -> Array:
         """Derivatives by what the sensors may be off, in units of prior_stds, (n, k).

@@ -64,33 +64,39 @@ def linearise(
             robots.append(started.offset([parameter], [step]).robot)
             steps.append(step)
             parameters.append(parameter)
-    scale = prior_stds(parameters) / np.array(steps)
-    value, time_derivative, changes = dataset.with_time_derivative(
-        described.robot, robots, scale, tick
+    first, edge = len(model.nuisances), len(model.nuisances) + dataset.sensor_count
+    kept = edge + len(model.own)
+    matrix = np.empty(
+        (kept + sum(len(c.sizes) for c in candidates), len(dataset.value)), np.float32
     )
-    sensors = dataset.sensor_nuisances(value, time_derivative)
-    first, own = len(model.nuisances), len(model.own)
-    nuisance: Matrix
-    others: list[Matrix]
     if before is None:
-        nuisance, mine = changes[:first], changes[first : first + own]
-        others = [changes[first + own :]]
+        into = [*matrix[:first], *matrix[edge:]]
     else:
-        nuisance, mine = before.matrix[:, before.nuisance].T, changes
-        others = [before.matrix[:, before.candidates[item.key]].T for item in candidates]
-    edge = first + sensors.shape[1]
-    parts, found = [], {}
+        into = list(matrix[edge:kept])
+        old = [before.nuisance, *(before.candidates[item.key] for item in candidates)]
+        matrix[:first] = before.matrix[:, old[0]].T
+        if candidates:
+            np.concatenate([before.matrix[:, part].T for part in old[1:]], out=matrix[kept:])
+    value, time_derivative = dataset.with_time_derivative(
+        described.robot,
+        robots,
+        scale=prior_stds(parameters) / np.array(steps),
+        into=into,
+        tick=tick,
+    )
+    matrix[first:edge] = dataset.sensor_nuisances(value, time_derivative).T
+    parts, found, at = [], {}, edge
     for hypothesis in model.hypotheses:
-        parts.append(slice(edge, edge := edge + len(hypothesis.parameters)))
+        parts.append(slice(at, at := at + len(hypothesis.parameters)))
     for candidate in candidates:
-        found[candidate.key] = slice(edge, edge := edge + len(candidate.sizes))
+        found[candidate.key] = slice(at, at := at + len(candidate.sizes))
     return Jacobian(
         model,
         value,
         time_derivative,
-        np.concatenate([nuisance, sensors.T, mine, *others], dtype=np.float32).T,
+        matrix.T,
         slice(0, first),
-        slice(first, first + sensors.shape[1]),
+        slice(first, edge),
         tuple(parts),
         found,
     )

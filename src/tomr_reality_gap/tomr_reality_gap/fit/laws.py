@@ -135,8 +135,8 @@ class _Misfit:
         values, vectors = np.linalg.eigh(evidence.matrix)
         kept = values > _NEGLIGIBLE * values.max()
         root = np.sqrt(values[kept])
-        units = vectors[:, kept].T.reshape(len(root), -1, len(table.root))
-        matrix = root[:, None, None] * (units @ np.linalg.inv(table.root))
+        units = vectors[:, kept].T.reshape(len(root), -1, table.root.shape[1])
+        matrix = root[:, None, None] * (units @ np.linalg.pinv(table.root))
         target = (vectors[:, kept].T @ evidence.vector) / root
         return cls(matrix.reshape(len(root), -1), target, evidence.inflation)
 

@@ -1,6 +1,6 @@
 """Terms without a name as columns: what each value of their table does to every channel."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from attrs import evolve, frozen
@@ -9,16 +9,19 @@ from numpy.typing import NDArray
 from tomr_power_model.effects.scales import Scales
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_power_model.unmodelled import Actions, Family, LearntTerm, Motion
-from tomr_power_model.unmodelled.term import basis_at, smoothness
+from tomr_power_model.unmodelled.term import smoothness, value_at
 from tomr_reality_gap.alignment.motion import motion_in
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit.basis_responses import own_rows
 from tomr_reality_gap.fit.dataset import Dataset
 
 Array = NDArray[np.float64]
+Columns = NDArray[np.float32]  # memory counts: a map has hundreds
 
 _MOST_KNOTS = {1: 90, 2: 24}  # by the number of variables
 _LENGTH = 1.5  # knots over which a table is smooth
+_ROUGH = 1e-3  # of the variance of its smoothest shape: shapes with less are left out
+_AT_ONCE = 32  # torques that are kept in memory at a time
 _LEAST_FLOOR = 0.2  # m: who goes no farther sees no floor
 _SMALL = 1e-9
 _ALL = -1  # wheels at once
@@ -61,7 +64,7 @@ class Table:
 
     family: type[Family]
     knots: tuple[Array, ...]
-    root: Array  # values = root @ units of N(0, 1), (k, k)
+    root: Array  # values = root @ units of N(0, 1), smooth ones, (k, r)
 
     @classmethod
     def over(
@@ -87,13 +90,10 @@ class Table:
             "supply": 3.0 * scales.power,
         }[family.acts]
         found = tuple(knots)
-        root = np.linalg.cholesky(smoothness(family, found, _LENGTH))
-        return cls(family, found, np.asarray(size * root, dtype=np.float64))
-
-    @property
-    def size(self) -> float:
-        """Standard deviation of a value, in the term's unit."""
-        return float(np.linalg.norm(self.root[0]))
+        variance, modes = np.linalg.eigh(smoothness(family, found, _LENGTH))
+        kept = variance > _ROUGH * variance[-1]
+        root = size * modes[:, kept] * np.sqrt(variance[kept])
+        return cls(family, found, np.asarray(root, dtype=np.float64))
 
     @property
     def rows(self) -> int:
@@ -122,8 +122,8 @@ class Table:
         motions: Sequence[Motion],
         *,
         is_exact: bool = True,
-    ) -> list[Array]:
-        """What the units of each row do to every value, (n, k) each.
+    ) -> list[Columns]:
+        """What the units of each row do to every value, (n, r) each.
 
         Unless exact, torques of each wheel are simulated at all wheels at once, and what one
         wheel's do to the others is left out.
@@ -142,44 +142,48 @@ class Table:
             found.append(part)
         return found
 
-    def _drawn(self, dataset: Dataset, motions: Sequence[Motion], place: int) -> Array:
+    def units_of(self, term: LearntTerm) -> Array:
+        """Units of each row of a term that was made of them, (rows, r)."""
+        return np.asarray(term.values @ np.linalg.pinv(self.root).T)
+
+    def _drawn(self, dataset: Dataset, motions: Sequence[Motion], place: int) -> Columns:
         found = []
         for simulation, motion in zip(dataset.simulations, motions, strict=True):
-            basis = self._basis(motion, place) @ self.root
-            none = np.zeros_like(motion.speed)
-            columns = []
-            for column in basis.T:
+            none, rows = np.zeros_like(motion.speed), []
+            for column in self._shapes(motion, place, self.root).T:
                 driver, supply = none.copy(), np.zeros(len(none))
                 if self.family.acts == "driver":
                     driver[:, place] = column
                 else:
                     supply = column
-                columns.append(power_rows(simulation, Actions(none, driver, supply)))
-            found.append(np.stack(columns, axis=1))
+                rows.append(power_rows(simulation, Actions(none, driver, supply)))
+            found.append(np.stack(rows, axis=1).astype(np.float32))
         return np.concatenate(found)
 
     def _responses(
         self, dataset: Dataset, robot: Robot, motions: Sequence[Motion], row: int
-    ) -> Array:
+    ) -> Columns:
         """Simulated: of a component of a force, of a wheel, or (`_ALL`) of all wheels at once."""
-        wheels = range(WHEELS) if row == _ALL else (0 if self.family.acts == "force" else row,)
-        basis = [np.stack([self._basis(item, wheel).T for wheel in wheels]) for item in motions]
-        # A map of a floor has many knots where no wheel ever was.
-        visited = np.any([item.any(axis=(0, 2)) for item in basis], axis=0)
-        torques = []
-        for motion, part in zip(motions, basis, strict=True):
-            values = self.size * part[:, visited]
-            if self.family.acts == "force":
-                pairs = [(x, 0.0 * x) if row == 0 else (0.0 * x, x) for x in values[0]]
-                torques.append(np.stack([motion.resisting(*pair) for pair in pairs]))
-                continue
-            torques.append(np.zeros((*values.shape[1:], WHEELS)))
-            torques[-1][..., list(wheels)] = np.moveaxis(values, 0, -1)
-        response = dataset.respond(robot, torques) - dataset.predict([robot])[0]
-        return np.asarray(response.T @ (self.root[visited] / self.size))
+        torques = [self._torques(motion, row) for motion in motions]
+        return np.ascontiguousarray(dataset.changes(robot, torques).T)
 
-    def _basis(self, motion: Motion, place: int) -> Array:
+    def _torques(self, motion: Motion, row: int) -> Iterator[Array]:
+        """Those of each unit in each driver period, some units at a time, (any, count, 3)."""
+        for first in range(0, self.root.shape[1], _AT_ONCE):
+            part = self.root[:, first : first + _AT_ONCE]
+            if self.family.acts == "force":
+                forces = self._shapes(motion, 0, part).T
+                pairs = [(x, 0.0 * x) if row == 0 else (0.0 * x, x) for x in forces]
+                yield np.stack([motion.resisting(*pair) for pair in pairs])
+                continue
+            found = np.zeros((part.shape[1], *motion.speed.shape))
+            for wheel in range(WHEELS) if row == _ALL else (row,):
+                found[..., wheel] = self._shapes(motion, wheel, part).T
+            yield found
+
+    def _shapes(self, motion: Motion, place: int, root: Array) -> Array:
+        """What some units do there in each driver period, (count, any)."""
         coordinates, factor = self.family.coordinates(motion), self.family.factor(motion)
         at = coordinates[:, min(place, coordinates.shape[1] - 1)]
-        column = factor[:, min(place, factor.shape[1] - 1)]
-        return np.asarray(basis_at(self.family, self.knots, at) * column[:, None])
+        values = value_at(self.family, self.knots, root, at)
+        return np.asarray(values * factor[:, [min(place, factor.shape[1] - 1)]])

@@ -26,8 +26,8 @@ def changes_of(
     """What each of some terms adds to every value, (v, n)."""
     found = [[term.actions(motion) for term in terms] for motion in motions]
     if terms[0].family.acts in ("torque", "force"):
-        torques = [np.stack([item.torque for item in row]) for row in found]
-        return np.asarray(dataset.respond(robot, torques) - dataset.predict([robot])[0])
+        torques = [[np.stack([item.torque for item in row])] for row in found]
+        return np.asarray(dataset.changes(robot, torques), dtype=np.float64)
     return np.concatenate(
         [
             np.stack([power_rows(simulation, item) for item in row])

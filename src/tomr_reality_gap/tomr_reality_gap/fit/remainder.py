@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.estimation.linear_gaussian import Gram, solve
+from tomr_power_model.estimation.linear_gaussian import Gram, Matrix, product, solve
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.statistics import robust_scale
 from tomr_reality_gap.fit.dataset import Dataset
@@ -43,7 +44,11 @@ class Remainder:
         shown = (columns @ vectors[:, values > _SHOWS]) * weight[:, None]
         return cls(dataset, residual * weight, np.asarray(shown, dtype=np.float64), weight)
 
-    @property
+    def beside(self, columns: Sequence[Matrix]) -> Matrix:
+        """Whitened columns beside the base, (n, q + p)."""
+        return np.concatenate([self.base.astype(np.float32), *columns], axis=1)
+
+    @cached_property
     def blocks(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Stretch and moment of each row."""
         stretch, moment = [], []
@@ -62,15 +67,19 @@ def _scatter(value: Array, residual: Array, quantum: float) -> float:
     return float(np.sqrt(max(noise, quantum**2 / 12.0) + (_INEXACT * np.std(value)) ** 2)) + 1e-12
 
 
-def predicted_share(rest: Remainder, columns: Sequence[Array], labels: NDArray[np.intp]) -> float:
+def whitened(columns: Matrix, weight: Array) -> NDArray[np.float32]:
+    """Columns (n, p) times weights (n,)."""
+    return np.asarray(columns * weight.astype(np.float32)[:, None], dtype=np.float32)
+
+
+def predicted_share(rest: Remainder, columns: Sequence[Matrix], labels: NDArray[np.intp]) -> float:
     """Share of what is left, beyond noise, that columns predict of blocks left out one by one.
 
     At most 1, at least -1: predicted worse than by nothing. NaN where no more than noise is left.
     """
-    own = np.concatenate(columns, axis=1) * rest.weight[:, None]
     without, beside = (
         _squares_unfitted(rest.residual, part, labels)
-        for part in (rest.base, np.concatenate([rest.base, own], axis=1))
+        for part in (rest.base, rest.beside([whitened(part, rest.weight) for part in columns]))
     )
     # Channel by channel: one that the model knows better than its noise hides none of the others'.
     parts = rows_of(rest.dataset.channels)
@@ -85,7 +94,7 @@ def predicted_share(rest: Remainder, columns: Sequence[Array], labels: NDArray[n
     return max(-1.0, min(1.0, float((without - beside).sum()) / beyond))
 
 
-def _squares_unfitted(residual: Array, columns: Array, labels: NDArray[np.intp]) -> Array:
+def _squares_unfitted(residual: Array, columns: Matrix, labels: NDArray[np.intp]) -> Array:
     """Squares of what columns leave of each block, fitted to the others, (n,)."""
     blocks = [labels == label for label in np.unique(labels)]
     grams = [Gram.of(columns[rows], residual[rows]) for rows in blocks]
@@ -94,5 +103,5 @@ def _squares_unfitted(residual: Array, columns: Array, labels: NDArray[np.intp])
     left = residual.copy()
     for rows, gram in zip(blocks, grams, strict=True):
         others = Gram(matrix - gram.matrix, vector - gram.vector, 0.0)
-        left[rows] -= columns[rows] @ solve(others, range(columns.shape[1])).mean
+        left[rows] -= product(columns[rows], solve(others, range(columns.shape[1])).mean)
     return np.asarray(left**2)

@@ -15,7 +15,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.estimation.linear_gaussian import Gram, solve
+from tomr_power_model.estimation.linear_gaussian import Gram, solve, transposed_product
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection
 from tomr_reality_gap.fit.model import Model
@@ -47,7 +47,7 @@ class Responses:
         fewer = best.model.without(number)
         values = self.dataset.predict([best.model.described.robot, fewer.described.robot])
         lacking = (self.dataset.value - best.value + values[0] - values[1]) * weight
-        vector = np.asarray((lacking * weight) @ jacobian.matrix, dtype=np.float64)
+        vector = transposed_product(jacobian.matrix, lacking * weight)
         gram = Gram(self._gram.matrix, vector, float(lacking @ lacking))
         base = list(range(jacobian.sensors.stop))
         pairs = zip(jacobian.model.hypotheses, jacobian.own, strict=True)

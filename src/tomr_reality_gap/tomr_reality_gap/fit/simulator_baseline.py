@@ -10,7 +10,7 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.estimation.linear_gaussian import Gram, Matrix, solve
+from tomr_power_model.estimation.linear_gaussian import Gram, Matrix, product, solve
 from tomr_power_model.estimation.noise import Noise, rows_of
 from tomr_power_model.estimation.parameter import prior_stds
 from tomr_power_model.robot import Robot
@@ -79,9 +79,8 @@ class SimulatorBaseline:
         parts = table.columns(self.dataset, robot, motions)
         chosen = [parts[number] for number in table.rows_of(term)]
         columns = np.concatenate(chosen, axis=1)
-        theirs = columns @ self._fitted(columns) * self.weight
-        units = [np.linalg.solve(table.root, values) for values in term.values]
-        ours = columns @ np.concatenate(units) * self.weight
+        theirs = product(columns, self._fitted(columns)) * self.weight
+        ours = product(columns, table.units_of(term).ravel()) * self.weight
         return float(theirs @ ours) > _HALF * float(ours @ ours)
 
     def _fitted(self, columns: Matrix) -> Array:

@@ -55,7 +55,7 @@ def discrepancy_torques(
         return None
     dataset = Dataset(tuple(simulations))
     basis = basis_responses(dataset, robot, torque, only=_VARIABLES)
-    value, time_derivative, _ = dataset.with_time_derivative(robot, (), np.empty(0))
+    value, time_derivative = dataset.with_time_derivative(robot, (), scale=np.empty(0), into=())
     residual, nothing = dataset.value - value, np.zeros((len(dataset.value), 1))
     local = basis.local
     weight = noise_of(

@@ -13,7 +13,7 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.effects.scales import Scales
-from tomr_power_model.estimation.linear_gaussian import Gram, solve
+from tomr_power_model.estimation.linear_gaussian import Gram, Matrix, product, solve
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.statistics import autocorrelation_time
 from tomr_power_model.robot import WHEELS, Robot
@@ -25,7 +25,7 @@ from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.laws import Evidence, laws_of
 from tomr_reality_gap.fit.learnt import Table
 from tomr_reality_gap.fit.polish import changes_of, polished
-from tomr_reality_gap.fit.remainder import Remainder, predicted_share
+from tomr_reality_gap.fit.remainder import Remainder, predicted_share, whitened
 
 Array = NDArray[np.float64]
 
@@ -38,6 +38,7 @@ _LAW = 0.8  # of the squares that are left: a law that explains so much is no ch
 _AS_MUCH = 0.95  # of what a wider family predicts
 _ALIKE = 0.02  # shares that tell no more of one family than of another
 _NEAR = 0.35  # of the best share: worth a closer look
+_HINT = 0.1  # share that shows at a glance of what will predict `_TOLD`: no closer look gave less
 _EVENT = 0.45  # of what a term of time explains: as much of it, and it is repeatable
 
 
@@ -79,14 +80,21 @@ class Tried:
 
 
 def unmodelled_effect(
-    rest: Remainder, robot: Robot, scales: Scales, *, is_sure: bool = False
+    rest: Remainder,
+    robot: Robot,
+    scales: Scales,
+    *,
+    is_sure: bool = False,
+    is_repeatable: bool = False,
 ) -> Unmodelled | None:
     """The term that predicts most of what is left, if any predicts enough of it.
 
-    `is_sure`: something is there, whatever it is.
+    `is_sure`: something is there, whatever it is; `is_repeatable`: what another drive would not
+    repeat is not asked for.
     """
     motions = [motion_in(item, robot) for item in rest.dataset.simulations]
-    tried = families_tried(rest, robot, scales, motions)
+    least = -1.0 if is_sure else _HINT
+    tried = families_tried(rest, robot, scales, motions, least=least, is_repeatable=is_repeatable)
     if not tried:
         return None
     event = next((item for item in tried if item.table.family.is_event), None)
@@ -150,49 +158,82 @@ def _narrowest(tried: Sequence[Tried]) -> Tried | None:
 
 
 def families_tried(
-    rest: Remainder, robot: Robot, scales: Scales, motions: Sequence[Motion]
+    rest: Remainder,
+    robot: Robot,
+    scales: Scales,
+    motions: Sequence[Motion],
+    *,
+    least: float = -1.0,
+    is_repeatable: bool = False,
 ) -> list[Tried]:
-    """All families that the recordings can show, best first; none where only noise is left."""
-    stretch, moment = rest.blocks
-    kinds = {channel.kind for channel in rest.dataset.channels}
-    found = []
-    for family in FAMILIES.values():
+    """All families that the recordings can show, best first; none where only noise is left.
+
+    Args:
+        rest: what is left of the recordings.
+        robot: of which it is left.
+        scales: how large terms may be.
+        motions: of the robot in the recordings.
+        least: share that must show at a glance for a closer look.
+        is_repeatable: none at all unless one that another drive would repeat shows as much.
+    """
+    # A map of the floor costs as much as all others, and no names are like it.
+    first = [item for item in FAMILIES.values() if not (item.is_event or item.is_shared)]
+    found = _at_a_glance(rest, robot, scales, motions, first)
+    if is_repeatable and max((item.share for item in found), default=-1.0) < least:
+        return []
+    others = [item for item in FAMILIES.values() if item.is_event or item.is_shared]
+    found += _at_a_glance(rest, robot, scales, motions, others)
+    most = max((item.share for item in found), default=0.0)
+    for number, item in enumerate(found):
+        if item.table.family.acts == "torque" and item.share > max(most - _NEAR, least):
+            columns = item.table.columns(rest.dataset, robot, motions)
+            share = predicted_share(rest, columns, _blocks(rest, item.table.family))
+            found[number] = evolve(item, share=share)
+    return sorted(found, key=lambda item: -item.share)
+
+
+def _at_a_glance(
+    rest: Remainder,
+    robot: Robot,
+    scales: Scales,
+    motions: Sequence[Motion],
+    families: Sequence[type[Family]],
+) -> list[Tried]:
+    """Some families, what one wheel's torque does to the others left out."""
+    kinds, found = {channel.kind for channel in rest.dataset.channels}, []
+    for family in families:
         seen = {"driver": "power", "supply": "total"}.get(family.acts)
         table = Table.over(family, motions, scales)
         if table is None or (seen is not None and seen not in kinds):
             continue
-        labels = moment if family.is_event else stretch
         columns = table.columns(rest.dataset, robot, motions, is_exact=False)
-        share = predicted_share(rest, columns, labels)
-        if math.isnan(share):
-            continue
-        found.append(Tried(table, share))
-        if family.is_shared:
-            found[-1] = Tried(table, share, predicted_share(rest, columns, moment))
-    most = max((item.share for item in found), default=0.0)
-    for number, item in enumerate(found):
-        family = item.table.family
-        if family.acts == "torque" and item.share > most - _NEAR:
-            columns = item.table.columns(rest.dataset, robot, motions)
-            labels = moment if family.is_event else stretch
-            found[number] = evolve(item, share=predicted_share(rest, columns, labels))
-    return sorted(found, key=lambda item: -item.share)
+        share = predicted_share(rest, columns, _blocks(rest, family))
+        if not math.isnan(share):
+            moments = predicted_share(rest, columns, rest.blocks[1]) if family.is_shared else -1.0
+            found.append(Tried(table, share, moments))
+    return found
+
+
+def _blocks(rest: Remainder, family: type[Family]) -> NDArray[np.intp]:
+    """What is left out by turns: moments of what says when, stretches of all else."""
+    stretch, moment = rest.blocks
+    return moment if family.is_event else stretch
 
 
 def refitted(rest: Remainder, effect: Unmodelled, robot: Robot) -> Unmodelled:
     """The same term, fitted anew to what another model leaves."""
     motions, table = [motion_in(item, robot) for item in rest.dataset.simulations], effect.table
-    stretch, moment = rest.blocks
     columns = table.columns(rest.dataset, robot, motions)
-    share = predicted_share(rest, columns, moment if table.family.is_event else stretch)
-    again = predicted_share(rest, columns, moment) if table.family.is_shared else share
+    share = predicted_share(rest, columns, _blocks(rest, table.family))
+    again = predicted_share(rest, columns, rest.blocks[1]) if table.family.is_shared else share
     return fitted(rest, Tried(table, max(share, again)), robot, motions)
 
 
 def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]) -> Unmodelled:
     """A family's table at the wheels that show it, or at all where its law holds for them too."""
-    columns = best.table.columns(rest.dataset, robot, motions)
-    columns = [part * rest.weight[:, None] for part in columns]
+    columns: list[Matrix] = [
+        whitened(part, rest.weight) for part in best.table.columns(rest.dataset, robot, motions)
+    ]
     every = list(range(len(columns)))
     rows = _rows_shown(rest, best.table, columns)
     found = _fitted_at(rest, best, robot, motions, [columns[row] for row in rows], rows)
@@ -209,13 +250,13 @@ def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]
     return _fitted_at(rest, best, robot, motions, columns, every)
 
 
-def _rows_shown(rest: Remainder, table: Table, columns: Sequence[Array]) -> list[int]:
+def _rows_shown(rest: Remainder, table: Table, columns: Sequence[Matrix]) -> list[int]:
     """Rows of a table at the wheels that show it; all where it acts elsewhere."""
     rows = list(range(len(columns)))
     if not table.wheels(rows) or table.family.is_shared:
         return rows
     units, _, _ = _solved(rest, columns)
-    energy = [float(((c @ u) ** 2).sum()) for c, u in zip(columns, units, strict=True)]
+    energy = [float((product(c, u) ** 2).sum()) for c, u in zip(columns, units, strict=True)]
     return [row for row in rows if energy[row] > _WHEEL_SHARE * max(energy)]
 
 
@@ -224,7 +265,7 @@ def _fitted_at(
     best: Tried,
     robot: Robot,
     motions: Sequence[Motion],
-    columns: Sequence[Array],
+    columns: Sequence[Matrix],
     rows: Sequence[int],
 ) -> Unmodelled:
     """Of some rows, whose whitened columns are given."""
@@ -235,9 +276,9 @@ def _fitted_at(
         np.sqrt(np.einsum("ij,jk,ik->i", table.root, covariance[part, part], table.root))
         for part in (slice(n * count, (n + 1) * count) for n in range(len(units)))
     ]
-    joined = np.concatenate(columns, axis=1)
-    own, term = joined @ np.concatenate(units), table.term(units, table.wheels(rows))
-    equations, change = _normal_equations(rest, joined, left), own / rest.weight
+    own = sum(product(part, row) for part, row in zip(columns, units, strict=True))
+    term, change = table.term(units, table.wheels(rows)), own / rest.weight
+    equations = _normal_equations(rest, columns, left)
     laws, simulated = laws_of(table, term, equations), term
     if laws:
         first, change = polished(
@@ -278,14 +319,14 @@ def _explained(rest: Remainder, alone: Array, change: Array) -> float:
     return 1.0 - float(lacking @ lacking) / max(float(alone @ alone), 1e-300)
 
 
-def _normal_equations(rest: Remainder, columns: Array, left: Array) -> Evidence:
+def _normal_equations(rest: Remainder, columns: Sequence[Matrix], left: Array) -> Evidence:
     """Of columns, what is not exactly known otherwise eliminated."""
-    base = rest.base
-    inner = base.T @ base + np.eye(base.shape[1])
-    cross = np.linalg.solve(inner, base.T @ np.column_stack([columns, rest.residual]))
+    gram, q = Gram.of(rest.beside(columns), rest.residual), rest.base.shape[1]
+    inner, cross = gram.matrix[:q, :q] + np.eye(q), gram.matrix[:q, q:]
+    known = np.linalg.solve(inner, np.column_stack([cross, gram.vector[:q]]))
     return Evidence(
-        columns.T @ columns - columns.T @ base @ cross[:, :-1],
-        columns.T @ rest.residual - columns.T @ base @ cross[:, -1],
+        gram.matrix[q:, q:] - cross.T @ known[:, :-1],
+        gram.vector[q:] - cross.T @ known[:, -1],
         max(float(np.mean([factor for _, factor in _inflations(rest.dataset, left)])), 1.0),
     )
 
@@ -316,12 +357,12 @@ def _is_large(dataset: Dataset, change: Array) -> bool:
     )
 
 
-def _solved(rest: Remainder, columns: Sequence[Array]) -> tuple[list[Array], Array, Array]:
+def _solved(rest: Remainder, columns: Sequence[Matrix]) -> tuple[list[Array], Array, Array]:
     """Units of each block of whitened columns, their covariance, and all that is explained."""
-    joined = np.concatenate([rest.base, *columns], axis=1)
-    found, q = solve(Gram.of(joined, rest.residual), range(joined.shape[1])), rest.base.shape[1]
+    joined, q = rest.beside(columns), rest.base.shape[1]
+    found = solve(Gram.of(joined, rest.residual), range(joined.shape[1]))
     units = np.split(found.mean[q:], len(columns))
-    return units, found.covariance[q:, q:], joined @ found.mean
+    return units, found.covariance[q:, q:], product(joined, found.mean)
 
 
 def shape_of(effect: Unmodelled, robot: Robot) -> Shape:
