@@ -169,7 +169,7 @@ def _instead(
     made = [_selection(count) for count in (names, beside)]
     plain = SimpleNamespace(value=(0.0,) * 100)
     monkeypatch.setattr(explain, "_remainder", lambda *_: None)
-    monkeypatch.setattr(explain, "unmodelled_effect", lambda *_: effect)
+    monkeypatch.setattr(explain, "unmodelled_effect", lambda *_, is_repeatable: effect)
     monkeypatch.setattr(explain, "_settled", lambda *_: (None, made[1], effect))
     monkeypatch.setattr(explain, "_left", lambda data, *_: left if data is plain else then)
     tried = explain._instead(plain, made[0], lambda *_: made[1], None)  # type: ignore[arg-type,return-value]
@@ -243,7 +243,7 @@ def test_a_term_is_sought_without_names_that_stood_in_for_it(
         return "data", fewer, effect
 
     monkeypatch.setattr(explain, "_remainder", lambda *_: None)
-    monkeypatch.setattr(explain, "unmodelled_effect", lambda *_, is_repeatable: alone)
+    monkeypatch.setattr(explain, "unmodelled_effect", lambda *_: alone)
     monkeypatch.setattr(explain, "_refitted", lambda _, __, effect: effect)
     monkeypatch.setattr(explain, "_settled", _settled)
     monkeypatch.setattr(explain, "_left", lambda data, *_: left if data == "data" else 100.0)
