@@ -84,6 +84,49 @@ def test_without_a_command_only_the_encoders_speak() -> None:
     assert all(math.isfinite(reading.power) for reading in last.from_encoders[1:])
 
 
+@pytest.mark.parametrize(
+    ("last_ms", "power"),
+    [
+        (775, 0.5**2 / 0.8 + 1.2),  # 0.5 V at 0.8 ohm, and 1.2 W of standby
+        (250, math.nan),  # too old: what the driver holds now is not known
+    ],
+)
+def test_a_wheel_at_rest_draws_what_its_driver_says_that_it_commands(
+    last_ms: int, power: float
+) -> None:
+    robot = shipped_robot("reference")
+    held = ({"torque": 0.7},) * 3  # N m: what a motor makes of 0.8 V
+    robot = evolve(robot, physics={**robot.physics, "friction.coulomb": held})
+    predictor, last = PowerPredictor(robot), None
+    for at_ms in range(3, 800, 10):
+        predictor.encoders(BASE + at_ms * MS, (0.0, 0.0, 0.0), NAN3)
+        if at_ms <= last_ms:
+            predictor.voltages(BASE + at_ms * MS, (0.5, -0.5, math.nan))
+        last = next(iter(predictor.due()), last)
+    assert last is not None
+    first, second, third = (reading.power for reading in last.from_encoders)
+    assert [first, second] == pytest.approx([power, power], nan_ok=True)
+    assert math.isnan(third)  # said nothing
+
+
+def test_a_wheel_that_turns_is_asked_of_its_motion_and_not_of_its_voltage() -> None:
+    robot, found = shipped_robot("reference"), []
+    for volts in (0.0, 9.0):
+        predictor, predictions = PowerPredictor(robot), []
+        speed = twist_to_wheels(robot) @ (0.3, 0.0, 0.0)
+        for at_ms, kind in _events(1000):
+            stamp = BASE + at_ms * MS
+            predictor.voltages(stamp, (volts, volts, volts))
+            if kind == "command":
+                predictor.command(stamp, (0.3, 0.0, 0.0))
+            else:
+                first, second, third = (float(value) for value in speed * at_ms * 1e-3)
+                predictor.encoders(stamp, (first, second, third), NAN3)
+            predictions += predictor.due()
+        found.append(predictions[-1].from_encoders[1:])
+    assert found[0] == found[1]
+
+
 def test_without_encoders_only_the_commands_speak() -> None:
     events = [(t, kind) for t, kind in _events(2000) if kind == "command" or t < 500]
     last = _run(events)[-1]

@@ -158,6 +158,16 @@ def test_other_ways_to_publish_power(make_robot: MakeRobot, drive: Callable) -> 
     }  # fmt: skip
 
 
+def test_the_voltages_that_the_drivers_command(make_robot: MakeRobot, drive: Callable) -> None:
+    """Steady: back-EMF of 0.7 V s/rad and what drives against friction; not of a lost signal."""
+    robot = make_robot({"measurement.motor_voltage": True}, ideal=True)
+    run = drive(Simulation(robot), 3.0, FORWARD, skip=1.5)
+    volts = np.array([fields["data"] for fields in run.fields("motor_voltage")]).mean(axis=0)
+    expected = [-(0.7 * 8.0 + 0.8 * 0.1314), 0.7 * 4.0 + 0.8 * 0.1086]
+    assert volts[:2] == pytest.approx(expected, rel=0.01)
+    assert len(run.stamps("motor_voltage")) == len(run.stamps("wheel_1/power"))
+
+
 @given(
     rate=st.floats(1.0, 1000.0),
     jitter=st.floats(0.0, 0.1),

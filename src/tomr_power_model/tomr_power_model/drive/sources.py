@@ -27,6 +27,7 @@ from tomr_power_model.robot import WHEELS, Robot
 
 # Topic of motor powers or currents in one array, in the order of the wheels.
 ARRAY_TOPIC = "power"
+VOLTAGE_TOPIC = "motor_voltage"  # that the drivers command, likewise
 ENCODER_TOPIC = "joint_states"
 TOTAL_TOPIC = "battery_state"
 TOTAL = WHEELS  # in place of a wheel: the whole robot

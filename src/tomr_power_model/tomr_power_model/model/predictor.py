@@ -42,6 +42,7 @@ Array = NDArray[np.float64]
 COMMANDS = "cmd_vel"
 ENCODERS = "joint_states"
 IMU = "imu/data"
+VOLTAGES = "motor_voltage"
 
 _BY_ANGLE = {"drivetrain.torque_ripple", "sensor.encoder_eccentricity"}
 _RESTS = 0.05  # rad/s: a slower wheel may stand still
@@ -95,6 +96,7 @@ class PowerPredictor:
         self._encoders.clear()
         self._commands.clear()
         self._gyro: tuple[int, float] | None = None
+        self._voltages: deque[tuple[int, float, float, float]] = deque()
         self._given: tuple[int, Triple] | None = None  # the newest command
         self._intervals: deque[int] = deque(maxlen=_INTERVALS)  # of the commands [ns]
         self._begun: int | None = None  # the first tick, in motion, of which not all is known
@@ -149,6 +151,13 @@ class PowerPredictor:
             self._gyro = (stamp_ns, yaw_rate)
         return arrival
 
+    def voltages(self, stamp_ns: int, values: Triple) -> Arrival:
+        """Take the voltages that the drivers command [V], positive where they drive forwards."""
+        arrival = self._arrive(VOLTAGES, stamp_ns, periodic=False)
+        if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
+            self._voltages.append((stamp_ns, *values))
+        return arrival
+
     def measured(self, wheel: int, stamp_ns: int) -> Arrival:
         """Take note of when a wheel's power was measured, or, as one more wheel, the whole's."""
         arrival = self._arrive(f"power {wheel}", stamp_ns)
@@ -195,7 +204,7 @@ class PowerPredictor:
         after = self._moved(estimate, 0.5 * self._period_s)
         windows = self._windows(tick)
         share = 0.5 + windows.offset_s / self._period_s
-        held = self._resting.voltages(self._path, after, speed, share)
+        held = self._commanded(tick, self._resting.voltages(self._path, after, speed, share))
         rise = self._path.wheel(at.RISE) or self._cold
         wheels = self._flaws.turned(estimate)
         turning = wheels.speed.tolist()
@@ -228,6 +237,17 @@ class PowerPredictor:
             total=self._total(means),
             from_encoders=from_encoders,
         )
+
+    def _commanded(self, tick: int, inferred: Sequence[float]) -> list[float]:
+        """Voltages of the drivers in a tick [V]: as they say, or else as inferred."""
+        period, stale = self.settings.ticks.period, self.settings.stale
+        found = of_tick(self._voltages, tick, period, stale)
+        if not found:
+            return list(inferred)
+        means = [sum(column) / len(found) for column in zip(*found, strict=True)][1:]
+        return [
+            said if math.isfinite(said) else own for said, own in zip(means, inferred, strict=True)
+        ]
 
     def _is_silent(self, tick: int, commanded: Commanded, speed: Sequence[float]) -> bool:
         """Whether the commands paused lately, so that what the robot was told is not known.

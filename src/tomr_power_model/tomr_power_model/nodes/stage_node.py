@@ -44,6 +44,9 @@ HEARD = "has heard every topic that it listens to"
 _SIGNAL_CHECK_S = 0.2  # the longest that a signal waits while no message comes
 _SILENT_S, _SAY_S = 3.0, 1.0  # without a decision, until it is said, and how often
 
+_RIVALS_S, _RIVALS_SEEN = 5.0, 6  # how often it looks for other nodes, until it says so
+_RIVAL = "is this robot diagnosed twice? End one of the two, or give it a namespace of its own"
+
 
 @cache
 def message_class(type_name: str) -> Any:
@@ -86,6 +89,27 @@ class StageNode(Node):
         self._ends: list[Callable[[], object]] = []  # of what it listens to
         self._topics: dict[str, list[str]] = {"listens to": [], "publishes": []}
         self._unheard: set[str] = set()  # topics it listens to, until the first message
+        self._rivals: dict[str, int] = {}  # how often they were seen in a row
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(_RIVALS_S, self.look_for_rivals, clock=steady)
+
+    def look_for_rivals(self) -> None:
+        """Warn of a second node that diagnoses the same robot: what both say interleaves.
+
+        Only of one that stays: a node that was killed is in the graph for up to 20 s.
+        """
+        own = self.get_name(), self.get_namespace()
+        found = {}
+        if self.get_node_names_and_namespaces().count(own) > 1:
+            found[own[0]] = "another node of this name runs"
+        for topic in self._outlets:
+            # Robots share /diagnostics.
+            if not topic.startswith("/") and self.count_publishers(topic) > 1:
+                found[topic] = "another node publishes it too"
+        self._rivals = {name: self._rivals.get(name, 0) + 1 for name in found}
+        for name, problem in found.items():
+            if self._rivals[name] >= _RIVALS_SEEN:
+                self.complain(name, f"{problem}: {_RIVAL}")
 
     def listen(
         self, inputs: Iterable[Input], advance: Callable[[], None], qos: QoSProfile = SENSOR_QOS

@@ -86,6 +86,7 @@ class Measurement:
     quantity: str
     signed: bool
     total: str
+    motor_voltage: bool = False  # whether drivers publish the voltages that they command
 
 
 @frozen
@@ -164,6 +165,7 @@ def robot_from_parameters(values: Mapping[str, object], place: str) -> Robot:
             quantity=str(checked["measurement.quantity"]),
             signed=bool(checked["measurement.signed"]),
             total=str(checked["measurement.total"]),
+            motor_voltage=bool(checked["measurement.motor_voltage"]),
         ),
         physics=MappingProxyType(physics),
         unmodelled=terms_of(values, names, place),

@@ -195,4 +195,11 @@ ROBOT_PARAMETERS: tuple[ParameterSpec, ...] = (
         default="battery_state",
         choices=("battery_state", "sum", "none"),
     ),
+    _S(
+        "measurement.motor_voltage",
+        "true: drivers publish the voltages that they command on motor_voltage, each held until "
+        "the next; what a wheel at rest draws is known from them",
+        kind="bool",
+        default=False,
+    ),
 )

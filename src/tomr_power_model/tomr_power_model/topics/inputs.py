@@ -9,6 +9,7 @@ from attrs import frozen
 from tomr_power_model.drive.plausible import PowerLimits
 from tomr_power_model.drive.sources import (
     ENCODER_TOPIC,
+    VOLTAGE_TOPIC,
     PowerReading,
     PowerTopic,
     motor_topics,
@@ -22,15 +23,16 @@ from tomr_power_model.messages.intake import (
     Unusable,
     WheelFinder,
     header_stamp_ns,
+    numbers_of,
     stamp_of,
     twist_of,
     yaw_rate_of,
 )
 from tomr_power_model.messages.plain import NANOSECONDS
-from tomr_power_model.messages.types import IMU, JOINT_STATE, TWIST, TWIST_STAMPED
+from tomr_power_model.messages.types import IMU, JOINT_STATE, MULTI_ARRAY, TWIST, TWIST_STAMPED
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.ticks import Arrival
-from tomr_power_model.robot import Robot
+from tomr_power_model.robot import WHEELS, Robot
 
 _MOST_KINDS = 200  # of complaints that are told apart: their words may be a message's
 Take = Callable[[Any, int], Arrival | str | None]
@@ -120,6 +122,10 @@ def model_inputs(
     def imu(message: Any, receive_ns: int) -> Arrival:
         return predictor.imu(stamp_of(message, receive_ns), yaw_rate_of(message))
 
+    def voltages(message: Any, receive_ns: int) -> Arrival:
+        first, second, third = numbers_of(message, WHEELS)[:WHEELS]
+        return predictor.voltages(receive_ns, (first, second, third))
+
     limits = PowerLimits.of(robot)
 
     def power(reading: PowerReading) -> Arrival | str:
@@ -130,6 +136,8 @@ def model_inputs(
         Input("cmd_vel", TWIST_STAMPED, guarded(command), (TWIST, TWIST_STAMPED)),
         *measured_inputs(robot, predictor.encoders, power, wheels),
     ]
+    if robot.measurement.motor_voltage:
+        inputs.append(Input(VOLTAGE_TOPIC, MULTI_ARRAY, guarded(voltages)))
     if predictor.settings.use_imu:
         inputs.append(Input("imu/data", IMU, guarded(imu)))
     return tuple(inputs)

@@ -21,6 +21,7 @@ from tomr_sim_bridge.plant.wheels import Vector
 
 WINDOW_NS = 5_000_000  # average over this time before the stamp
 ARRAY_TOPIC = "power"
+VOLTAGE_TOPIC = "motor_voltage"
 _TOTAL_NOISE = 2.0  # the battery's monitor is that much noisier than a driver's
 
 
@@ -48,6 +49,7 @@ class PowerMonitor:
         self._lagged = np.full(WHEELS, math.nan)
         self._publish = _SOURCES[robot.measurement.source]
         self.efforts: list[float] = []  # A, latest currents for JointState.effort
+        self.commanded = [0.0] * WHEELS  # V, of the drivers
         self.actions: FaultActions | None = None  # what faults do now
         self._held: list[Reading | None] = [None] * WHEELS  # of frozen sensors
 
@@ -64,6 +66,8 @@ class PowerMonitor:
             )
             message = battery_state(stamp, total.voltage, -total.drawn, "battery")
             found.append(Sample("battery_state", stamp, message))
+        if self._robot.measurement.motor_voltage:
+            found.append(Sample(VOLTAGE_TOPIC, stamp, samples.multi_array(self.commanded)))
         return found
 
     def _window(self, until: int) -> Vector:

@@ -1,7 +1,7 @@
 """The robot's sensors: rates, quanta, noise and the messages they make."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -92,9 +92,14 @@ class Sensors:
         self._odometry_pose = (0.0, 0.0, 0.0)
         self._odometry_stamp = start
 
-    def read(self, faults: FaultBoard, actions: FaultActions) -> list[Sample]:
-        """Return the samples that have fallen due, in the order of their stamps."""
-        self._power.actions = actions
+    def read(
+        self, faults: FaultBoard, actions: FaultActions, commanded: Sequence[float]
+    ) -> list[Sample]:
+        """Return the samples that have fallen due, in the order of their stamps.
+
+        `commanded`: voltages, by the drivers [V].
+        """
+        self._power.actions, self._power.commanded = actions, list(commanded)
         now = self._memory.latest.stamp_ns
         found: list[Sample] = []
         for clock, read in self._streams:

@@ -209,7 +209,8 @@ class Simulation:
         self._transmitted = constant * current - self._rotor * rotor_acceleration
         self._count += 1
         self._remember(bus, current, power, turned)
-        return self._sensors.read(self.faults, actions)
+        commanded = (self._duty * self.robot.supply.nominal_voltage).tolist()
+        return self._sensors.read(self.faults, actions, commanded)
 
     def _actions(self, contact: Vector) -> FaultActions:
         """What faults do during the coming stretch."""
