@@ -31,7 +31,7 @@ def _node(others: dict[str, int], twins: int) -> tuple[Any, list[tuple[str, str]
         ({}, 0, []),
         ({"/diagnostics": 3}, 0, []),  # which robots share
         ({"residuals": 1}, 0, ["residuals"]),
-        ({"residuals": 1}, 1, ["tomr_diagnosis", "residuals"]),
+        ({"residuals": 1}, 1, ["tomr_diagnosis"]),
     ],
 )
 def test_a_second_diagnosis_of_one_robot_is_warned_of(

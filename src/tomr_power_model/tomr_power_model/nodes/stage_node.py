@@ -107,9 +107,9 @@ class StageNode(Node):
             if not topic.startswith("/") and self.count_publishers(topic) > 1:
                 found[topic] = "another node publishes it too"
         self._rivals = {name: self._rivals.get(name, 0) + 1 for name in found}
-        for name, problem in found.items():
-            if self._rivals[name] >= _RIVALS_SEEN:
-                self.complain(name, f"{problem}: {_RIVAL}")
+        lasting = [name for name in found if self._rivals[name] >= _RIVALS_SEEN]
+        for name in lasting[:1]:  # one line says it
+            self.complain(name, f"{found[name]}: {_RIVAL}")
 
     def listen(
         self, inputs: Iterable[Input], advance: Callable[[], None], qos: QoSProfile = SENSOR_QOS
