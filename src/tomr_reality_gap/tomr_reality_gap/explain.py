@@ -23,6 +23,7 @@ from tomr_reality_gap.fit.jacobian import linearise
 from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.remainder import Remainder
+from tomr_reality_gap.fit.significance import significant
 from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
 from tomr_reality_gap.fit.unmodelled import Unmodelled, refitted, unmodelled_effect
 from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
@@ -94,6 +95,7 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
     if effect is not None and baseline is not None and baseline.shows(effect):
         effect, dataset, plain = None, plain or dataset, None
         found = named(dataset)
+    found = significant(dataset, found, tick)
     found, shared = beyond_baseline(dataset, found, baseline, tick)
     return AnalysisResult(
         dataset,

@@ -7,7 +7,7 @@ reality: it is taken off, and a finding of which half or more is so is none.
 from collections.abc import Sequence
 
 import numpy as np
-from attrs import evolve, field, frozen
+from attrs import field, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.estimation.linear_gaussian import Gram, Matrix, product, solve
@@ -20,7 +20,7 @@ from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection
 from tomr_reality_gap.fit.jacobian import linearise
 from tomr_reality_gap.fit.model import Model
-from tomr_reality_gap.fit.refine import refine
+from tomr_reality_gap.fit.significance import dropped
 from tomr_reality_gap.fit.unmodelled import Unmodelled
 
 Array = NDArray[np.float64]
@@ -107,9 +107,4 @@ def beyond_baseline(
         ]
         if not shares or max(shares) < _HALF:
             return found, theirs
-        worst = int(np.argmax(shares))
-        last = found.rounds[-1]
-        states = [(model.without(worst), found.best.sensors)]
-        best = refine(dataset, states, last.jacobian, found.noise, tick=tick)[0]
-        groups = found.alternatives
-        found = evolve(found, best=best, alternatives=(*groups[:worst], *groups[worst + 1 :]))
+        found = dropped(dataset, found, int(np.argmax(shares)), tick)
