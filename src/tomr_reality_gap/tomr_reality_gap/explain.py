@@ -11,7 +11,7 @@ from tomr_power_model.effects.scales import Scales
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.response import controller_alternatives
-from tomr_reality_gap.alignment.simulation import Run
+from tomr_reality_gap.alignment.simulation import Run, Tick
 from tomr_reality_gap.analysis import AnalysisResult, residuals_of
 from tomr_reality_gap.explanation import Explanation
 from tomr_reality_gap.fit.backward_elimination import backward_elimination
@@ -24,9 +24,14 @@ from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.remainder import Remainder
 from tomr_reality_gap.fit.significance import significant
-from tomr_reality_gap.fit.simulator_baseline import SimulatorBaseline, beyond_baseline
+from tomr_reality_gap.fit.simulator_baseline import (
+    Offsets,
+    SimulatorBaseline,
+    beyond_baseline,
+)
 from tomr_reality_gap.fit.unmodelled import Unmodelled, refitted, unmodelled_effect
 from tomr_reality_gap.hypotheses.catalogue import catalogue, nuisances
+from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 from tomr_reality_gap.mismatch.orders import ripple_orders
 from tomr_reality_gap.prepared import Prepared, prepared
 from tomr_reality_gap.progress import Progress
@@ -95,8 +100,7 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
     if effect is not None and baseline is not None and baseline.shows(effect):
         effect, dataset, plain = None, plain or dataset, None
         found = named(dataset)
-    found = significant(dataset, found, tick)
-    found, shared = beyond_baseline(dataset, found, baseline, tick)
+    found, shared = _held(dataset, found, candidates, baseline, tick)
     return AnalysisResult(
         dataset,
         found,
@@ -110,6 +114,24 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
         plain,
         effect,
     )
+
+
+def _held(
+    dataset: Dataset,
+    found: Selection,
+    candidates: Sequence[Hypothesis],
+    baseline: SimulatorBaseline | None,
+    tick: Tick,
+) -> tuple[Selection, Offsets]:
+    """Findings that are sure, and that the user's simulation does not show as well; and how much
+    of each of them it shows.
+    """
+    while True:
+        kept, shared = beyond_baseline(dataset, significant(dataset, found, tick), baseline, tick)
+        if len(kept.best.model.hypotheses) == len(found.best.model.hypotheses):
+            return kept, shared
+        # What could stand in for the others was barred by what is gone.
+        found = backward_elimination(dataset, kept, candidates, tick)
 
 
 def _beside(

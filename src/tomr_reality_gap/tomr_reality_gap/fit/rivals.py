@@ -56,7 +56,7 @@ class Responses:
             base += self._rows(own.get(hypothesis.key))
         found: dict[str, tuple[float, Model]] = {}
         for item in self.candidates:
-            rows = self._rows(jacobian.candidates.get(item.key))
+            rows = self._rows(own.get(item.key))[: len(item.sizes)]
             first = item.parameters[0]
             barred = item.name in best.model.names or first.discrete_offset or not rows
             if barred or any(exclude_each_other(item, other) for other in fewer.hypotheses):
