@@ -46,8 +46,13 @@ class _Model:
         return _Model(tuple(changed), (offsets,))
 
 
-def _nearest(*shown: tuple[Hypothesis, np.ndarray], size: float = 3.0) -> list[_Model]:
-    """Rivals of the first, of which so much is in the data; the first column is a nuisance."""
+def _nearest(
+    *shown: tuple[Hypothesis, np.ndarray], size: float = 3.0, searched: int = 0
+) -> list[_Model]:
+    """Rivals of the first, of which so much is in the data; the first column is a nuisance.
+
+    So many others were in the last model that was searched from, and are no candidates there.
+    """
     hypotheses, columns = zip(*shown, strict=True)
     found, by_name = hypotheses[0], {item.name: column for item, column in shown}
     matrix = np.stack([NUISANCE, *columns], axis=1)
@@ -57,8 +62,8 @@ def _nearest(*shown: tuple[Hypothesis, np.ndarray], size: float = 3.0) -> list[_
     jacobian = SimpleNamespace(
         matrix=matrix,
         sensors=slice(1, 1),
-        model=_Model(()),
-        own=(),
+        model=_Model(hypotheses[1 : 1 + searched]),
+        own=[places.pop(item.key) for item in hypotheses[1 : 1 + searched]],
         candidates=places,
     )
     best = SimpleNamespace(model=model, value=size * columns[0])
@@ -97,6 +102,13 @@ def test_what_only_nuisances_tell_apart_is_a_rival() -> None:
     found, beside, near = map(_hypothesis, ("found", "beside", "near"))
     tried = _nearest((found, SHOWN), (beside, SHOWN + NUISANCE), (near, SHOWN + 0.03 * OTHER))
     assert [model.hypotheses[0].effect for model in tried] == ["beside", "near"]
+
+
+def test_what_was_dropped_from_the_model_may_stand_in_as_well() -> None:
+    found, gone, near = map(_hypothesis, ("found", "gone", "near"))
+    shown = ((found, SHOWN), (gone, SHOWN + 0.017 * OTHER), (near, SHOWN + 0.03 * OTHER))
+    tried = _nearest(*shown, searched=1)
+    assert [model.hypotheses[0].effect for model in tried] == ["gone", "near"]
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tomr_power_model.estimation.parameter import Parameter
+from tomr_reality_gap import explain
 from tomr_reality_gap.fit import significance
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.significance import distances, significant
@@ -60,6 +61,34 @@ def test_what_starts_beyond_nothing_is_that_far_from_it() -> None:
 
 def test_an_alternative_that_is_no_size_is_not_judged() -> None:
     assert distances(_model((_hypothesis(LATER), (1.0,))), np.array([9.9])) == [math.inf]
+
+
+def test_what_stands_in_is_sought_anew_until_nothing_more_is_dropped(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One goes as it may be nothing, one as the user's simulation shows it; then all is sure."""
+
+    def selection(*names: str) -> SimpleNamespace:
+        return SimpleNamespace(best=SimpleNamespace(model=SimpleNamespace(hypotheses=names)))
+
+    def without(name: str, found: SimpleNamespace) -> SimpleNamespace:
+        return selection(*(n for n in found.best.model.hypotheses if n != name))
+
+    anew: list[tuple[str, ...]] = []
+
+    def eliminated(_: object, found: SimpleNamespace, *__: object) -> SimpleNamespace:
+        anew.append(found.best.model.hypotheses)
+        return selection(*("better" if n == "a" else n for n in found.best.model.hypotheses))
+
+    monkeypatch.setattr(explain, "significant", lambda _, found, __: without("weak", found))
+    monkeypatch.setattr(
+        explain, "beyond_baseline", lambda _, found, *__: (without("theirs", found), "shared")
+    )
+    monkeypatch.setattr(explain, "backward_elimination", eliminated)
+    given = selection("a", "weak", "theirs", "b")
+    kept, shared = explain._held(None, given, (), None, lambda _: None)  # type: ignore[arg-type]
+    assert (kept.best.model.hypotheses, shared) == (("better", "b"), "shared")
+    assert anew == [("a", "b")]
 
 
 def _selected(monkeypatch: pytest.MonkeyPatch, away: dict[str, float]) -> list[str]:
