@@ -13,9 +13,10 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.signals import SignalHandlerOptions
 
 from tomr_commission.driving import STILL, Command, DriveChoice, DriveWatch
+from tomr_power_model.drive.sources import VOLTAGE_TOPIC
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.plain import NANOSECONDS
-from tomr_power_model.messages.types import IMU, ODOMETRY, TWIST, TWIST_TYPES
+from tomr_power_model.messages.types import IMU, MULTI_ARRAY, ODOMETRY, TWIST, TWIST_TYPES
 from tomr_power_model.nodes.command_type import chosen_type
 from tomr_power_model.nodes.stage_node import SENSOR_QOS, make_executor, message_class, to_ros
 from tomr_power_model.recordings import RecordingWriter
@@ -33,7 +34,8 @@ _SETTLE = 1.0  # s in which the graph tells who else is there
 _SPIN = 0.01  # s
 _BACK, _ON = -0.2, 2.0  # s that a clock may go between two looks
 _HALT = 0.5  # s of standing commanded at the end, whatever ended it
-_BESIDE = (("imu/data", IMU), ("odom", ODOMETRY))  # recorded where they are published
+# Recorded where they are published.
+_BESIDE = (("imu/data", IMU), ("odom", ODOMETRY), (VOLTAGE_TOPIC, MULTI_ARRAY))
 
 
 @frozen
