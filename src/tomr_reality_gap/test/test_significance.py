@@ -91,8 +91,29 @@ def test_what_stands_in_is_sought_anew_until_nothing_more_is_dropped(
     assert anew == [("a", "b")]
 
 
-def _selected(monkeypatch: pytest.MonkeyPatch, away: dict[str, float]) -> list[str]:
-    """Names that are left of some, by how far they are from nothing; the others move as they go."""
+def test_what_a_finding_explains_is_what_leaving_it_out_adds() -> None:
+    """Measured 2 and 2, of noises 1 and 0.5; without either 1 is left."""
+    shown = {"both": [2.0, 2.0], "a": [1.0, 2.0], "b": [2.0, 1.5]}
+
+    class Made:
+        hypotheses = ("a", "b")
+        described = SimpleNamespace(robot="both")
+
+        def without(self, number: int) -> SimpleNamespace:
+            return SimpleNamespace(described=SimpleNamespace(robot="ab"[1 - number]))
+
+    dataset = SimpleNamespace(
+        value=np.array([2.0, 2.0]), predict=lambda robots: np.array([shown[r] for r in robots])
+    )
+    noise = SimpleNamespace(weight=np.array([1.0, 2.0]))
+    found = SimpleNamespace(best=SimpleNamespace(model=Made()), noise=noise)
+    assert significance.energies(dataset, found) == [1.0, 1.0]  # type: ignore[arg-type]
+
+
+def _selected(
+    monkeypatch: pytest.MonkeyPatch, away: dict[str, float], useless: tuple[str, ...] = ()
+) -> list[str]:
+    """Names that are left of some, by how far they are from nothing; `useless` explain nothing."""
     found = SimpleNamespace(best=SimpleNamespace(model=SimpleNamespace(hypotheses=list(away))))
 
     def dropped(_: object, found: SimpleNamespace, number: int, tick: object) -> SimpleNamespace:
@@ -104,6 +125,11 @@ def _selected(monkeypatch: pytest.MonkeyPatch, away: dict[str, float]) -> list[s
     monkeypatch.setattr(significance, "dropped", dropped)
     monkeypatch.setattr(
         significance, "distances", lambda model, _: [away[name] for name in model.hypotheses]
+    )
+    monkeypatch.setattr(
+        significance,
+        "energies",
+        lambda _, found: [-1.0 * (n in useless) or 9.0 for n in found.best.model.hypotheses],
     )
     left = significant(None, found)  # type: ignore[arg-type]
     return list(left.best.model.hypotheses)
@@ -123,3 +149,8 @@ def test_findings_that_may_be_nothing_go_the_least_certain_first(
     monkeypatch: pytest.MonkeyPatch, away: dict[str, float], left: list[str]
 ) -> None:
     assert _selected(monkeypatch, away) == left
+
+
+def test_what_explains_nothing_goes_first_and_even_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert _selected(monkeypatch, {"a": 9.0}, ("a",)) == []
+    assert _selected(monkeypatch, {"a": 9.0, "b": 0.5}, ("a",)) == ["b"]

@@ -1,8 +1,9 @@
-"""Findings whose size the recordings tell apart from nothing, by their robust intervals.
+"""Findings that explain something, and whose size the recordings distinguish from nothing.
 
 The evidence takes what is left for noise. Where a model lacks something, as of a wheel that sticks
 and slips, a small finding brings much evidence by making up for that, here this way and there
-that: leaving out parts of the recordings shows that its size is not known, not even its sign.
+that: leaving out parts of the recordings shows that its size is not known, not even its sign. And
+one that only lets tolerances take better values explains none of the mismatch itself.
 """
 
 import math
@@ -27,18 +28,31 @@ _HALF = 1.96  # standard deviations of half a 95 % interval
 
 
 def significant(dataset: Dataset, found: Selection, tick: Tick = lambda done: None) -> Selection:
-    """Findings but for those beside others whose 95 % interval holds nothing; the last one stays:
-    what made it necessary is there, whatever it is.
+    """Findings but for those that explain nothing, and those beside others whose 95 % interval
+    includes nothing; of the latter the last one stays: what made it necessary is there.
     """
-    while len(found.best.model.hypotheses) > 1:
+    while found.best.model.hypotheses:
         model = found.best.model
-        sigma = own_sigma(dataset, found, linearise(dataset, model, ()))
-        away = distances(model, sigma)
-        least = int(np.argmin(away))
-        if away[least] > 1.0:
-            break
-        found = dropped(dataset, found, least, tick)
+        explained = energies(dataset, found)
+        worst = int(np.argmin(explained))
+        if explained[worst] > 0.0:
+            if len(model.hypotheses) == 1:
+                break
+            away = distances(model, own_sigma(dataset, found, linearise(dataset, model, ())))
+            worst = int(np.argmin(away))
+            if away[worst] > 1.0:
+                break
+        found = dropped(dataset, found, worst, tick)
     return found
+
+
+def energies(dataset: Dataset, found: Selection) -> list[float]:
+    """Squares, in units of noise, that leaving each finding out adds, all else as fitted."""
+    model, weight = found.best.model, found.noise.weight
+    fewer = [model.without(number) for number in range(len(model.hypotheses))]
+    values = dataset.predict([item.described.robot for item in (model, *fewer)])
+    left = [float((((dataset.value - value) * weight) ** 2).sum()) for value in values]
+    return [item - left[0] for item in left[1:]]
 
 
 def dropped(
