@@ -1,4 +1,4 @@
-"""Findings whose size the recordings tell apart from nothing, by their robust intervals.
+"""Findings whose size the recordings distinguish from nothing, by their robust intervals.
 
 The evidence takes what is left for noise. Where a model lacks something, as of a wheel that sticks
 and slips, a small finding brings much evidence by making up for that, here this way and there
