@@ -1,4 +1,4 @@
-"""Slow changes that are no fault, in MuJoCo: are they told, and is nothing accused meanwhile?
+"""Slow changes that are no fault, in MuJoCo: are they reported, and is nothing accused meanwhile?
 
     .venv/bin/python bench/conditions.py [--robots 2] [--drives 9]
 
@@ -99,14 +99,14 @@ CHANGES: dict[str, Change] = {
 
 @frozen
 class Found:
-    """What a robot was called, and what was told at the end."""
+    """What a robot was called, and what was reported at the end."""
 
     change: str
     mass: float  # kg, as described
     ticks: int
     alarms: Counter[str]  # faults named, of other wheels too
     named: float | None  # s of driving until the dragging wheel was named
-    told: tuple[Severity, ...]
+    reported: tuple[Severity, ...]
 
 
 def _frames(change: str, seed: int, tours: int) -> Iterator[tuple[int, ResidualFrame]]:
@@ -130,27 +130,27 @@ def driven(task: tuple[str, int, int]) -> Found:
     watch = SeverityWatch(robot)
     classifier = FaultClassifier(make_judge(ClassifierSettings()), watch)
     alarms: Counter[str] = Counter()
-    named, ticks, told = None, 0, watch.conditions
+    named, ticks, reported = None, 0, watch.conditions
     for _, frame in _frames(change, seed, tours):
         ticks += 1
         diagnosis = classifier.classify(frame)
-        told = watch.conditions or told
+        reported = watch.conditions or reported
         if diagnosis is None or not diagnosis.changed or diagnosis.state.name in FAULTLESS:
             continue
         alarms[diagnosis.state.name] += 1
         if named is None and diagnosis.state in (DRAGGING[1], STATES[MOTOR + 1]):
             named = 1e-9 * _PERIOD * ticks
-    return Found(change, robot.mass, ticks, alarms, named, told)
+    return Found(change, robot.mass, ticks, alarms, named, reported)
 
 
 def _line(found: Found) -> str:
-    told = "; ".join(item.words for item in found.told) or "nothing"
+    reported = "; ".join(item.words for item in found.reported) or "nothing"
     alarms = ", ".join(f"{count} {name}" for name, count in found.alarms.items()) or "none"
     late = "" if found.named is None else f"; named after {found.named:.0f} s"
     seconds = 1e-9 * _PERIOD * found.ticks
     return (
         f"{found.change:28} {found.mass:5.1f} kg {seconds:5.0f} s  alarms: {alarms}{late}\n"
-        f"{'':28} told: {told}"
+        f"{'':28} reported: {reported}"
     )
 
 

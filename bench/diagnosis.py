@@ -99,15 +99,15 @@ def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[Resid
     compared = Compared(modelled, modelled)
     (_, usual), (_, band) = (compared.residuals(chosen) for chosen in (BandSettings(), bands))
 
-    def width(item: Residual, told: float, wanted: float) -> float:
-        return max(wanted, item.band) if item.band > _WIDER * told else wanted
+    def width(item: Residual, default: float, wanted: float) -> float:
+        return max(wanted, item.band) if item.band > _WIDER * default else wanted
 
     return [
         evolve(
             frame,
             residuals=tuple(
-                evolve(item, band=width(item, float(told), float(wanted)))
-                for item, told, wanted in zip(frame.residuals, *row, strict=True)
+                evolve(item, band=width(item, float(default), float(wanted)))
+                for item, default, wanted in zip(frame.residuals, *row, strict=True)
             ),
         )
         for frame, *row in zip(frames, usual, band, strict=True)

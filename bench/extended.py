@@ -227,7 +227,7 @@ def score_fault(seed: int, name: str) -> Seen | None:
     if not observable:
         return None
     label = _label(drive, name, size)
-    # The onset is when it first shows: what comes before, nobody could tell.
+    # The onset is when it first shows: what comes before, nobody could detect.
     label = evolve(label, onset=observable[0][0] - 4 * _PERIOD, observable=observable)
     return seen(said_of(labelled), START_NS, [label], (0, 1))
 
@@ -262,14 +262,14 @@ def targets(found: Sequence[Seen]) -> dict[str, object]:
     report: dict[str, object] = {}
     for name, counts in groups.items():
         total = counts.total()
-        told = {
+        judged = {
             "right": counts[RIGHT],
             "right or unknown": total - counts[WRONG] - counts[MISSED],
             "unknown or a fault": total - counts[MISSED],
             "a wrong fault": counts[WRONG],
         }
         report[name] = {"faults": total} | {
-            words: with_interval(part, total) for words, part in told.items()
+            words: with_interval(part, total) for words, part in judged.items()
         }
     return report
 

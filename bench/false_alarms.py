@@ -2,9 +2,9 @@
 
     .venv/bin/python bench/false_alarms.py [--hours 20]
 
-`bench/diagnosis.py` counts them in MuJoCo, where three hours take twenty minutes and cannot tell
-one alarm in ten hours from none. Here the drives are as there, bumps, starts and stops included,
-from seeds that nothing else uses; the plant is the faster one that also trains.
+`bench/diagnosis.py` counts them in MuJoCo, where three hours take twenty minutes and cannot
+distinguish one alarm in ten hours from none. Here the drives are as there, bumps, starts and stops
+included, from seeds that nothing else uses; the plant is the faster one that also trains.
 """
 
 import argparse

@@ -47,7 +47,7 @@ class Ending:
     begin_ns: int  # stamp at which the drive starts
     comes: float
     ends: float
-    rest: tuple[float, float] = (math.inf, math.inf)  # in which it is told to stand
+    rest: tuple[float, float] = (math.inf, math.inf)  # in which it is commanded to stand
     seed: int = 0  # of the sensors' noise
 
 

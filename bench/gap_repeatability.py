@@ -1,9 +1,9 @@
-"""The real Robotino, explained thrice: do disjoint sets of headings tell the same values?
+"""The real Robotino, explained thrice: do disjoint sets of headings give the same values?
 
     .venv/bin/python bench/gap_repeatability.py --robotino gap [--surface gray green]
 
 Works on what bench/gap_robotino.py --out gap has written: its recordings, and its description with
-what the bench tells. Of each floor, headings at 0.1 m/s in three sets of twelve (from 5, 15 and 25
+what the bench shows. Of each floor, headings at 0.1 m/s in three sets of twelve (from 5, 15 and 25
 degrees on, 30 degrees apart) are explained, each by itself. Of every value that two sets name it is
 counted whether the one lies in the interval of the other. Besides, every recording of the floors,
 at all speeds, is read and aligned as for an explanation, twelve headings at a time: refusals are
@@ -100,10 +100,10 @@ def print_report(console: Console, report: Mapping[str, Any]) -> None:
                 "{:.4g} [{:.4g}, {:.4g}]".format(*values[name]) if name in values else "-"
                 for values in sets
             ]
-            told = [is_within for known, is_within in within if known == name]
-            table.add_row(surface, name, *cells, f"{sum(told)} of {len(told)}")
+            inside = [is_within for known, is_within in within if known == name]
+            table.add_row(surface, name, *cells, f"{sum(inside)} of {len(inside)}")
     console.print(table)
-    pairs = [told for within in report["within"].values() for _, told in within]
+    pairs = [inside for within in report["within"].values() for _, inside in within]
     console.print(f"within each other's intervals: {sum(pairs)} of {len(pairs)}")
     console.print(
         f"refused: {len(report['refused'])} of {report['sets']} sets, "

@@ -61,7 +61,7 @@ _USUAL_INTEGRAL = 10.0  # 1/s, of the integral gain over the proportional one
 
 @frozen
 class Bench:
-    """What the recordings with wheels in the air tell."""
+    """What the recordings with wheels in the air show."""
 
     coulomb: tuple[float, ...]  # N m at each wheel
     viscous: tuple[float, ...]  # N m s/rad
@@ -103,7 +103,7 @@ def _answer(time: Array, run: Run, step: int) -> float:
 
 
 def described(bench: Bench, integral: float, delay: float) -> str:
-    """Text of the robot's description with what the bench told."""
+    """Text of the robot's description with what the bench showed."""
     values = dict(read_description(SOURCE))
     names = load_robot(SOURCE).wheel_names
     for effect, name, numbers in (

@@ -325,9 +325,9 @@ def main(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)))
     options = parser.parse_args(arguments)
     amount = options.placements, options.seeds
-    told = list(plays(*amount))
-    chosen = [k for k, (_, case, *_) in enumerate(told) if options.only in case.kind]
-    for mission, seed in sorted({(told[k][2], told[k][3]) for k in chosen}):
+    listed = list(plays(*amount))
+    chosen = [k for k, (_, case, *_) in enumerate(listed) if options.only in case.kind]
+    for mission, seed in sorted({(listed[k][2], listed[k][3]) for k in chosen}):
         usually(mission, seed)  # the workers inherit it, and the drive
     play = partial(_play, placements=amount[0], seeds=amount[1])
     with ProcessPoolExecutor(options.jobs) as pool:

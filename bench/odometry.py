@@ -12,11 +12,11 @@ by more than 2 %, 5 mm and 0.5 % of the way. The estimator itself is run on some
 
 slips: `tomr_odometry` on every drive of slips_practice; its scorer prints the figures.
 
-bound: those drives without IMU, by one that is told which wheels slide when, the floor's traction,
+bound: those drives without IMU, by one that knows which wheels slide when, the floor's traction,
 slope and drag and the robot's parameters: what it still lacks is what pushes and how slides begin.
 
-healthy: the healthy drives of faults_practice with their IMU and without it: how much slip is told,
-how far from that of the wheels the pose ends, and the CPU, reading included.
+healthy: the healthy drives of faults_practice with their IMU and without it: how much slip is
+reported, how far from that of the wheels the pose ends, and the CPU, reading included.
 """
 
 import argparse
@@ -230,7 +230,7 @@ def _is_within(spells: Sequence[Sequence[float]], times: Array) -> NDArray[np.bo
     return within
 
 
-def _told(body: Body, twist: Array, force: Array, pull: Array, drag: float, dt: float) -> Array:
+def _advanced(body: Body, twist: Array, force: Array, pull: Array, drag: float, dt: float) -> Array:
     """Twist after dt by the forces of the contacts [N] and the pull of a slope [N]."""
     along = np.tanh(body.along @ twist / STICKING) * body.load
     wrench = body.rows.T @ force + pull - drag * (body.along.T @ along)
@@ -248,11 +248,11 @@ def _floor(floor: Mapping[str, float], yaw: float, body: Body, robot: Robot) -> 
 
 
 def bound_of(bag: Path, truth: Path, robot: Robot) -> dict[str, float]:
-    """Without IMU, by one that is told which wheels slide and all of floor and robot.
+    """Without IMU, by one that knows which wheels slide and all of floor and robot.
 
     Wheels that grip hold the twist; those that slide pull with all the traction that there is.
     """
-    told = json.loads(truth.read_text())
+    known = json.loads(truth.read_text())
     settings = OdometrySettings(use_imu=False)
     with open_recording(bag) as recording:
         items = list(estimates(recording, robot, SlipOdometry(robot, settings), Complaints()))
@@ -261,9 +261,9 @@ def bound_of(bag: Path, truth: Path, robot: Robot) -> dict[str, float]:
         true = reference_of(recording, topic)
     body, _ = body_of(robot)
     stamps = np.array([item.stamp_ns for item in items], dtype=np.int64)
-    times = np.asarray(1e-9 * (stamps - int(told["t0_ns"])), dtype=np.float64)
-    slides = np.stack([_is_within(spells, times) for spells in told["slipping"]], axis=1)
-    poses, floor = true.at(stamps), told["floor"]
+    times = np.asarray(1e-9 * (stamps - int(known["t0_ns"])), dtype=np.float64)
+    slides = np.stack([_is_within(spells, times) for spells in known["slipping"]], axis=1)
+    poses, floor = true.at(stamps), known["floor"]
     twist, pose, plain = items[0].twist.copy(), poses[0].copy(), poses[0].copy()
     errors = []
     for k in range(1, len(items)):
@@ -271,7 +271,7 @@ def bound_of(bag: Path, truth: Path, robot: Robot) -> dict[str, float]:
         by_wheels = items[k].twist  # without an IMU the estimator's is that of the wheels
         limit = floor.get("patch_friction", floor["friction"]) * body.load
         force = slides[k] * limit * np.tanh(body.rows @ (by_wheels - twist) / STICKING)
-        twist = _told(body, twist, force, *_floor(floor, pose[2], body, robot), dt)
+        twist = _advanced(body, twist, force, *_floor(floor, pose[2], body, robot), dt)
         grips = body.rows[~slides[k]]
         if len(grips):
             light = np.linalg.solve(body.inertia, grips.T)
@@ -341,11 +341,11 @@ def healthy(options: argparse.Namespace) -> int:
             elapsed = 1e-9 * (items[-1].stamp_ns - items[0].stamp_ns)
             apart = end_error(estimated_path(items), wheels)
             ratios = np.mean([(np.abs(item.slip) > 0.1).any() for item in items])
-            told = np.mean([item.is_slipping for item in items])
+            slipping = np.mean([item.is_slipping for item in items])
             imu = dict(items[-1].sensors).get("imu/data")
             print(
-                f"{bag.name}, IMU {imu}: a ratio over 0.1 {100 * ratios:.2f} %, slipping told "
-                f"{100 * told:.2f} % of {elapsed:.0f} s, {apart:.4f} m from the wheels' end, "
+                f"{bag.name}, IMU {imu}: a ratio over 0.1 {100 * ratios:.2f} %, slipping reported "
+                f"{100 * slipping:.2f} % of {elapsed:.0f} s, {apart:.4f} m from the wheels' end, "
                 f"{spent / elapsed:.3f} of a core",
                 flush=True,
             )

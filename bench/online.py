@@ -112,7 +112,7 @@ def all_run(processes: Mapping[str, subprocess.Popen[bytes]]) -> bool:
 
 def _cpu(nodes: Mapping[str, subprocess.Popen[bytes]]) -> dict[str, float]:
     if not all_run(nodes):
-        return dict.fromkeys(nodes, 0.0)  # `running` tells which one ended, and why
+        return dict.fromkeys(nodes, 0.0)  # `running` names which one ended, and why
     return {name: cpu_seconds(process.pid) for name, process in nodes.items()}
 
 

@@ -5,8 +5,8 @@
 MuJoCo robots that differ from their description by up to 5 %: so many drives of each kind, drawn as
 in bench/extended.py from seeds that nothing else uses. With `--robot`, a description of the robot
 of `faults_practice`, the drives of that independent plant too (TOMR_RECORDINGS). Of each drive the
-severity told last counts while the right kind of state was named. A motor whose torque constant is
-lower by q loses as much more in its winding as one of 1/(1 - q)^2 its resistance.
+severity stated last counts while the right kind of state was named. A motor whose torque constant
+is lower by q loses as much more in its winding as one of 1/(1 - q)^2 its resistance.
 """
 
 import argparse
@@ -81,7 +81,7 @@ def _last(diagnoses: Iterable[Diagnosis], states: Sequence[State]) -> Severity |
 
 
 def _true_size(name: str, settings: Mapping[str, object]) -> float:
-    """In the unit in which its severity is told."""
+    """In the unit in which its severity is stated."""
     sizes = {key: float(value) for key, value in settings.items() if isinstance(value, float)}
     if name == "motor_torque_weak":
         return 1.0 / (1.0 - sizes["loss"]) ** 2 - 1.0
@@ -117,12 +117,12 @@ def _practice() -> Iterator[tuple[Path, str, float]]:
 
 
 def _line(kind: str, cases: Sequence[Case]) -> str:
-    told = [(case.true, case.said) for case in cases if case.said is not None]
-    text = f"{kind:26}{len(cases):>4} drives{len(told):>4} told"
-    if not told:
+    stated = [(case.true, case.said) for case in cases if case.said is not None]
+    text = f"{kind:26}{len(cases):>4} drives{len(stated):>4} stated"
+    if not stated:
         return text
-    off = [abs(said.value - true) / abs(true) for true, said in told]
-    wide = [(said.high - said.low) / 2.0 / abs(true) for true, said in told]
+    off = [abs(said.value - true) / abs(true) for true, said in stated]
+    wide = [(said.high - said.low) / 2.0 / abs(true) for true, said in stated]
     held = sum(case.holds for case in cases)
     return (
         f"{text}{held:>4} intervals hold the truth; off by {100 * np.median(off):.0f} % (median), "

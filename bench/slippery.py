@@ -1,11 +1,11 @@
-"""Slips without an IMU, told by power: robots in MuJoCo whose descriptions lack physics.
+"""Slips without an IMU, estimated from power: robots in MuJoCo whose descriptions lack physics.
 
     .venv/bin/python bench/slippery.py --out DIR [--robots 8] [--first 20]
 
 Each robot (bench/commissioned.py: values up to 5 % off, three effects left out of its robot.yaml)
 drives some minutes on each kind of floor, half of the time with encoders of 64 counts. Printed are,
 of each kind, end errors and velocity errors while wheels slide, of wheel odometry and of
-tomr_odometry without IMU; how much of the sliding is told, and what is told where nothing slides.
+tomr_odometry without IMU; how much of the sliding is reported, and how much where nothing slides.
 Recordings are kept in DIR and not made again. About 15 s of one core per drive.
 """
 
@@ -118,7 +118,7 @@ class Met:
     ends: tuple[float, float]  # m
     speeds: tuple[float, float]  # m/s, RMS while wheels slide; NaN: they never do
     way: float  # m
-    told: float  # share of the sliding
+    reported: float  # share of the sliding
     false: float  # share of the rest
 
 
@@ -146,7 +146,7 @@ def met(bag: Path, description: Path) -> Met:
     )
     off = [np.array([item.twist for item in items]) - real for items in (plain, ours)]
     slides = (np.abs(off[0] @ body_of(robot)[0].rows.T) > _SLIDING).any(axis=1)
-    told = np.array([item.is_slipping for item in ours])
+    reported = np.array([item.is_slipping for item in ours])
     speeds = [
         math.sqrt(np.mean(np.sum(one[slides, :2] ** 2, axis=1))) if slides.any() else math.nan
         for one in off
@@ -155,8 +155,8 @@ def met(bag: Path, description: Path) -> Met:
         ends=(end_error(paths[0], reference), end_error(paths[1], reference)),
         speeds=(speeds[0], speeds[1]),
         way=float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum()),
-        told=float(told[slides].mean()) if slides.any() else math.nan,
-        false=float(told[~slides].mean()),
+        reported=float(reported[slides].mean()) if slides.any() else math.nan,
+        false=float(reported[~slides].mean()),
     )
 
 
@@ -174,12 +174,12 @@ def _line(kind: str, found: Sequence[Met]) -> str:
     plain, ours = np.array([item.ends for item in found]).T
     ends = ratio(ours, plain, np.array([item.way for item in found]))
     pooled = np.sqrt(np.nanmean(np.square([item.speeds for item in found]), axis=0))
-    told = np.nanmean([item.told for item in found])
+    reported = np.nanmean([item.reported for item in found])
     return (
         f"{kind:7} end {ends['plain_m']:.3f} -> {ends['ours_m']:.3f} m, ratio {ends['ratio']:.2f} "
         f"[{ends['low']:.2f}, {ends['high']:.2f}], worse {100 * ends['worse']:.0f} % of "
-        f"{len(found)}; sliding {pooled[0]:.3f} -> {pooled[1]:.3f} m/s, told {100 * told:.0f} %; "
-        f"of the rest {100 * np.mean([item.false for item in found]):.1f} %"
+        f"{len(found)}; sliding {pooled[0]:.3f} -> {pooled[1]:.3f} m/s, reported "
+        f"{100 * reported:.0f} %; of the rest {100 * np.mean([item.false for item in found]):.1f} %"
     )
 
 
@@ -199,7 +199,7 @@ def _main(arguments: Sequence[str] | None) -> int:
         rows = list(tqdm(found, total=len(tasks), unit="drive"))
     for kind in KINDS:
         print(_line(kind, [row for row, task in zip(rows, tasks, strict=True) if task[1] == kind]))
-    slid = [row for row in rows if row.told == row.told]
+    slid = [row for row in rows if row.reported == row.reported]
     speeds = np.sqrt(np.mean(np.square([row.speeds for row in slid]), axis=0))
     print(f"all: sliding {speeds[0]:.3f} -> {speeds[1]:.3f} m/s, ratio {speeds[1] / speeds[0]:.2f}")
     return 0

@@ -60,9 +60,9 @@ def _judged(bag: Path, truth: dict[str, Any], pipeline: Pipeline) -> Named:
     times, states = [], []
     state = ""
     for _, step in steps_of(bag, pipeline):
-        told = {diagnosis.stamp_ns: diagnosis.state.name for diagnosis in step.diagnoses}
+        named = {diagnosis.stamp_ns: diagnosis.state.name for diagnosis in step.diagnoses}
         for frame in step.frames:
-            state = told.get(frame.stamp_ns, state)
+            state = named.get(frame.stamp_ns, state)
             times.append((frame.stamp_ns - int(truth["t0_ns"])) / NANOSECONDS)
             states.append(state)
     seconds, spans = np.array(times), truth["in_use"]

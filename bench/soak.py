@@ -5,7 +5,7 @@
 Faults come and go, streams fall silent, clocks jump, encoders flood, nodes are killed and started
 again. Minutes are the robot's. Judged: every verdict is found again within 2 s of what it needs
 being back (a killed node has heard all that it listens to, for which DDS has 6 s), no fault is
-named that is not there, the memory of each node stays within 5 % after warm-up, all end when told
+named that is not there, the memory of each node stays within 5 % after warm-up, all end when asked
 to and leave nothing behind. What was passed on in the 30 s before a false word is recorded as
 DIR/false_word_N, for tomr_diagnose.
 

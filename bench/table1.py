@@ -92,10 +92,10 @@ def agreement(codes: Codes, state: str) -> dict[str, object]:
     }
     for name, order in INPUT_ORDERS.items():
         same = codes[:, list(order)] == column
-        told = column[DISPUTED] != 0
+        signed = column[DISPUTED] != 0
         report[name] = {
             "disputed_inputs_as_printed": float(same[:, DISPUTED].mean()),
-            "of_them_where_the_table_has_a_sign": float(same[:, DISPUTED][:, told].mean()),
+            "of_them_where_the_table_has_a_sign": float(same[:, DISPUTED][:, signed].mean()),
             "whole_column_as_printed": float(same.all(axis=1).mean()),
         }
     return report

@@ -1,4 +1,4 @@
-"""`tomr_diagnose` tells good recordings apart; bad ones get one line and exit code 2."""
+"""`tomr_diagnose` distinguishes good recordings from bad; these get one line and exit code 2."""
 
 import json
 import shutil

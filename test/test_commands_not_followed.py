@@ -1,4 +1,4 @@
-"""A robot that is told to drive and stands: driver off, contactor open, collision monitor."""
+"""A robot that is commanded to drive and stands: driver off, contactor open, collision monitor."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +17,7 @@ robot: reference
 phases:
   - {pause: 9.0}
 """
-STOPPED = (3.0, 6.0)  # s, in which it is told to drive
+STOPPED = (3.0, 6.0)  # s, in which it is commanded to drive
 
 
 def test_it_is_said_within_half_a_second_and_taken_back(tmp_path: Path) -> None:

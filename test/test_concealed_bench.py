@@ -20,7 +20,7 @@ from concealed.beyond import OUTSIDE
 from concealed.catalogue import BODY, SIZES, Case, Concealed, catalogue
 from concealed.claims import Report, Truth, report_of, truth_of
 from concealed.concealing import Hidden, hidden_of, real_parameters
-from concealed.concealing import truth_of as told
+from concealed.concealing import truth_of as stated_truth
 from concealed.drives import STYLES, random_plan
 from concealed.driving import STEP, Track
 from concealed.recipes import RECIPES
@@ -152,7 +152,7 @@ def test_effects_stand_where_and_as_large_as_the_truth_says() -> None:
     wrong = Concealed("parameter.robot.mass", BODY, -0.25)
     hidden = [hidden_of(item, nominal, random) for item in (*case.effects, wrong)]
     real = robot_from_parameters(real_parameters(nominal, deviations, hidden), "real")
-    viscous, mass = told(hidden, nominal, deviations)
+    viscous, mass = stated_truth(hidden, nominal, deviations)
     values = [real.effect("friction.viscous", wheel) for wheel in range(3)]
     there = [value is not None for value in values]
     assert there == [joint in viscous["where"] for joint in (W1, W2, W3)]
@@ -253,8 +253,8 @@ def test_effects_outside_the_vocabulary_act_on_their_wheel_only(name: str) -> No
 
 
 def test_the_right_name_at_the_right_place_is_exact() -> None:
-    told_so = {"coefficient": {"value": 0.022, "ci95": [0.019, 0.025]}}
-    right = finding("friction.viscous", W1, W2, W3, parameters=told_so)
+    values = {"coefficient": {"value": 0.022, "ci95": [0.019, 0.025]}}
+    right = finding("friction.viscous", W1, W2, W3, parameters=values)
     outcome = score_case(truth(VISCOUS), report(right))
     (hit,) = outcome.hits
     assert (hit.exact, hit.named, hit.alike, hit.called) == (True, True, True, "friction.viscous")
@@ -338,7 +338,7 @@ def test_a_wrong_parameter_is_scored_by_wheel() -> None:
     (hit,) = score_case(truth(wrong), report(dotted)).hits
     assert hit.exact
     assert hit.comparisons[0].error == pytest.approx(0.0, abs=1e-12)
-    # All three wheels told alike: the family and a wheel are right, so it is no false discovery.
+    # All three wheels named alike: the family and a wheel are right, so it is no false discovery.
     assert score_case(truth(wrong), report({**dotted, "where": ["all_wheels"]})).false == ()
 
 
@@ -542,13 +542,13 @@ def test_the_unnamed_are_scored_by_variable_place_law_and_prediction() -> None:
     )
     assert (comes.repeats, stays.repeats, comes.share, comes.law) == (True, False, None, None)
     missed = unnamed("x.tether", None)
-    assert (missed.recognised, missed.told, missed.share) == (False, "match", 0.0)
+    assert (missed.recognised, missed.named, missed.share) == (False, "match", 0.0)
     assert figures([cubic, otherwise, comes, stays, missed]) == {
         "recognised": (4, 5),
         "variable and place right": (3, 5),
         "share of the possible improvement, median": 0.0,
         "not repeatable, said so": (1, 2),
-        "a right law among those told": (1, 3),
+        "a right law among those reported": (1, 3),
     }
 
 

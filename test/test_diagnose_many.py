@@ -26,7 +26,7 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, di
     return code, json.loads(printed.out), printed.err
 
 
-def test_episodes_do_not_overlap_and_tell_since_when(capsys: pytest.CaptureFixture[str]) -> None:
+def test_episodes_do_not_overlap_and_state_since_when(capsys: pytest.CaptureFixture[str]) -> None:
     code, found, _ = run(capsys, FAULTY, "--phases", 2)
     assert code == 1
     episodes = found["episodes"]

@@ -55,7 +55,7 @@ def test_speed_is_measured_against_the_direction_of_the_model() -> None:
         power, turning = Residual(1.0, 0.5, 4.0), Residual(residual, 0.5, speed, "rad/s")
         return ResidualFrame(2_000_000_000, (*(power,) * 4, *(turning,) * 3, *(power,) * 3))
 
-    for modelled, measured in ((-9.0, -7.0), (9.0, 7.0)):  # slower than told by 2 rad/s
+    for modelled, measured in ((-9.0, -7.0), (9.0, 7.0)):  # slower than commanded by 2 rad/s
         found = simulated.gathered([Step(frames=(frame(modelled, -2.0),))], 1_000_000_000)
         assert found.time == pytest.approx([1.0])
         assert found.speed[0] == pytest.approx([measured] * 3)
@@ -73,7 +73,7 @@ def test_both_power_models_follow_a_short_drive() -> None:
     assert simulated.of_robot(robot, found.speed)[-1] == pytest.approx(0.4, abs=0.02)
 
 
-def test_change_by_distance_tells_line_from_parabola() -> None:
+def test_change_by_distance_distinguishes_line_from_parabola() -> None:
     distance = np.repeat([0.0, *mass_center.DISTANCES], [1, 12, 12, 12, 12])
     line = mass_center.figures_of(10.0 + 10.0 * distance, 10.0 + 10.0 * distance)
     parabola = mass_center.figures_of(10.0 + 10.0 * distance**2, 10.0 + 10.0 * distance)

@@ -166,8 +166,8 @@ def test_states_are_scored_by_their_names_and_first_stamps() -> None:
         # Named now, though it began two seconds ago.
         return Diagnosis(stamp, state, stamp - 2 * 10**9, (), frame, False, wheel)
 
-    told = [(3, STATES[0], None), (4, STATES[0], None), (5, STATES[2], 1), (6, STATES[2], 0)]
-    assert changes_of(said(*item) for item in told) == (
+    decided = [(3, STATES[0], None), (4, STATES[0], None), (5, STATES[2], 1), (6, STATES[2], 0)]
+    assert changes_of(said(*item) for item in decided) == (
         (3.0, "normal", None),
         (5.0, "control_system", 2),
         (6.0, "control_system", 1),
@@ -240,8 +240,8 @@ def test_a_set_of_recordings_is_diagnosed_and_scored_by_its_own_program(tmp_path
     for folder in (drives, drives.parent / "healthy_long", truth / "practice"):
         folder.mkdir(parents=True)
     (drives / "one").symlink_to(ROOT / "bags" / "square")
-    told = {"onset": None, "extended": "battery", "t0_ns": 7 * 10**9, "bumps": [{"t": 0.5}]}
-    (truth / "practice" / "one.json").write_text(json.dumps(told))
+    labels = {"onset": None, "extended": "battery", "t0_ns": 7 * 10**9, "bumps": [{"t": 0.5}]}
+    (truth / "practice" / "one.json").write_text(json.dumps(labels))
     (tmp_path / "score_faults.py").write_text("import sys; print(*sys.argv[1:])")
     recordings = Recordings(tmp_path, "practice")
     (drive,) = recordings.drives("drives")
@@ -263,6 +263,6 @@ def test_absent_recordings_are_one_line(
 ) -> None:
     monkeypatch.setenv("TOMR_RECORDINGS", str(tmp_path))
     assert run_main(main, [command]) == EXIT_BAD_INPUT
-    told = capsys.readouterr().err
-    assert told.count("\n") == 1
-    assert "is absent: set TOMR_RECORDINGS" in told
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1
+    assert "is absent: set TOMR_RECORDINGS" in printed

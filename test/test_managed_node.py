@@ -82,7 +82,7 @@ def test_a_manager_has_the_node_in_hand(
 ) -> None:
     def connected(heard: int, offered: int) -> None:
         wait_until(
-            lambda: manager.connections() == ({heard}, {offered}), f"{heard} heard, {offered} told"
+            lambda: manager.connections() == ({heard}, {offered}), f"{heard} heard, {offered} named"
         )
 
     ros = ["--ros-args", "--params-file", ROBOT]

@@ -150,7 +150,7 @@ def test_intervals_are_those_of_least_squares() -> None:
 def test_an_effect_has_the_terms_that_the_library_says(
     effect: str, values: Mapping[str, float], base: ParameterisedRobot, forward: RecordingSimulation
 ) -> None:
-    """Its own terms tell most of the power that it adds, and more with those that come along."""
+    """Its own terms explain most of the power that it adds, and more with those that come along."""
     given = {f"physics.{effect}.{name}": value for name, value in values.items()}
     robots = [base.robot, base.given(given).robot]
     added = np.subtract(*forward.predict(robots)[::-1])
@@ -159,11 +159,11 @@ def test_an_effect_has_the_terms_that_the_library_says(
     for channel, part in zip(forward.channels, rows_of(forward.channels), strict=True):
         if channel.kind == "power":
             columns = dict(zip(series, columns_of(forward, series, channel).T, strict=True))
-            assert _told(added[part], [columns[name] for name in own | along]) > 0.5
-            assert _told(added[part], [columns[name] for name in own]) > 0.4
+            assert _explained(added[part], [columns[name] for name in own | along]) > 0.5
+            assert _explained(added[part], [columns[name] for name in own]) > 0.4
 
 
-def _told(target: np.ndarray[Any, Any], columns: list[np.ndarray[Any, Any]]) -> float:
+def _explained(target: np.ndarray[Any, Any], columns: list[np.ndarray[Any, Any]]) -> float:
     """Share of the target's energy that columns explain."""
     matrix = np.stack(columns, axis=1)
     left = target - matrix @ np.linalg.lstsq(matrix, target, rcond=None)[0]

@@ -91,12 +91,12 @@ signal.pause()
     ("code", "more", "found"),
     [
         ("0", "", {}),
-        ("1", "", {"nodes end when told to, and only then": "node: code 1"}),
+        ("1", "", {"nodes end when asked to, and only then": "node: code 1"}),
         (
             "0",
             "print('Traceback'); sys.exit(0)",
             {
-                "nodes end when told to, and only then": "node ended by itself",
+                "nodes end when asked to, and only then": "node ended by itself",
                 "tracebacks in logs": "node",
             },
         ),

@@ -52,11 +52,11 @@ SHARED = {path.stem for path in ROOT.glob("test/*.py")}
 
 @functools.cache
 def setup_arguments(package: Path) -> dict[str, Any]:
-    """What the package's setup.py tells setuptools."""
-    told: dict[str, Any] = {}
-    with contextlib.chdir(package), patch("setuptools.setup", lambda **given: told.update(given)):
+    """What the package's setup.py gives setuptools."""
+    stated: dict[str, Any] = {}
+    with contextlib.chdir(package), patch("setuptools.setup", lambda **given: stated.update(given)):
         runpy.run_path("setup.py")
-    return told
+    return stated
 
 
 def commands(package: Path) -> list[str]:
@@ -142,7 +142,7 @@ def test_install_has_what_ros2_looks_for(package: Path) -> None:
 @each_package()
 def test_package_xml_agrees_with_setup(package: Path) -> None:
     root = ET.parse(package / "package.xml").getroot()
-    told = setup_arguments(package)
+    stated = setup_arguments(package)
     for tag, key in (
         ("name", "name"),
         ("version", "version"),
@@ -150,10 +150,10 @@ def test_package_xml_agrees_with_setup(package: Path) -> None:
         ("license", "license"),
         ("maintainer", "maintainer"),
     ):
-        assert root.findtext(tag) == told[key]
-    assert told["version"] == setup_arguments(PACKAGES[0])["version"]
+        assert root.findtext(tag) == stated[key]
+    assert stated["version"] == setup_arguments(PACKAGES[0])["version"]
     address = root.find("maintainer").attrib["email"]  # type: ignore[union-attr]
-    assert address == told["maintainer_email"]
+    assert address == stated["maintainer_email"]
     # colcon builds plain Python, without a word, where it takes the address for invalid.
     assert re.fullmatch(r"[-\w.]+@[-\w]+(\.[-\w]+)+", address)
     assert root.findtext("export/build_type") == "ament_python"
@@ -162,8 +162,8 @@ def test_package_xml_agrees_with_setup(package: Path) -> None:
 @each_package()
 def test_every_file_of_the_package_is_installed(package: Path) -> None:
     with contextlib.chdir(package):
-        told = {**setup_arguments(package), "script_name": "setup.py"}
-        command = setuptools.Distribution(told).get_command_obj("build_py")
+        stated = {**setup_arguments(package), "script_name": "setup.py"}
+        command = setuptools.Distribution(stated).get_command_obj("build_py")
         command.ensure_finalized()
         installed = {str(Path(file)) for _, _, file in command.find_all_modules()}
         for _, folder, _, files in command.data_files:
@@ -282,8 +282,8 @@ def test_the_diagnosis_is_launched_as_three_nodes_or_as_one() -> None:
     modules = [f"{package}{name}" for package in ("launch", "launch_ros") for name in names]
     file = ROOT / "src/tomr_fault_diag/launch/diagnosis.launch.py"
     with patch.dict(sys.modules, {name: _Launch(name) for name in modules}):
-        (told,) = runpy.run_path(str(file))["generate_launch_description"]().given
-    nodes = [action.named for action in told if type(action).__name__ == "Node"]
+        (stated,) = runpy.run_path(str(file))["generate_launch_description"]().given
+    nodes = [action.named for action in stated if type(action).__name__ == "Node"]
     started: dict[str, set[str]] = {"IfCondition": set(), "UnlessCondition": set()}
     for node in nodes:
         (switch,) = node["condition"].given
@@ -297,7 +297,7 @@ def test_the_diagnosis_is_launched_as_three_nodes_or_as_one() -> None:
         "IfCondition": {"tomr_diagnosis"},
         "UnlessCondition": {"power_model", "power_residuals", "fault_classifier"},
     }
-    arguments = {action.given[0] for action in told if "default_value" in action.named}
+    arguments = {action.given[0] for action in stated if "default_value" in action.named}
     used = {
         value.given[0].given[0] for n in nodes for v in n["parameters"][2:] for value in v.values()
     }

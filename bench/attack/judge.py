@@ -176,12 +176,12 @@ def problem_of(given: Attack, code: int, errors: str, output: str) -> str:
         return half
     lines = [line for line in errors.splitlines() if line.strip()]
     usage = any(line.startswith("usage:") for line in lines)
-    told = given.largest_file is None and given.tool != "tomr_import_robotino" and not usage
+    strict = given.largest_file is None and given.tool != "tomr_import_robotino" and not usage
     said = sum(line.startswith("error:") for line in lines)
     several = given.tool == "tomr_diagnose" and said > 0  # a line for each recording
-    if told and code == 2 and said != 1 and not several:
+    if strict and code == 2 and said != 1 and not several:
         return "no line"
-    if told and any(not line.startswith(_QUIET) for line in lines):
+    if strict and any(not line.startswith(_QUIET) for line in lines):
         return "other lines"
     return _false_word(given, code, output)
 

@@ -41,8 +41,8 @@ _REPLY_S = 2.0  # for an answer of the web server
 @attack("parameters at run time")
 def parameters(dice: random.Random, folder: Path, base: Base) -> Attack:
     node = dice.choice(NODES)
-    told = {"node": node, "seed": dice.randrange(2**31), "sets": dice.choice((1, 5, 40))}
-    return Attack("parameters", (json.dumps(told),), f"{told['sets']} of {node}")
+    choice = {"node": node, "seed": dice.randrange(2**31), "sets": dice.choice((1, 5, 40))}
+    return Attack("parameters", (json.dumps(choice),), f"{choice['sets']} of {node}")
 
 
 def set_parameters(arguments: Sequence[str]) -> int:
@@ -55,15 +55,15 @@ def _set_parameters(arguments: Sequence[str] | None) -> int:
     from rclpy.parameter import Parameter
 
     (text,) = arguments or ()
-    told = json.loads(text)
-    dice = random.Random(told["seed"])
+    choice = json.loads(text)
+    dice = random.Random(choice["seed"])
     robot = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")
     with as_file(robot) as file:
         rclpy.init(args=["--ros-args", "--params-file", str(file), "--log-level", "fatal"])
-    node = _node(told["node"])
+    node = _node(choice["node"])
     names = sorted(str(name) for name in node._parameters)
     refused = 0
-    for _ in range(told["sets"]):
+    for _ in range(choice["sets"]):
         count = dice.choice((1, 1, 3))
         wanted = []
         for _ in range(count):
@@ -150,8 +150,8 @@ _ASKED = (
 @attack("pages and sockets")
 def clients(dice: random.Random, folder: Path, base: Base) -> Attack:
     sent = [_sent(dice) for _ in range(dice.choice((1, 3, 10)))]
-    told = json.dumps([data.hex() for data in sent])
-    return Attack("live view", (told,), repr(sent[0][:40]))
+    text = json.dumps([data.hex() for data in sent])
+    return Attack("live view", (text,), repr(sent[0][:40]))
 
 
 def _sent(dice: random.Random) -> bytes:

@@ -18,7 +18,7 @@ from tomr_power_model.messages.bag import jazzy_typestore
 from tomr_power_model.recordings import RecordingWriter
 
 Raws = Iterable[Raw]
-_STAMP, _HEAD = struct.Struct("<iI"), 4  # the stamp comes after what tells the encoding
+_STAMP, _HEAD = struct.Struct("<iI"), 4  # the stamp comes after what states the encoding
 SECOND = 1_000_000_000
 _DEAD_S = 2.0  # as the classifier has it
 EXTREMES = (math.nan, math.inf, -math.inf, 1e308, -1e308, 1e30, -1e30, 1e6, 0.0, 5e-324)
@@ -209,9 +209,9 @@ def odd_stamps(dice: random.Random, folder: Path, base: Base) -> Attack:
     return Attack(tool, arguments, what, _known_of_stamps(kind, clock, chosen, names))
 
 
-def _moved(kind: str, stamp: int, told: tuple[int, int, int], dice: random.Random) -> int:
-    """A stamp that is not true [ns]; `told`: the first, one in the middle, by how much."""
-    first, middle, by = told
+def _moved(kind: str, stamp: int, moves: tuple[int, int, int], dice: random.Random) -> int:
+    """A stamp that is not true [ns]; `moves`: the first, one in the middle, by how much."""
+    first, middle, by = moves
     if (kind == "jump" and stamp > middle) or (kind == "stray" and dice.random() < 0.01):
         return stamp + by
     if kind == "far" and dice.random() < 0.02:
@@ -235,7 +235,7 @@ def _known_of_stamps(
         return None  # a well-formed recording of a motion that no robot makes
     if clock != "stamped" and alone and kind in ("jump", "reverse", "shuffle"):
         names |= {POWER[topic] for topic in chosen if topic in POWER}  # no power of this motion
-    # It moves before or long after it is told to.
+    # It moves before or long after its command.
     if clock == "both" and alone and kind in ("jump", "reverse") and chosen & _MOTION:
         names |= {DISOBEYS.name}
     return names

@@ -1,4 +1,4 @@
-"""Attacks on what tells of a recording or a robot: metadata.yaml, sqlite3 tables, commissioning."""
+"""Attacks on what describes recordings or robots: metadata.yaml, sqlite3 tables, commissioning."""
 
 import random
 import sqlite3

@@ -42,7 +42,7 @@ class Case:
     style: str = "varied"  # of the missions
     noise: Literal["white", "autocorrelated"] = "white"
     total_only: bool = False
-    says_so: bool = True  # whether robot.yaml tells that there is no power of single motors
+    says_so: bool = True  # whether robot.yaml states that there is no power of single motors
     stiffness: float = 1.0  # times the usual gains of the speed loop
     balanced: bool = False  # the second effect is scaled until the mean power is that of neither
     quick: bool = False  # belongs to the group `small`

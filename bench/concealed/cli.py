@@ -29,9 +29,9 @@ its own, and keeps its report as REPORTS/<id>.json and the seconds it took. A ca
 is named with its last line. Works on the recordings `concealed` as well."""
 _SCORE = """\
 Scores a folder of reports against a folder of truths; a missing report is a miss. exact: effect and
-place, with confidence of at least 0.5. class: the effect, or one that data cannot tell from it, is
-named or among the rivals at an overlapping place. false discovery: a confident finding that is
-neither, nor a deviation of the robot told right."""
+place, with confidence of at least 0.5. class: the effect, or one that data cannot distinguish from
+it, is named or among the rivals at an overlapping place. false discovery: a confident finding that
+is neither, nor a deviation of the robot stated right."""
 _EPILOG = """\
 A look at twelve cases:
   concealed.py make --out concealed --group small

@@ -109,7 +109,7 @@ def beyond_effects(hidden: Sequence[Hidden], robot: Robot) -> list[PlantEffect]:
 def truth_of(
     hidden: Sequence[Hidden], nominal: Nested, deviations: Deviations
 ) -> list[dict[str, Any]]:
-    """The concealed effects as the truth file tells them."""
+    """The concealed effects as the truth file states them."""
     return [
         {"id": f"e{number}", **_truth(item, nominal, deviations)}
         for number, item in enumerate(hidden, start=1)
@@ -117,21 +117,21 @@ def truth_of(
 
 
 def _truth(item: Hidden, nominal: Nested, deviations: Deviations) -> dict[str, Any]:
-    told: dict[str, Any] = {"effect": item.effect, "where": list(item.where)}
+    stated: dict[str, Any] = {"effect": item.effect, "where": list(item.where)}
     outside = OUTSIDE.get(item.effect)
     if is_parameter(item.effect):
-        told["parameters"] = _wrong_value(item, nominal, deviations)
+        stated["parameters"] = _wrong_value(item, nominal, deviations)
     elif outside is None:
         units = EFFECTS[item.effect].parameters
-        told["parameters"] = {
+        stated["parameters"] = {
             key: {"value": value, "unit": units[key].unit} for key, value in item.values.items()
         }
     else:
-        told |= {"effect": "unknown", "nature": item.effect, "shape": outside.shape}
-        told["parameters"] = {
+        stated |= {"effect": "unknown", "nature": item.effect, "shape": outside.shape}
+        stated["parameters"] = {
             key: {"value": value, "unit": outside.units[key]} for key, value in item.values.items()
         }
-    return told | {"size": item.size_name, "amount": item.size}
+    return stated | {"size": item.size_name, "amount": item.size}
 
 
 def _wrong_value(item: Hidden, nominal: Nested, deviations: Deviations) -> dict[str, Any]:

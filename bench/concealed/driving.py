@@ -24,7 +24,7 @@ STEP = 0.005  # s: a stretch of the plant, and the window of a power monitor
 _STEP_NS = round(STEP * NANOSECONDS)
 _ACCELERATION_SPAN = 2  # steps
 # The plant's own sensors stay idle: this bench has its own, see sensing.py. The drivers count
-# without quanta: what quanta stir up in the loop is chance, and no oracle could foretell it.
+# without quanta: what quanta stir up in the loop is chance, and no oracle could predict it.
 _IDLE = {
     "power_rate": 1.0,
     "encoder_rate": 1.0,
@@ -55,7 +55,7 @@ class Track:
         )
 
     def power_at(self, when: Array, supply: int) -> Array:
-        """Power drawn [W], from the averaged voltage and current as a monitor tells it."""
+        """Power drawn [W], from the averaged voltage and current as a monitor reports it."""
         voltage, current = self.supply_at(when, supply)
         return voltage * current
 

@@ -9,7 +9,7 @@ from attrs import frozen
 
 from concealed.claims import PARAMETER, WHEELS, Finding, Places, TrueEffect, Truth
 
-# Effects that power and encoders cannot tell apart, or hardly.
+# Effects that power and encoders cannot distinguish, or hardly.
 _ALIKE: tuple[frozenset[str], ...] = tuple(
     frozenset(names)
     for names in (
@@ -55,14 +55,14 @@ _ALIKE: tuple[frozenset[str], ...] = tuple(
         ("body.mass_center_offset", "parameter.robot.mass_center"),
     )
 )
-_CLOSE = 0.015  # of the nominal value: a wrong parameter told this well is told right
+_CLOSE = 0.015  # of the nominal value: a wrong parameter stated this well is stated right
 _NARROW = 0.2  # of the nominal value: an interval that says something
 _NOT_COMPARED = ("nominal", "initial_temperature")
 _ANGLES = ("phase", "azimuth")
 
 
 def family(effect: str) -> frozenset[str]:
-    """An effect with those that data can hardly tell from it."""
+    """An effect with those that data can hardly distinguish from it."""
     return frozenset({effect}).union(*(alike for alike in _ALIKE if effect in alike))
 
 
@@ -77,23 +77,23 @@ def explains(finding: Finding, true: TrueEffect) -> bool:
 
 
 def is_true(finding: Finding, truth: Truth) -> bool:
-    """Whether a finding tells something that is so, be it concealed or a deviation of the part."""
+    """Whether a finding states something that is so, be it concealed or a deviation of the part."""
     if any(explains(finding, true) for true in truth.effects):
         return True
-    return finding.effect.startswith(PARAMETER) and tells_value(finding, truth)
+    return finding.effect.startswith(PARAMETER) and states_value(finding, truth)
 
 
-def tells_value(finding: Finding, truth: Truth) -> bool:
-    """Whether a `parameter.*` finding tells what the part really is."""
+def states_value(finding: Finding, truth: Truth) -> bool:
+    """Whether a `parameter.*` finding states what the part really is."""
     nominal = _nominal(truth.nominal, finding.effect.removeprefix(PARAMETER))
     actual = actual_value(finding, truth)
     if nominal is None or actual is None:
         return False
-    for told in finding.values.values():
-        if abs(told.value - actual) <= _CLOSE * abs(nominal):
+    for estimate in finding.values.values():
+        if abs(estimate.value - actual) <= _CLOSE * abs(nominal):
             return True
-        if told.interval is not None:
-            low, high = told.interval
+        if estimate.interval is not None:
+            low, high = estimate.interval
             if low <= actual <= high and high - low < _NARROW * abs(nominal):
                 return True
     return False
@@ -136,7 +136,7 @@ def _wheels(places: Places) -> list[int]:
 
 @frozen
 class Comparison:
-    """One parameter, told against true."""
+    """One parameter, reported against true."""
 
     effect: str
     parameter: str
@@ -147,15 +147,15 @@ class Comparison:
 def compared(true: TrueEffect, finding: Finding) -> Iterator[Comparison]:
     """Parameters of a finding of the right name against the true ones."""
     for key, value in true.values.items():
-        told = finding.values.get(key)
-        if told is None and true.effect.startswith(PARAMETER) and key == "value":
-            told = next(iter(finding.values.values()), None)
-        if told is None or key in _NOT_COMPARED:
+        reported = finding.values.get(key)
+        if reported is None and true.effect.startswith(PARAMETER) and key == "value":
+            reported = next(iter(finding.values.values()), None)
+        if reported is None or key in _NOT_COMPARED:
             continue
         covered = None
-        if told.interval is not None:
-            covered = told.interval[0] <= value <= told.interval[1]
-        error = _relative(key, told.value - value, value, true)
+        if reported.interval is not None:
+            covered = reported.interval[0] <= value <= reported.interval[1]
+        error = _relative(key, reported.value - value, value, true)
         yield Comparison(true.effect, key, error, covered)
 
 

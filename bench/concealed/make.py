@@ -170,8 +170,8 @@ def _recorded(
     for name, mission in zip(("real", "real_holdout"), missions, strict=True):
         true = robot.drive(hidden, mission)
         nominal = robot.simulate(mission)
-        told = write_recording(folder / name, true, robot.sensors, mission.start_ns, random)
-        found[name] = oracle.errors(told, nominal, true)
+        readings = write_recording(folder / name, true, robot.sensors, mission.start_ns, random)
+        found[name] = oracle.errors(readings, nominal, true)
         if name == "real":
             ideal = SensorSet(imu=robot.sensors.imu, wheel_power=robot.sensors.wheel_power)
             write_recording(folder / "sim", nominal, ideal, mission.start_ns, random)

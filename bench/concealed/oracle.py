@@ -17,12 +17,12 @@ _MOST = 0.9
 
 
 def errors(
-    told: Mapping[str, Measured], nominal: Track, true: Track
+    readings: Mapping[str, Measured], nominal: Track, true: Track
 ) -> dict[str, dict[str, float] | dict[str, dict[str, float]]]:
     """NRMSE by channel, of the wheels together and of the total: see `nrmse`."""
     channels: dict[str, dict[str, float]] = {}
     squares: dict[str, Array] = {}
-    for topic, reading in told.items():
+    for topic, reading in readings.items():
         supply = SUPPLIES.index(topic)
         power = reading.power
         before = power - nominal.power_at(reading.time, supply)

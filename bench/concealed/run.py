@@ -16,7 +16,7 @@ from tomr_power_model.errors import InputError
 
 TIMES_FILE = "seconds.json"  # in the folder of reports
 _REPORT = "report.json"
-_TOLD = (0, 1)  # exit codes of a tool that came to a verdict: match, mismatch
+_DECIDED = (0, 1)  # exit codes of a tool that came to a verdict: match, mismatch
 _TIMEOUT = 1800.0  # s
 
 
@@ -60,7 +60,7 @@ def explain(command: Sequence[str], case: Path, reports: Path, out: Path) -> Run
         return Run(case.name, time.perf_counter() - begin, str(error))
     seconds = time.perf_counter() - begin
     written = target / _REPORT
-    if done.returncode not in _TOLD or not written.exists():
+    if done.returncode not in _DECIDED or not written.exists():
         lines = (done.stderr or done.stdout).strip().splitlines() or ["said nothing"]
         return Run(case.name, seconds, f"exit code {done.returncode}: {lines[-1]}")
     shutil.copyfile(written, reports / f"{case.name}.json")

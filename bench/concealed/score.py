@@ -1,8 +1,9 @@
 """Reports against truths.
 
 exact: the effect is named with its place, confidence 0.5 or more. class: the effect or one that
-data cannot tell from it is named, or listed as a rival, at an overlapping place, whatever the
-confidence. false discovery: a confident finding that is neither, nor a wrong parameter told right.
+data cannot distinguish from it is named, or listed as a rival, at an overlapping place, whatever
+the confidence. false discovery: a confident finding that is neither, nor a wrong parameter stated
+right.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -21,7 +22,7 @@ from concealed.likeness import (
     family,
     is_true,
     overlap,
-    tells_value,
+    states_value,
 )
 
 NOTHING = "(nothing)"
@@ -55,7 +56,7 @@ class Outcome:
     false: tuple[str, ...]
     overconfident: tuple[str, ...]
     verdict_right: bool
-    place: float | None  # Jaccard index of the places told and true; None for nulls
+    place: float | None  # Jaccard index of the places named and true; None for nulls
     after: float | None  # NRMSE on the holdout as reported
     seconds: float | None
 
@@ -129,13 +130,13 @@ def _overconfident(truth: Truth, sure: Iterable[Finding]) -> Iterable[str]:
 
 
 def _verdict_right(truth: Truth, report: Report | None) -> bool:
-    """A null may also be told by naming its deviations, and them rightly."""
+    """A null may also be recognised by naming its deviations, and them rightly."""
     if report is None:
         return False
     if not truth.null:
         return report.verdict == MISMATCH
     deviations_only = all(
-        finding.effect.startswith(PARAMETER) and tells_value(finding, truth)
+        finding.effect.startswith(PARAMETER) and states_value(finding, truth)
         for finding in report.confident
     )
     return report.verdict == MATCH or deviations_only
@@ -143,8 +144,8 @@ def _verdict_right(truth: Truth, report: Report | None) -> bool:
 
 def _place(truth: Truth, sure: Sequence[Finding]) -> float:
     true = frozenset[str]().union(*(effect.places for effect in truth.effects))
-    told = frozenset[str]().union(*(finding.places for finding in sure))
-    return len(true & told) / len(true | told)
+    named = frozenset[str]().union(*(finding.places for finding in sure))
+    return len(true & named) / len(true | named)
 
 
 def score_all(
@@ -165,8 +166,8 @@ def totals(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     nulls = [item for item in outcomes if item.truth.null]
     hits = [hit for item in outcomes for hit in item.hits]
     unknown = [item for item in real if any(hit.effect == UNKNOWN for hit in item.hits)]
-    told = [comparison for hit in hits for comparison in hit.comparisons]
-    covered = [item.covered for item in told if item.covered is not None]
+    compared = [comparison for hit in hits for comparison in hit.comparisons]
+    covered = [item.covered for item in compared if item.covered is not None]
     gaps = [_gap_closed(item) for item in real]
     ratios = [item.after / item.truth.oracle for item in real if item.after is not None]
     return {
@@ -184,7 +185,7 @@ def totals(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "unknown_misnamed": _share(unknown, lambda item: bool(item.false)),
         "overconfident": sum(len(item.overconfident) for item in outcomes),
         "place": _mean([item.place for item in real if item.place is not None]),
-        "parameter_error_median": _median([item.error for item in told]),
+        "parameter_error_median": _median([item.error for item in compared]),
         "intervals_covering": (sum(covered), len(covered)),
         "gap_closed_median": _median([gap for gap in gaps if gap is not None]),
         "oracle_ratio_median": _median(ratios),

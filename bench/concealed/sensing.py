@@ -77,7 +77,7 @@ def drawn_sensors(
 
 @frozen
 class Measured:
-    """What the power monitor of one supply told: stamp [s], voltage [V], current drawn [A]."""
+    """What the power monitor of one supply measured: stamp [s], voltage [V], current drawn [A]."""
 
     time: Array
     voltage: Array
@@ -148,7 +148,7 @@ def write_recording(
     path: Path, track: Track, sensors: SensorSet, start_ns: int, random: np.random.Generator
 ) -> dict[str, Measured]:
     """Write a recording and return what it says about power, by topic."""
-    told = {
+    readings = {
         topic: measured(track, supply, sensors, random)
         for supply, topic in enumerate(SUPPLIES)
         if supply == BATTERY or sensors.wheel_power
@@ -157,7 +157,7 @@ def write_recording(
         *_commands(track, sensors, start_ns, random),
         *_joint_states(track, sensors, start_ns, random),
     ]
-    for topic, reading in told.items():
+    for topic, reading in readings.items():
         found.extend(_power(topic, reading, start_ns))
     if sensors.imu:
         found.extend(_imu(track, sensors, start_ns, random))
@@ -170,7 +170,7 @@ def write_recording(
         for stamp, sample in received:
             message = to_bag(sample.message)
             writer.write(sample.topic, sample.message.type_name, message, stamp)
-    return told
+    return readings
 
 
 def _commands(

@@ -41,8 +41,8 @@ def print_cases(console: Console, outcomes: Sequence[Outcome]) -> None:
 
 
 def _case_row(outcome: Outcome) -> list[str]:
-    truth, told = outcome.truth, [item for hit in outcome.hits for item in hit.comparisons]
-    covered = [item.covered for item in told if item.covered is not None]
+    truth, compared = outcome.truth, [item for hit in outcome.hits for item in hit.comparisons]
+    covered = [item.covered for item in compared if item.covered is not None]
     verdict = outcome.report.verdict if outcome.report else "(no report)"
     return [
         truth.identity,
@@ -51,7 +51,7 @@ def _case_row(outcome: Outcome) -> list[str]:
         _of(sum(hit.exact for hit in outcome.hits), len(outcome.hits)),
         _of(sum(hit.alike for hit in outcome.hits), len(outcome.hits)),
         _number(outcome.place, 2),
-        _number(max((item.error for item in told), default=None), 3),
+        _number(max((item.error for item in compared), default=None), 3),
         _of(sum(covered), len(covered)),
         _number(truth.before, 3),
         _number(outcome.after, 3),
@@ -107,8 +107,8 @@ def print_confusion(console: Console, counts: Mapping[tuple[str, str], int]) -> 
             reverse=True,
         )
         total = sum(n for (t, _), n in counts.items() if t == true)
-        told = ", ".join(f"{called} {n}" for n, called in others)
-        table.add_row(true, f"{counts.get((true, right), 0)}/{total}", told)
+        listed = ", ".join(f"{called} {n}" for n, called in others)
+        table.add_row(true, f"{counts.get((true, right), 0)}/{total}", listed)
     console.print(table)
 
 
@@ -140,7 +140,7 @@ def draw_confusion(counts: Mapping[tuple[str, str], int], path: Path) -> None:
                 )  # fmt: skip
     axes.set_xticks(range(len(columns)), columns, rotation=90, fontsize=8)
     axes.set_yticks(range(len(rows)), rows, fontsize=8)
-    axes.set_xlabel("called (solid frame: right, dotted: data can hardly tell)")
+    axes.set_xlabel("called (solid frame: right, dotted: data can hardly distinguish)")
     axes.set_ylabel("concealed")
     figure.savefig(path, bbox_inches="tight")
 
@@ -163,14 +163,14 @@ def print_totals(console: Console, found: Mapping[str, Any]) -> None:
 def print_unnamed(console: Console, found: Sequence[Met], figures: Mapping[str, Any]) -> None:
     """What has no name: one line per case, and the figures of all."""
     table = Table(title="Without a name", box=None)
-    for heading in ("id", "case", "told as", "placed", "share", "comes and goes", "law"):
+    for heading in ("id", "case", "named as", "placed", "share", "comes and goes", "law"):
         table.add_column(heading, no_wrap=True)
     for item in found:
         marks = [
             "-" if said is None else "yes" if said else "no" for said in (item.repeats, item.law)
         ]
         share, placed = _number(item.share, 2), "yes" if item.placed else "no"
-        table.add_row(item.truth.identity, item.truth.name, item.told, placed, share, *marks)
+        table.add_row(item.truth.identity, item.truth.name, item.named, placed, share, *marks)
     console.print(table)
     for name, value in figures.items():
         console.print(f"{name}: {'-' if value is None else _any(value)}")

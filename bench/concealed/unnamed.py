@@ -48,11 +48,11 @@ class Met:
 
     truth: Truth
     recognised: bool
-    told: str  # family and place, or what it was called
+    named: str  # family and place, or what it was called
     placed: bool  # the right variable at the right place
     share: float | None  # of the possible improvement on the held-out drive
     repeats: bool | None  # said to come and go where it does
-    law: bool | None  # a right law among those that are told
+    law: bool | None  # a right law among those that are reported
 
 
 def met_all(truths: Sequence[Truth], reports: Path) -> list[Met]:
@@ -75,7 +75,7 @@ def met(truth: Truth, true: TrueEffect, report: Report) -> Met:
     return Met(
         truth=truth,
         recognised=unknown is not None,
-        told=f"{family} at {', '.join(sorted(places))}" if unknown else _called(report.confident),
+        named=f"{family} at {', '.join(sorted(places))}" if unknown else _called(report.confident),
         placed=family in kind.families and places == true.places,
         share=_share(truth, report) if kind.repeats else None,
         repeats=None if kind.repeats else learnt.get("repeatable") is False,
@@ -107,5 +107,5 @@ def figures(found: Sequence[Met]) -> dict[str, tuple[int, int] | float | None]:
         "variable and place right": counted([item.placed for item in found]),
         "share of the possible improvement, median": median(shares) if shares else None,
         "not repeatable, said so": counted([item.repeats for item in found]),
-        "a right law among those told": counted([item.law for item in found]),
+        "a right law among those reported": counted([item.law for item in found]),
     }

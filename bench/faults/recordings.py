@@ -61,11 +61,11 @@ class Recordings:
         """All of a kind (`healthy`, `healthy_long`, `drives`) in the order of their ids."""
         found = []
         for bag in sorted((self.folder / "faults" / self.robot / kind).iterdir()):
-            told = _json(self.truth / self.robot / f"{bag.name}.json")
-            is_normal = told["onset"] is None and told["extended"] == "none"
-            start = int(told["t0_ns"])
-            bumps = [start + round(1e9 * bump["t"]) for bump in told.get("bumps") or ()]
-            size = told.get("severity") or {}
+            truth = _json(self.truth / self.robot / f"{bag.name}.json")
+            is_normal = truth["onset"] is None and truth["extended"] == "none"
+            start = int(truth["t0_ns"])
+            bumps = [start + round(1e9 * bump["t"]) for bump in truth.get("bumps") or ()]
+            size = truth.get("severity") or {}
             has_size = isinstance(size.get("value"), float)
             severity = (size["quantity"], size["value"]) if has_size else None
             found.append(Drive(bag.name, bag, is_normal, tuple(bumps), severity))

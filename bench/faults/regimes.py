@@ -72,7 +72,7 @@ def tick_speeds(
 ) -> Array:
     """Mean speeds [rad/s] over the ticks that end at the stamps, (n, 3), from angles (m, 3) [rad].
 
-    NaN where the encoders tell nothing of a tick's start or end.
+    NaN where the encoders show nothing of a tick's start or end.
     """
     ends = (stamp_ns - time_ns[0]).astype(np.float64)
     time = (time_ns - time_ns[0]).astype(np.float64)

@@ -125,14 +125,14 @@ def _experiment(title: str, fault: str) -> Result:
         powers = [f"{ours.mean():.2f} / {model.mean():.2f}" for ours, model in pairs]
         rows.append((phase, *powers[:3], powers[4], *(_mostly(i, span) for i in judged.values())))
     first = {name: _first_named(item) for name, item in judged.items()}
-    told = "; ".join(f"{_JUDGES[name]}: {what}" for name, what in first.items())
+    named = "; ".join(f"{_JUDGES[name]}: {what}" for name, what in first.items())
     return Result(
         f"{title}, mean power measured / modelled, W",
         ("phase", "motor 1", "motor 2", "motor 3", "robot", *_JUDGES.values()),
         rows,
         {"phases": numbers, "first_named": first},
         _picture(found, judged, true_speed(heard), title),
-        (f"moves from {PHASES['1: 20 deg from -Y'][0]:.2f} s on; first named: {told}",),
+        (f"moves from {PHASES['1: 20 deg from -Y'][0]:.2f} s on; first named: {named}",),
     )
 
 

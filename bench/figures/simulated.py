@@ -157,9 +157,9 @@ def of_robot(robot: Robot, wheel_speed: Array) -> Array:
 
 def true_speed(heard: Sequence[Heard]) -> tuple[Array, Array]:
     """Times since the start [s] and the simulated robot's true speed [m/s], (n,) each."""
-    told = [item for item in heard if item.topic == "ground_truth/odom"]
-    time = [1e-9 * (item.stamp_ns - heard[0].stamp_ns) for item in told]
-    linear = [item.message.twist.twist.linear for item in told]
+    odometry = [item for item in heard if item.topic == "ground_truth/odom"]
+    time = [1e-9 * (item.stamp_ns - heard[0].stamp_ns) for item in odometry]
+    linear = [item.message.twist.twist.linear for item in odometry]
     return np.array(time), np.array([np.hypot(v.x, v.y) for v in linear])
 
 

@@ -16,12 +16,12 @@ from others.sparse import Equation, Sparse
 
 _JOINTS = sorted(WHEELS)
 _TOLERANCE = 0.02  # by which any value may be off its description
-_TOLD = 3  # parameters in a line
+_LISTED = 3  # parameters in a line
 
 
 @frozen
 class Verdict:
-    """What a method tells of one case, and how much of that is so."""
+    """What a method claims of one case, and how much of that is so."""
 
     after: float | None  # NRMSE on the holdout
     claims: int  # parameters said to be off by more than the tolerance; terms; findings
@@ -61,13 +61,13 @@ def score_refit(truth: Truth, found: Refit) -> Verdict:
     claimed = [fit for fit in found.fits if _surely_moved(fit) > _TOLERANCE]
     claimed.sort(key=_surely_moved, reverse=True)
     bounded = sum(fit.at_bound for fit in found.fits)
-    told = [f"{fit.key} {_percent(fit)}" for fit in claimed[:_TOLD]]
+    listed = [f"{fit.key} {_percent(fit)}" for fit in claimed[:_LISTED]]
     return Verdict(
         after=found.after,
         claims=len(claimed),
         false=tuple(fit.key for fit in claimed if not is_true(finding_of(fit), truth)),
         named=None,
-        says="; ".join([f"{bounded} at a bound" if bounded else "no issues detected", *told]),
+        says="; ".join([f"{bounded} at a bound" if bounded else "no issues detected", *listed]),
     )
 
 

@@ -72,12 +72,12 @@ def columns_of(
 
 
 def _shape(own: str, along: str = "") -> Shape:
-    """Terms that tell an effect, and terms that come along with it."""
+    """Terms that show an effect, and terms that come along with it."""
     return frozenset(own.split(", ")), frozenset(along.split(", ")) - {""}
 
 
 # The loop holds the speed: a torque T costs w T, and about |i| T in the winding.
-# Effects that no term tells are missing.
+# Effects that no term shows are missing.
 _NOTHING: Shape = (frozenset(), frozenset())
 _COPPER = _shape("i^2", "w i")
 _BODY = _shape("w a", "i^2, w i, i, braking")

@@ -149,7 +149,7 @@ def _later(robot: Robot, delay: float) -> Robot:
 
 
 def half_widths(residual: Array, jacobian: Array) -> Array:
-    """Half the 95 % intervals from the Jacobian at the optimum; infinite where it tells nothing."""
+    """Half the 95 % intervals from the Jacobian at the optimum; infinite where it shows nothing."""
     freedom = len(residual) - jacobian.shape[1]
     values, vectors = np.linalg.eigh(jacobian.T @ jacobian)
     blind = values <= _SINGULAR * values[-1]

@@ -19,19 +19,19 @@ def totals(rows: Sequence[Row]) -> dict[str, dict[str, Any]]:
     """By method: held-out error against the oracle's; what is claimed, and not so."""
     found = {}
     for method in METHODS:
-        told = [row.verdicts[method] for row in rows]
+        verdicts = [row.verdicts[method] for row in rows]
         nulls = [row.verdicts[method] for row in rows if row.null]
         after = [(row.verdicts[method].after, row.oracle) for row in rows]
         ratios = [value / oracle for value, oracle in after if value is not None]
-        named = [item.named for item in told if item.named is not None]
+        named = [item.named for item in verdicts if item.named is not None]
         found[method] = {
             "oracle ratio, median": float(np.median(ratios)) if ratios else None,
             "oracle ratio, largest": max(ratios, default=None),
             _AIM: f"{sum(ratio <= ORACLE_AIM for ratio in ratios)}/{len(ratios)}",
             "effects named": f"{sum(named)}/{sum(row.effects for row in rows)}" if named else None,
-            "claims": sum(item.claims for item in told),
-            "false claims": sum(len(item.false) for item in told),
-            "cases with false claims": f"{sum(bool(item.false) for item in told)}/{len(rows)}",
+            "claims": sum(item.claims for item in verdicts),
+            "false claims": sum(len(item.false) for item in verdicts),
+            "cases with false claims": f"{sum(bool(item.false) for item in verdicts)}/{len(rows)}",
             "claims on nulls": sum(item.claims for item in nulls),
             "false claims on nulls": sum(len(item.false) for item in nulls),
         }

@@ -91,7 +91,7 @@ class Flood:
 
 @frozen
 class Rest:
-    """The robot is told to stand for a while [s]."""
+    """The robot is commanded to stand for a while [s]."""
 
     length: float
     words: str = "at rest"

@@ -18,7 +18,7 @@ from tomr_demo import bound
 from tomr_power_model.nodes.stage_node import HEARD
 
 _MARK = "TOMR_SOAK"  # in the environment of every process, whoever starts it
-_END_S = 5.0  # in which a node must end when told to
+_END_S = 5.0  # in which a node must end when asked to
 _SAMPLE_S = 2.0  # between two looks at memory
 _UP = "publishes "  # said by a node that is complete
 
@@ -36,7 +36,7 @@ class Member:
 
 @define
 class Crew:
-    """All nodes by name; `command(name)` tells how to start one."""
+    """All nodes by name; `command(name)` returns how to start one."""
 
     command: Callable[[str], Sequence[str]]
     logs: Path
@@ -104,7 +104,7 @@ class Crew:
                 member.memory.samples.append((now - member.since, resident_mb(member.popen.pid)))
 
     def ended(self) -> list[str]:
-        """Nodes that ended without being told to."""
+        """Nodes that ended without being asked to."""
         return [name for name, member in self.members.items() if member.popen.poll() is not None]
 
     def end(self) -> list[Item]:
@@ -121,7 +121,7 @@ class Crew:
         traces = [life.name for life, text in self._texts() if "Traceback" in text]
         return [
             Item(
-                "nodes end when told to, and only then",
+                "nodes end when asked to, and only then",
                 ", ".join(self._bad) or "all did",
                 not self._bad,
             ),

@@ -56,7 +56,7 @@ class Flood(Node):
 
 
 def main() -> int:
-    """Run until told to end."""
+    """Run until asked to end."""
     source, target, shift = sys.argv[1:]
     return run_node(lambda: Flood(source, target, int(shift)))
 

@@ -62,7 +62,7 @@ def memory_items(processes: Iterable[Process], warm_up: float) -> list[Item]:
     found: dict[str, list[tuple[float, float, float]]] = {}  # base, lowest, highest [MB]
     for process in processes:
         samples = process.after(warm_up)
-        if len(samples) < 10:  # killed before there was anything to tell
+        if len(samples) < 10:  # killed before there was anything to judge
             continue
         base = statistics.median(samples[: max(3, round(_BASE * len(samples)))])
         found.setdefault(process.name, []).append((base, min(samples), max(samples)))

@@ -9,7 +9,7 @@ NAME = "tomr_fault_diag"
 setup(
     name=NAME,
     version="0.2.0",
-    description="Faults of a three-wheeled omni robot, told from the power of its motors.",
+    description="Faults of a three-wheeled omni robot, detected in its motors' power.",
     maintainer="TOMR maintainers",
     maintainer_email="maintainers@tomr.dev",
     license="Apache-2.0",

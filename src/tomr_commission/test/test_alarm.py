@@ -132,14 +132,14 @@ def test_peaks_at_the_cap_count_for_the_scale_by_their_length_alone() -> None:
 
 def test_exponential_excesses_are_taken_for_heavier_once_in_twenty() -> None:
     random = np.random.default_rng(0)
-    told = np.mean([_is_heavier(random.exponential(2.0, 100)) for _ in range(1000)])
-    assert told == pytest.approx(0.05, abs=0.02)
+    heavier = np.mean([_is_heavier(random.exponential(2.0, 100)) for _ in range(1000)])
+    assert heavier == pytest.approx(0.05, abs=0.02)
 
 
 @pytest.mark.parametrize(
     "peaks", [[], [0.0], [3.0], [3.0] * 50, [40.0] * 50, [0.0] * 49 + [5.0]], ids=str
 )
-def test_peaks_that_tell_nothing_of_a_tail_are_no_error(peaks: list[float]) -> None:
+def test_peaks_that_show_nothing_of_a_tail_are_no_error(peaks: list[float]) -> None:
     tail = Tail.of("shoves", peaks, 30.0, CHOICE)
     assert tail.above == sum(peak > 0.0 for peak in peaks)
     assert np.isfinite([tail.scale, tail.rate(15.0), *tail.draws(15.0)]).all()

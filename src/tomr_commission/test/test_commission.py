@@ -155,7 +155,7 @@ def test_file_of_another_robot_is_refused_by_all(
         (3, "commissioned: no: with version x of the suite, this is"),
     ],
 )
-def test_file_of_another_time_is_told_in_a_line(
+def test_file_of_another_time_is_reported_in_a_line(
     done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], part: int | None, said: str
 ) -> None:
     robot = load_robot(done / "commissioned.yaml")
@@ -167,9 +167,9 @@ def test_file_of_another_time_is_told_in_a_line(
     written = tmp_path / "then.yaml"
     written.write_text(yaml.safe_dump(document))
     assert diagnose([str(BAGS / "square"), "--robot", str(written)]) == 0
-    told = [line for line in capsys.readouterr().err.splitlines() if "commissioned" in line]
-    assert len(told) == (part is not None)
-    assert all(said in line for line in told)
+    warned = [line for line in capsys.readouterr().err.splitlines() if "commissioned" in line]
+    assert len(warned) == (part is not None)
+    assert all(said in line for line in warned)
 
 
 def test_commissioned_file_is_commissioned_again_from_its_description(

@@ -62,7 +62,7 @@ def test_it_drives_and_records(bridge: object, spawn: Callable, command: list[st
     assert speeds.max() == pytest.approx(0.3)
     first = speeds[speeds > 0.0][0]
     assert first == pytest.approx(0.09)  # slowly
-    assert not seen.command[-5:].any()  # told to stand
+    assert not seen.command[-5:].any()  # commanded to stand
     assert len(seen.command_time) > 100
 
 

@@ -1,4 +1,4 @@
-"""A robot that is driven: slowly first, and stopped where it does otherwise than told."""
+"""A robot that is driven: slowly first, and stopped where it does otherwise than commanded."""
 
 import math
 
@@ -54,7 +54,7 @@ def test_how_far_it_gets() -> None:
 
 
 def driven(
-    gain: np.ndarray, twist: Twist = AHEAD, until: float = 4.0, tells_speed: bool = True
+    gain: np.ndarray, twist: Twist = AHEAD, until: float = 4.0, reports_speed: bool = True
 ) -> DriveWatch:
     """Still for 1 s, then commanded; the wheels turn so many times as fast, at 100 Hz."""
     watch = DriveWatch(ROBOT, DriveChoice())
@@ -67,22 +67,22 @@ def driven(
         now = speed if time >= 1.1 else np.zeros(3)
         angle = angle + 0.01 * now
         one, two, three = angle.tolist()
-        a, b, c = now.tolist() if tells_speed else NAN3
+        a, b, c = now.tolist() if reports_speed else NAN3
         watch.encoders(time, (one, two, three), (a, b, c))
         assert watch.problem(time, 0.01) == ""
     return watch
 
 
-@pytest.mark.parametrize("tells_speed", [True, False])
+@pytest.mark.parametrize("reports_speed", [True, False])
 @pytest.mark.parametrize("twist", [AHEAD, TURNING])
-def test_a_robot_that_does_as_told(twist: Twist, tells_speed: bool) -> None:
-    watch = driven(np.array([0.9, 1.1, 1.0]), twist, tells_speed=tells_speed)
+def test_a_robot_that_does_as_commanded(twist: Twist, reports_speed: bool) -> None:
+    watch = driven(np.array([0.9, 1.1, 1.0]), twist, reports_speed=reports_speed)
     assert list(watch.mistakes()) == []
 
 
-@pytest.mark.parametrize("tells_speed", [True, False])
-def test_a_wheel_that_turns_the_other_way_is_named(tells_speed: bool) -> None:
-    (mistake,) = driven(np.array([1.0, 1.0, -1.0]), TURNING, tells_speed=tells_speed).mistakes()
+@pytest.mark.parametrize("reports_speed", [True, False])
+def test_a_wheel_that_turns_the_other_way_is_named(reports_speed: bool) -> None:
+    (mistake,) = driven(np.array([1.0, 1.0, -1.0]), TURNING, reports_speed=reports_speed).mistakes()
     assert mistake == "wheel_3_joint turns -1.00 times as fast as commanded"
 
 

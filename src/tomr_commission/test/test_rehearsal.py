@@ -70,19 +70,19 @@ def test_fault_comes_on_under_way_and_stays() -> None:
     assert drive.length > 8.0
 
 
-def test_rehearsal_sees_no_more_than_the_robot_tells() -> None:
+def test_rehearsal_sees_no_more_than_the_robot_reports() -> None:
     deaf = Rehearsal(shoves=3, force=(3.0, 3.0), silent=tuple(range(10)))
     args = (BandSettings(power=0.1, relative=0.01, speed=0.01), ClassifierSettings(), USAGE)
     assert max(rehearse("reference", *args, deaf).peaks) == 0.0
     assert max(rehearse("reference", *args, evolve(deaf, silent=())).peaks) > 0.0
 
 
-def test_faults_are_simulated_only_where_the_simulator_tells_what_was_recorded(
+def test_faults_are_simulated_only_where_the_simulator_measures_what_was_recorded(
     monkeypatch: pytest.MonkeyPatch, steady: Callable[..., Observed]
 ) -> None:
     monkeypatch.setattr(simulated, "on_all_cores", lambda work, jobs: [work(jobs[0])])
     monkeypatch.setattr(simulated, "observed_simulation", lambda drive: steady())
     bands, settings = BandSettings(), ClassifierSettings()
     assert try_simulated("reference", bands, settings, USAGE, "W")
-    with pytest.raises(InputError, match="the recordings tell A of the motors, the simulator W"):
+    with pytest.raises(InputError, match="the recordings hold A of the motors, the simulator W"):
         try_simulated("reference", bands, settings, USAGE, "A")

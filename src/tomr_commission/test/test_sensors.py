@@ -1,4 +1,4 @@
-"""Robots that tell currents, or their total power alone."""
+"""Robots that report currents, or their total power alone."""
 
 import dataclasses
 import json
@@ -79,7 +79,7 @@ def test_currents_leave_the_alarm_level_where_it_is(tmp_path: Path, rehearse: Mo
     assert found["alarm"]["caution"] >= ClassifierSettings().caution
     assert found["alarm"]["expected_per_hour"] is found["alarm"]["ci95_per_hour"] is None
     assert "expected_false_alarms" not in (tmp_path / "out" / "commissioned.yaml").read_text()
-    assert any("the robot tells currents, not powers" in note for note in found["notes"])
+    assert any("the robot reports currents, not powers" in note for note in found["notes"])
     assert 0.0 < found["bands"]["current"] < 0.15  # A, the default
     floors = {floor["kind"]: floor for floor in found["floors"]}
     assert floors["power sensor biased"]["unit"] == "A"
@@ -96,7 +96,7 @@ def test_total_alone_is_all_that_is_rehearsed(tmp_path: Path, rehearse: Mock) ->
     bag = derived(
         tmp_path / "bag", lambda topic, message: None if topic.endswith("/power") else message
     )
-    # Told apart from sensors that were forgotten: in one line.
+    # Distinguished from sensors that were forgotten: in one line.
     assert main([str(bag), "--robot", "reference", "--out", str(tmp_path / "no")]) == 2
     sections = {name: {**flat} for name, flat in read_sections("reference").items()}
     sections["/**"]["measurement.source"] = "total_only"
@@ -112,7 +112,7 @@ def test_total_alone_is_all_that_is_rehearsed(tmp_path: Path, rehearse: Mock) ->
 
 
 @pytest.mark.parametrize("is_known", [True, False])
-def test_a_rate_that_is_not_known_is_not_told(is_known: bool) -> None:
+def test_a_rate_that_is_not_known_is_not_stated(is_known: bool) -> None:
     tails = [Tail.of(name, [0.0] * count, 30.0, AlarmChoice()) for name, count in TAILS.items()]
     level = alarm_level(tails[: 1 + (not is_known)], 0.05, 11.0, AlarmChoice())
     said = SimpleNamespace(alarms=(), undecided=0, ticks=1)
@@ -142,7 +142,7 @@ def test_silenced_residuals_are_unknown(healthy: Observed) -> None:
     assert kinds_for(quiet) == ()
 
 
-def test_more_current_is_put_into_motors_whose_total_is_not_told(healthy: Observed) -> None:
+def test_more_current_is_put_into_motors_whose_total_is_not_reported(healthy: Observed) -> None:
     units = healthy.units.copy()
     units[list(SILENT)] = "A"
     amperes = evolve(healthy, units=units)

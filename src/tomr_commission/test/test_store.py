@@ -42,7 +42,7 @@ def test_drive_comes_back_as_it_was(tmp_path: Path, steady: Callable[..., Observ
         assert store.observed("drive", "a") is None
 
 
-def test_digest_and_fingerprint_tell_inputs_apart(tmp_path: Path) -> None:
+def test_digest_and_fingerprint_distinguish_inputs(tmp_path: Path) -> None:
     assert digest(["ab", "c"]) != digest(["a", "bc"])
     bag = tmp_path / "bag"
     bag.mkdir()

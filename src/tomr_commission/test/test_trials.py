@@ -58,11 +58,11 @@ def test_scaled_motor_shows_in_its_own_and_the_total(steady: Callable[..., Obser
     assert np.allclose(change, expected)
 
 
-def test_frozen_sensor_tells_what_it_told_first(steady: Callable[..., Observed]) -> None:
+def test_frozen_sensor_reports_what_it_reported_first(steady: Callable[..., Observed]) -> None:
     drive = steady(sigma=0.3, ticks=300)
     after = injected(drive, BY_NAME["power sensor frozen"], 1.0, 0)
-    told = (after.residual + after.modelled)[100:, 1]
-    assert np.allclose(told, (drive.residual + drive.modelled)[100, 1])
+    measured = (after.residual + after.modelled)[100:, 1]
+    assert np.allclose(measured, (drive.residual + drive.modelled)[100, 1])
     assert (after.residual[:, 0] == drive.residual[:, 0]).all()
 
 

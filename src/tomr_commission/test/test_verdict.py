@@ -141,7 +141,7 @@ def test_of_many_drives_some_need_wider_bands(outcome: Outcome, steady: Steady) 
     even = [0.1 * 1.25**k for k in range(9)]
     assert wider(even) == []
     assert wider([*[0.1] * 8, 0.6]) == ["tour8"]
-    # A few do not tell how far drives scatter.
+    # A few do not show how far drives scatter.
     assert wider([0.1, 0.15, 0.2, 0.6]) == ["tour3"]
     # Within the bands nothing is amiss.
     assert wider([0.01, 0.01, 0.01, 0.05]) == []

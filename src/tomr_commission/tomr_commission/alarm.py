@@ -48,7 +48,7 @@ class Tail:
     above: int  # events over the threshold
     scale: float  # decades, of the exponential tail
     certain: int  # peaks that the scale rests on, those that the usual scale counts as included
-    shape: float | None  # of a generalised Pareto tail; None: too few to tell
+    shape: float | None  # of a generalised Pareto tail; None: too few to estimate it
     peaks: tuple[float, ...]  # all over the threshold, the highest first
 
     @classmethod

@@ -6,7 +6,7 @@ import numpy as np
 from attrs import asdict, evolve, frozen
 from numpy.typing import NDArray
 
-from tomr_commission.observed import Observed, band_of, tells_currents, yaw_band_of
+from tomr_commission.observed import Observed, band_of, reports_currents, yaw_band_of
 from tomr_commission.request import BandChoice
 from tomr_fault_diag.residuals.calibrated import fit_bands, widened
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL
@@ -19,7 +19,7 @@ _REST = 0.1  # rad/s: a slower wheel stands
 _STEADY = 0.3  # rad/s over three ticks
 _LATELY = 10  # ticks
 _FEW = 3  # residuals
-_LEAST_STEADY = 40  # ticks, from which a torque is told
+_LEAST_STEADY = 40  # ticks, from which a torque is estimated
 KINDS: Mapping[str, Sequence[int]] = {
     "total power": [TOTAL],
     "motor power, command path": list(MOTORS),
@@ -31,7 +31,7 @@ KINDS: Mapping[str, Sequence[int]] = {
 def bands_of(drives: Sequence[Observed], choice: BandChoice) -> BandSettings:
     """Bands that the healthy residuals of drives stay within, with a margin.
 
-    Raises InputError where they are too few to tell.
+    Raises InputError where they are too few to estimate them.
     """
     fitted = fit_bands(
         np.concatenate([drive.residual for drive in drives]),
@@ -153,7 +153,7 @@ def needed(drive: Observed, bands: BandSettings, within: float) -> dict[str, flo
 
 @frozen
 class Drag:
-    """Torque that wheels need in steady motion, as their power or current tells it."""
+    """Torque that wheels need in steady motion, as their power or current shows it."""
 
     added: Array  # beyond the modelled; N m, or A where currents are compared; (3,)
     usual: Array  # as modelled, the same
@@ -169,7 +169,7 @@ def steady_drag(drive: Observed) -> Drag:
     rows = regimes(drive)["steady"] & np.isfinite(residual) & np.isfinite(modelled)
     weight = np.where(rows, speed, 0.0)
     # A current is a torque already, power one times the speed.
-    per_torque = np.ones_like(weight) if tells_currents(drive) else weight
+    per_torque = np.ones_like(weight) if reports_currents(drive) else weight
     total = np.where(rows.sum(axis=0) < _LEAST_STEADY, np.nan, (weight * per_torque).sum(axis=0))
 
     def torque(drawn: Array) -> Array:

@@ -21,7 +21,7 @@ from tomr_commission.commissioned import (
 from tomr_commission.evidence import decisions, evidence_in
 from tomr_commission.explained import EXPLAINED, FOLDER, Split, explain_drives
 from tomr_commission.injected import kinds_for, try_injected
-from tomr_commission.observed import Observed, frames_of, observe, tells_currents, unit_of_motors
+from tomr_commission.observed import Observed, frames_of, observe, reports_currents, unit_of_motors
 from tomr_commission.parallel import on_all_cores
 from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse
 from tomr_commission.request import CommissionRequest
@@ -52,7 +52,7 @@ Progress = Callable[[str, float], None]
 
 STEPS = "steps"
 _CURRENTS = (
-    "shoves were not simulated: the robot tells currents, not powers; so the alarm level is the "
+    "shoves were not simulated: the robot reports currents, not powers; so the alarm level is the "
     "shipped one at least, and how many false alarms shoves raise is not known"
 )
 _MORE = 1.1  # of the least that is held out: ends of recordings are not compared
@@ -122,7 +122,7 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     )
     trials = try_injected(longest, bands, chosen, kinds_for(longest))
     notes = [note for drive in work.drives for note in drive.notes]
-    if tells_currents(longest):
+    if reports_currents(longest):
         notes.append(_CURRENTS)
     simulated, note = work.simulated(described, bands, chosen, unit_of_motors(longest))
     trials += simulated
@@ -263,14 +263,14 @@ class _Work:
             bands = bands_of(fitted, choice)
             evidence = _real_peaks(fitted, bands, settings, self.request.alarm.block)
             wider = choice.wider * choice.margin
-            # A few shoves tell where many are not worth while.
+            # A few shoves show where many are not worth while.
             for asked, most in (
                 (first, _HOPELESS * choice.most_caution),
                 (plan, choice.most_caution),
             ):
                 shoved = (
                     Shoved((), 0.0)
-                    if tells_currents(fitted[0])
+                    if reports_currents(fitted[0])
                     else self.rehearsed(described, bands, settings, asked)
                 )
                 level = _level(self.request, evidence, shoved, plan)

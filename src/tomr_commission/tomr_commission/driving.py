@@ -61,7 +61,7 @@ def schedule(plan: Plan, choice: DriveChoice) -> tuple[tuple[Command, ...], floa
 
 
 def reach(commands: Sequence[Command]) -> float:
-    """How far the robot gets from where it starts [m], if it does as it is told."""
+    """How far the robot gets from where it starts [m], if it does as commanded."""
     x = y = heading = farthest = 0.0
     for command, after in pairwise(commands):
         step = after.time - command.time
@@ -99,7 +99,7 @@ class DriveWatch:
             del self._commanded[0]
 
     def encoders(self, time: float, position: Triple, velocity: Triple) -> None:
-        """A sample [s, rad, rad/s]; where no velocity is told it follows from the positions."""
+        """A sample [s, rad, rad/s]; where no velocity is reported it follows from the positions."""
         angle, speed = np.array(position), np.array(velocity)
         if self._before is not None and time > self._before[0]:
             turned = (angle - self._before[1]) / (time - self._before[0])

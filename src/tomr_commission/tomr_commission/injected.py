@@ -1,7 +1,7 @@
 """Faults put into real recordings, where that is honest: what a power sensor or a motor would show.
 
-Powers are put off as the sensor would tell them, tick by tick; motion, commands and everything else
-stay as recorded. What a fault does to the motion is not in it: such faults are simulated.
+Powers are put off as the sensor would report them, tick by tick; motion, commands and everything
+else stay as recorded. What a fault does to the motion is not in it: such faults are simulated.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_commission.evidence import decisions
-from tomr_commission.observed import Observed, frames_of, tells_currents
+from tomr_commission.observed import Observed, frames_of, reports_currents
 from tomr_commission.trials import Trial, first_alarm, smallest_found
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, TOTAL
@@ -31,7 +31,7 @@ class InjectedKind:
     name: str
     sizes: tuple[float, ...]  # to try, the largest first; in the unit
     unit: str
-    change: Callable[[Array, float], Array]  # measured power (n,), size -> what is told (n,)
+    change: Callable[[Array, float], Array]  # measured power (n,), size -> what is reported (n,)
     in_total: bool = False
 
 
@@ -66,7 +66,7 @@ def kinds_for(drive: Observed) -> tuple[InjectedKind, ...]:
     """What can honestly be put into a drive: nothing into motors without sensors of their own."""
     if set(MOTORS) <= set(drive.silent):
         return ()
-    if not tells_currents(drive):
+    if not reports_currents(drive):
         return KINDS
     # What a motor draws more of the whole robot's watts is not known in amperes.
     return tuple(
@@ -83,9 +83,9 @@ def injected(drive: Observed, kind: InjectedKind, size: float, wheel: int) -> Ob
     rows = slice(_HEALTHY, None)
     measured = (drive.residual + drive.modelled)[rows, channel]
     known = np.isfinite(measured)
-    told = measured.copy()
-    told[known] = kind.change(measured[known], size) if known.any() else measured[known]
-    added = np.where(known, told - measured, 0.0)
+    reported = measured.copy()
+    reported[known] = kind.change(measured[known], size) if known.any() else measured[known]
+    added = np.where(known, reported - measured, 0.0)
     residual[rows, channel] += added
     residual[rows, ENCODERS[wheel]] += added
     if kind.in_total:

@@ -47,7 +47,7 @@ class Observed:
     modelled: Array  # (n, 10)
     missing: NDArray[np.str_]  # why a residual is unknown, empty where it is known, (n, 10)
     units: NDArray[np.str_]  # of the residuals, (10,)
-    yaw: Array  # gyro less wheels, and yaw rate as the wheels tell [rad/s], (n, 2)
+    yaw: Array  # gyro less wheels, and yaw rate as the wheels show [rad/s], (n, 2)
 
     @classmethod
     def of(cls, name: str, frames: list[ResidualFrame]) -> Self:
@@ -87,11 +87,11 @@ class Observed:
 
     @property
     def silent(self) -> tuple[int, ...]:
-        """Residuals that are never known: what the robot does not tell."""
+        """Residuals that are never known: what the robot does not report."""
         return tuple(np.flatnonzero(~np.isfinite(self.residual).any(axis=0)).tolist())
 
     def silenced(self, channels: Sequence[int]) -> "Observed":
-        """The drive of a robot that does not tell some residuals."""
+        """The drive of a robot that does not report some residuals."""
         residual, missing = self.residual.copy(), self.missing.astype("<U32")
         residual[:, list(channels)] = np.nan
         missing[:, list(channels)] = NOT_MEASURED
@@ -145,7 +145,7 @@ def unit_of_motors(drive: Observed) -> str:
     return str(drive.units[MOTORS.start])
 
 
-def tells_currents(drive: Observed) -> bool:
+def reports_currents(drive: Observed) -> bool:
     """Whether motors are compared by their currents."""
     return unit_of_motors(drive) == "A"
 

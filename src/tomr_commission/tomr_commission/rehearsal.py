@@ -61,14 +61,14 @@ class Rehearsal:
     """How the simulated hours are made."""
 
     shoves: int = 390
-    first: int = 90  # of them, that tell whether the others are worth while
+    first: int = 90  # of them, that show whether the others are worth while
     force: tuple[float, float] = (0.5, 3.0)  # N per kg of the robot
     duration: tuple[float, float] = (0.03, 0.2)  # s
     off: float = 0.02  # share by which every value of the robot may be off its explained one
     payload: float = 0.05  # of its mass, at most
     friction: tuple[float, float] = (0.6, 1.0)  # traction of the floor
     shoves_per_hour: float = 30.0  # that a robot meets, for the rate of alarms
-    silent: tuple[int, ...] = ()  # residuals that the robot does not tell
+    silent: tuple[int, ...] = ()  # residuals that the robot does not report
 
 
 @frozen

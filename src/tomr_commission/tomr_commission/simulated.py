@@ -91,7 +91,7 @@ def try_simulated(
 ) -> list[Trial]:
     """Each fault at each wheel, downwards until it is not found, on all cores.
 
-    Raises InputError for a robot that MuJoCo cannot do, or whose motors are not told in `unit`.
+    Raises InputError for a robot that MuJoCo cannot do, or whose motors are not measured in `unit`.
     """
     jobs = [(robot, bands, settings, usage, unit, case) for case in cases()]
     return [trial for trials in on_all_cores(_tried, jobs) for trial in trials]
@@ -108,7 +108,7 @@ def _tried(job: _Job) -> list[Trial]:
         seen = observed_simulation(simulated_fault(robot, usage, case, size))
         if unit_of_motors(seen) != unit:
             raise InputError(
-                f"the recordings tell {unit} of the motors, the simulator {unit_of_motors(seen)}"
+                f"the recordings hold {unit} of the motors, the simulator {unit_of_motors(seen)}"
             )
         said = decisions(frames_of(seen, bands), settings)
         begin = _ONSET - (int(seen.stamp_ns[0]) - START_NS) / NANOSECONDS

@@ -68,7 +68,7 @@ def check_wheels(drives: Sequence[Drive], robot: Robot, place: str) -> None:
 
 
 def _answers(drives: Sequence[Drive]) -> Array | None:
-    """Wheel speeds by commanded twist, (3, 3); None where the commands do not tell."""
+    """Wheel speeds by commanded twist, (3, 3); None where the commands do not show them."""
     asked, speeds = [], []
     for drive in drives:
         if len(drive.command_time) < 2:

@@ -1,4 +1,4 @@
-"""Simulate a robot, and diagnose it too unless told otherwise."""
+"""Simulate a robot, and diagnose it too unless asked not to."""
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, OpaqueFunction

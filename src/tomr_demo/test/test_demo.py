@@ -35,7 +35,7 @@ def at(seconds: float) -> int:
 def played(
     truths: Sequence[tuple[float, str | None, int]], named: Sequence[tuple[float, str]], end: float
 ) -> Scoreboard:
-    """A board that was told the truth every 0.05 s and the diagnoses, each when it came."""
+    """A board that was given the truth every 0.05 s and the diagnoses, each when it came."""
     board = Scoreboard()
     news = [(time, 0, state) for time, state in named]
     news += [(0.05 * tick, 1, "") for tick in range(1 + round(end / 0.05))]
@@ -128,7 +128,7 @@ def test_table_shows_what_was_named_how_late_and_what_is_still_to_come() -> None
     assert text.count("PASS") == 2
 
 
-def test_plain_lines_tell_each_change_once(capsys: pytest.CaptureFixture[str]) -> None:
+def test_plain_lines_report_each_change_once(capsys: pytest.CaptureFixture[str]) -> None:
     view = PlainView(Console(width=130))
     board = Scoreboard()
     view.starting("no /joint_states from sim_bridge yet")
@@ -152,14 +152,14 @@ def test_plain_lines_tell_each_change_once(capsys: pytest.CaptureFixture[str]) -
     ]
 
 
-def test_truth_is_read_as_the_simulator_tells_it() -> None:
+def test_truth_is_read_as_the_simulator_publishes_it() -> None:
     simulation = Simulation(shipped_robot("reference"))
     simulation.set_fault("encoder_lost", wheel=3, severity=1.0)
-    told = [s.message for s in simulation.step_to(60_000_000) if f"/{s.topic}" == TRUTH]
-    assert [truth_in(to_bag(message)) for message in told[-1:]] == [("encoder_lost", 3)]
+    published = [s.message for s in simulation.step_to(60_000_000) if f"/{s.topic}" == TRUTH]
+    assert [truth_in(to_bag(message)) for message in published[-1:]] == [("encoder_lost", 3)]
     simulation.set_fault("encoder_lost")
-    told = [s.message for s in simulation.step_to(200_000_000) if f"/{s.topic}" == TRUTH]
-    assert truth_in(to_bag(told[-1])) == (None, 1)
+    published = [s.message for s in simulation.step_to(200_000_000) if f"/{s.topic}" == TRUTH]
+    assert truth_in(to_bag(published[-1])) == (None, 1)
 
 
 def test_only_a_folder_of_an_earlier_demo_is_replaced(tmp_path: Path) -> None:

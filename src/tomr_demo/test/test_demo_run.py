@@ -195,7 +195,7 @@ def test_demo_keeps_away_from_a_robot_that_is_there_already(
         rclpy.shutdown(context=context)
 
 
-def test_demo_tells_which_process_refused_its_input(
+def test_demo_names_which_process_refused_its_input(
     tmp_path: Path, spawn: Callable[..., Any]
 ) -> None:
     weights = tmp_path / "weights.npz"

@@ -34,7 +34,7 @@ SPIN = 0.02  # s
 Take = Callable[[str, Any, int], None]
 
 
-# Every message here begins with a header: after the four bytes that tell the encoding, which is
+# Every message here begins with a header: after the four bytes that state the encoding, which is
 # little endian on every machine this runs on, its stamp.
 _STAMP = struct.Struct("<4xiI")
 

@@ -85,7 +85,7 @@ def _stamp_of(text: str, otherwise: int) -> int:
 class Stretch:
     """A time in which the same thing was true, and what was named meanwhile.
 
-    It starts at the last stamp at which something else was told to be true: early by up to the
+    It starts at the last stamp at which something else was stated to be true: early by up to the
     period of the truth, so that no delay is flattered.
     """
 
@@ -184,7 +184,7 @@ class Scoreboard:
     stretches: list[Stretch] = field(factory=list)
     latest: Named | None = None
     now_ns: int = 0
-    _told_ns: int = 0  # newest stamp of the truth
+    _heard_ns: int = 0  # newest stamp of the truth
 
     @property
     def passed(self) -> bool:
@@ -213,8 +213,8 @@ class Scoreboard:
         current = self.stretches[-1] if self.stretches else None
         place = None if fault_id in (None, "floor_slippery") else wheel
         if current is None or (current.fault_id, current.wheel) != (fault_id, place):
-            self._open(Stretch(fault_id, place, self._told_ns or stamp_ns), current)
-        self._told_ns = stamp_ns
+            self._open(Stretch(fault_id, place, self._heard_ns or stamp_ns), current)
+        self._heard_ns = stamp_ns
         self.now_ns = max(self.now_ns, stamp_ns)
 
     def diagnosis(self, named: Named) -> None:

@@ -43,7 +43,7 @@ class Scene:
     frame: ResidualFrame | None = None
 
     def seconds(self, stamp_ns: int) -> float:
-        """A stamp [ns] as time since the truth was first told [s]."""
+        """A stamp [ns] as time since the truth was first published [s]."""
         start = self.board.stretches[0].start_ns if self.board.stretches else stamp_ns
         return max(0.0, (stamp_ns - start) / NANOSECONDS)
 
@@ -86,14 +86,14 @@ def act_table(scene: Scene, width: int) -> Table:
 
 
 def _row(scene: Scene, stretch: Stretch) -> list[Text]:
-    shown = _telling(stretch)
+    shown = _naming(stretch)
     share = "" if shown is None or shown.probability is None else f"{shown.probability:.2f}"
     state = state_text(shown)
     if stretch.strays:
         state.append(f" (also {', '.join(stretch.strays)})", style="yellow")
     delay = None if shown is stretch.before else stretch.delay_ns
-    told = shown.evidence if shown is not None and stretch.fault_id else ()
-    evidence = "; ".join(line.partition(", band")[0] for line in told)
+    stated = shown.evidence if shown is not None and stretch.fault_id else ()
+    evidence = "; ".join(line.partition(", band")[0] for line in stated)
     return [
         Text(f"{scene.seconds(stretch.start_ns):.1f} s"),
         Text(stretch.title),
@@ -105,7 +105,7 @@ def _row(scene: Scene, stretch: Stretch) -> list[Text]:
     ]
 
 
-def _telling(stretch: Stretch) -> Named | None:
+def _naming(stretch: Stretch) -> Named | None:
     """The diagnosis that a row shows: that which first named it, else the newest."""
     if stretch.right is not None:
         return stretch.right
@@ -196,7 +196,7 @@ class PlainView:
 
     console: Console
     _missing: str = ""
-    _told: int = 0
+    _shown: int = 0
     _state: str = ""
 
     def __enter__(self) -> Self:
@@ -212,9 +212,9 @@ class PlainView:
 
     def show(self, scene: Scene) -> None:
         stretches = scene.board.stretches
-        for stretch in stretches[self._told :]:
+        for stretch in stretches[self._shown :]:
             self._line(scene, stretch.start_ns, f"true: {stretch.title}")
-        self._told = len(stretches)
+        self._shown = len(stretches)
         latest = scene.board.latest
         if latest is None or not stretches or latest.state == self._state:
             return

@@ -146,7 +146,7 @@ def test_nothing_to_compare_is_stale_not_normal() -> None:
     assert diagnosis.state.level is Level.STALE
 
 
-def test_a_robot_that_has_not_been_told_anything_waits() -> None:
+def test_a_robot_that_has_not_been_commanded_anything_waits() -> None:
     nan = float("nan")
     unknown = Residual(nan, nan, nan, missing=NO_COMMAND)
     (waiting,) = _classify([ResidualFrame(BASE + 50 * MS, (unknown,) * 10)])

@@ -55,7 +55,7 @@ def frame(tick: int, shown: Shown, unit: Unit = "W", noise: float = 0.0) -> Resi
     )
 
 
-def told(
+def reported(
     shown: Shown,
     state: State = STATES[NORMAL],
     ticks: int = 5000,
@@ -81,18 +81,18 @@ def holds(change: Severity, truth: float) -> bool:
 
 
 def test_a_robot_as_described_has_not_changed() -> None:
-    assert told(unchanged) == {}
+    assert reported(unchanged) == {}
 
 
 def test_hot_windings() -> None:
-    found = told(lambda i, w, a: power(i, w) + 0.3 * RESISTANCE * i**2)
+    found = reported(lambda i, w, a: power(i, w) + 0.3 * RESISTANCE * i**2)
     assert set(found) == {"winding resistance"}
     assert holds(found["winding resistance"], 0.3)
 
 
 def test_stiff_grease_at_one_axle() -> None:
     more = np.array([0.0, 0.04, 0.0]) / CONSTANT
-    found = told(lambda i, w, a: power(i + np.sign(w) * more, w))
+    found = reported(lambda i, w, a: power(i + np.sign(w) * more, w))
     assert set(found) == {"friction of motor 2"}
     assert holds(found["friction of motor 2"], 0.04)
     assert found["friction of motor 2"].unit == "N m"
@@ -114,47 +114,47 @@ def loaded(share: float, hot: float = 0.0) -> Shown:
 
 
 def test_a_payload() -> None:
-    found = told(loaded(0.3))
+    found = reported(loaded(0.3))
     assert set(found) == {"payload"}
     assert holds(found["payload"], 0.3 * ROBOT.mass)
     assert found["payload"].unit == "kg"
 
 
 def test_a_payload_as_heavy_as_the_robot() -> None:
-    assert told(loaded(1.0))["payload"].value == pytest.approx(ROBOT.mass, rel=0.02)
+    assert reported(loaded(1.0))["payload"].value == pytest.approx(ROBOT.mass, rel=0.02)
 
 
-def test_hot_windings_that_the_jerks_of_a_payload_may_feign_are_not_told() -> None:
-    assert set(told(loaded(0.4, hot=0.2))) == {"payload"}
-    assert set(told(loaded(0.0, hot=0.2))) == {"winding resistance"}
+def test_hot_windings_that_the_jerks_of_a_payload_may_feign_are_not_reported() -> None:
+    assert set(reported(loaded(0.4, hot=0.2))) == {"payload"}
+    assert set(reported(loaded(0.0, hot=0.2))) == {"winding resistance"}
 
 
 def test_drivers_that_draw_more() -> None:
-    found = told(lambda i, w, a: power(i, w) + np.array([0.0, 0.0, 0.8]))
+    found = reported(lambda i, w, a: power(i, w) + np.array([0.0, 0.0, 0.8]))
     assert set(found) == {"standby power of motor 3"}
     assert holds(found["standby power of motor 3"], 0.8)
 
 
 def test_a_battery_that_has_given_much() -> None:
-    found = told(unchanged, supply=lambda tick: 0.93 if tick % 3 else NAN)
+    found = reported(unchanged, supply=lambda tick: 0.93 if tick % 3 else NAN)
     assert set(found) == {"supply voltage"}
     assert found["supply voltage"].value == pytest.approx(-0.07)
-    assert told(unchanged, supply=lambda _: 0.97) == {}
+    assert reported(unchanged, supply=lambda _: 0.97) == {}
 
 
-def test_a_supply_that_comes_and_goes_tells_nothing() -> None:
+def test_a_supply_that_comes_and_goes_shows_nothing() -> None:
     # 14 % less every other stretch, of which a mean of ten is no surer than to 5 %.
-    assert told(unchanged, ticks=1800, supply=lambda tick: 1.0 - 0.14 * (tick // 180 % 2)) == {}
+    assert reported(unchanged, ticks=1800, supply=lambda tick: 1.0 - 0.14 * (tick // 180 % 2)) == {}
 
 
 def test_a_battery_that_was_replaced() -> None:
-    found = told(unchanged, ticks=12_000, supply=lambda tick: 0.85 if tick < 5000 else 1.0)
+    found = reported(unchanged, ticks=12_000, supply=lambda tick: 0.85 if tick < 5000 else 1.0)
     assert found == {}
 
 
-def test_currents_tell_friction() -> None:
+def test_currents_show_friction() -> None:
     more = np.array([0.04, 0.0, 0.0]) / CONSTANT
-    found = told(lambda i, w, a: i + np.sign(w) * more, robot=CURRENTS, unit="A")
+    found = reported(lambda i, w, a: i + np.sign(w) * more, robot=CURRENTS, unit="A")
     assert set(found) == {"friction of motor 1"}
     assert holds(found["friction of motor 1"], 0.04)
 
@@ -171,7 +171,7 @@ def test_currents_tell_friction() -> None:
         (1.2, 0.0, 0.5, 1),
     ],
 )
-def test_which_motors_tell_something(
+def test_which_motors_show_something(
     speed: float, change: float, current: float, rows: int
 ) -> None:
     motors, still = Motors(ROBOT), Residual(0.0, 1.0, 0.0, "rad/s")
@@ -192,7 +192,7 @@ def test_which_motors_tell_something(
 
 
 @pytest.mark.parametrize(("more", "rows"), [(0.05, 1), (0.07, 0)])
-def test_a_motor_that_jerks_tells_nothing(more: float, rows: int) -> None:
+def test_a_motor_that_jerks_shows_nothing(more: float, rows: int) -> None:
     # A tenth of 0.5 A, and of 0.1 A that friction takes.
     motors, still = Motors(ROBOT), Residual(0.0, 1.0, 0.0, "rad/s")
     ticks = []
@@ -213,27 +213,27 @@ def test_constants_of_a_description_are_known_to_5_percent(
 ) -> None:
     exact = np.array([0.3, *[0.0] * 8]), np.zeros(9)
     monkeypatch.setattr(ConditionsWatch, "_fitted", lambda _: exact)
-    (found,) = told(unchanged, ticks=3000).values()
+    (found,) = reported(unchanged, ticks=3000).values()
     assert (found.low, found.high) == (pytest.approx(0.285), pytest.approx(0.315))
 
 
-def test_what_is_little_is_not_told() -> None:
-    assert told(lambda i, w, a: power(i, w) + 0.05 * RESISTANCE * i**2) == {}
+def test_what_is_little_is_not_reported() -> None:
+    assert reported(lambda i, w, a: power(i, w) + 0.05 * RESISTANCE * i**2) == {}
 
 
 def test_it_takes_minutes_of_driving() -> None:
     hot = lambda i, w, a: power(i, w) + 0.3 * RESISTANCE * i**2  # noqa: E731
-    assert told(hot, ticks=900) == {}
-    assert set(told(hot, ticks=4000)) == {"winding resistance"}
+    assert reported(hot, ticks=900) == {}
+    assert set(reported(hot, ticks=4000)) == {"winding resistance"}
 
 
 @pytest.mark.parametrize("state", [PUSHED, DRAGGING[1]])
 def test_only_a_robot_that_is_well_has_conditions(state: State) -> None:
     hot = lambda i, w, a: power(i, w) + 0.3 * RESISTANCE * i**2  # noqa: E731
-    assert told(hot, state) == {}
+    assert reported(hot, state) == {}
 
 
-def test_ticks_apart_tell_no_payload_and_no_ticks_nothing() -> None:
+def test_ticks_apart_show_no_payload_and_no_ticks_nothing() -> None:
     watch = SeverityWatch(ROBOT)
     for tick in range(0, 60_000, 20):  # a second apart
         watch.take(frame(tick, lambda i, w, a: 2.0 * power(i, w)), STATES[NORMAL], None)
@@ -256,7 +256,7 @@ def test_five_minutes_are_remembered_and_a_clock_that_leaps_forgets() -> None:
     assert watch.conditions == ()
 
 
-def test_a_message_tells_them() -> None:
+def test_a_message_states_them() -> None:
     changes = (
         Severity("winding resistance", "", 0.2, 0.15, 0.25),
         Severity("payload", "kg", 3.0, 2.5, 3.5),

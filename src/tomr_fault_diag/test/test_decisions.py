@@ -106,12 +106,12 @@ def classified(frames: Sequence[ResidualFrame], **settings: Any) -> list[Diagnos
 
 def changes(found: Sequence[Diagnosis]) -> list[tuple[int, str]]:
     """When the state changed, and to what: a push is normal."""
-    told: list[tuple[int, str]] = []
+    named: list[tuple[int, str]] = []
     for diagnosis in found:
         name = (STATES[NORMAL] if diagnosis.state is PUSHED else diagnosis.state).name
-        if diagnosis.changed and name != (told[-1][1] if told else ""):
-            told.append(((diagnosis.stamp_ns - BASE) // MS, name))
-    return told
+        if diagnosis.changed and name != (named[-1][1] if named else ""):
+            named.append(((diagnosis.stamp_ns - BASE) // MS, name))
+    return named
 
 
 FAULT = "motor system fault 2"
@@ -220,7 +220,7 @@ def test_too_many_gaps_are_not_enough_data() -> None:
     }
 
 
-def test_speeds_that_cannot_be_told_leave_the_powers() -> None:
+def test_speeds_that_cannot_be_measured_leave_the_powers() -> None:
     """Something is wrong with motor 2, and without its speed nobody can say what."""
     frames = [without(item, SPEEDS, SCATTER) for item in FAULTY]
     assert changes(classified(frames)) == [(50, "normal"), (3000, "unknown")]
@@ -261,8 +261,8 @@ def test_a_gap_is_no_time_in_which_a_fault_recovers() -> None:
 def test_every_state_that_is_wrong_says_what_to_check_and_which_of_the_six_it_is() -> None:
     named = [value for value in vars(states).values() if isinstance(value, State)]
     for state in (*STATES, *POWER_SENSOR, *named):
-        told = state.level is not Level.OK or state is states.NOT_ENOUGH
-        assert bool(check_first(state)) == told, state
+        is_worth_a_look = state.level is not Level.OK or state is states.NOT_ENOUGH
+        assert bool(check_first(state)) == is_worth_a_look, state
         paper = "unknown" if state.paper is None else STATES[state.paper].name
         assert six_state(state) == paper
     found = next(d for d in classified(FAULTY) if d.changed and d.state is STATES[MOTOR + 1])

@@ -79,7 +79,7 @@ def test_a_gyro_is_believed_once_it_has_agreed_for_two_seconds_of_turning(period
     assert found[5000].yaw.modelled == pytest.approx(RATE, rel=1e-5)
 
 
-def test_what_differs_then_is_told_over_its_band() -> None:
+def test_what_differs_then_is_judged_over_its_band() -> None:
     found = frames(lambda at_ms: RATE if at_ms < 4000 else RATE - 0.5)
     assert found[3900].yaw.code == 0
     assert found[5000].yaw.residual == pytest.approx(-0.5, abs=1e-6)

@@ -44,11 +44,11 @@ def test_plotjuggler_layout_shows_what_there_is() -> None:
     assert len(curves) == 38
     statuses = {f"/{RESIDUALS}/{NAMELESS}/{name}" for name in residual_names(ROBOT.wheel_topics)}
     states = {f"/diagnostics/{NAMELESS}/{NAME}/p {state.name}" for state in STATES}
-    told = {f"{status}/{key}" for status in statuses for key in ("residual", "band", "modelled")}
+    shown = {f"{status}/{key}" for status in statuses for key in ("residual", "band", "modelled")}
     for curve in curves:
         joint = re.fullmatch(r"(.*)/(wheel_\d_joint)/velocity", curve)
         topic = joint[1] if joint else curve.removesuffix("/current")
-        assert topic in TOPICS or curve in told | states
+        assert topic in TOPICS or curve in shown | states
         assert joint is None or joint[2] in ROBOT.wheel_names
 
 

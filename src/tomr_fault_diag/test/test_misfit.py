@@ -67,7 +67,7 @@ def named(frames: list[ResidualFrame], judge: int = NORMAL) -> list[tuple[int, s
 
 
 @pytest.mark.parametrize("period", [10, 50, 200])
-def test_a_robot_that_stands_when_told_to_drive_does_not_follow(period: int) -> None:
+def test_a_robot_that_stands_when_commanded_to_drive_does_not_follow(period: int) -> None:
     driving = [frame(t, TURNING, TURNING) for t in range(period, 2000, period)]
     stopped = [frame(t, TURNING, (0.0, 0.0, 0.1)) for t in range(2000, 4000, period)]
     again = [frame(t, TURNING, TURNING) for t in range(4000, 6000, period)]
@@ -220,7 +220,7 @@ def test_a_supply_that_sags_for_a_moment_is_not_low() -> None:
 
 
 @pytest.mark.parametrize("share", [NAN, 0.881])
-def test_what_is_not_told_or_not_low_is_none(share: float) -> None:
+def test_what_is_not_known_or_not_low_is_none(share: float) -> None:
     assert named(_supplied({0: share})) == [(50, "normal")]
 
 

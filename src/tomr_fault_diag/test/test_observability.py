@@ -32,7 +32,7 @@ def seen(*ticks: Sequence[Wheel]) -> Unseen:
         ((-0.4, -0.8), (0,), ()),  # it turns by 0.4 rad/s, the other way
         ((5.0, -5.0), (), ()),
         ((-5.0, -5.0), (), ()),
-        ((UNKNOWN, UNKNOWN), (), ()),  # it may be told to turn
+        ((UNKNOWN, UNKNOWN), (), ()),  # it may be commanded to turn
         ((0.0, UNKNOWN), (), (0,)),  # it may turn
     ],
 )

@@ -134,7 +134,7 @@ def test_what_has_changed_slowly_stands_there_too() -> None:
     assert "Changed slowly" not in time_line(replayed(summary()), [track()], [], WHEELS)
 
 
-def test_the_conditions_told_last_stand() -> None:
+def test_the_conditions_reported_last_stand() -> None:
     summariser, frame = Summariser(JOINTS), ResidualFrame(START, (Residual(0.0, 1.0, 0.0),) * 10)
     changes = [(Severity("x", "kg", value, 0.0, 9.0),) for value in (1.0, 2.0)]
     for conditions in changes:
@@ -144,7 +144,7 @@ def test_the_conditions_told_last_stand() -> None:
     assert summariser.summary().conditions == changes[1]
 
 
-def test_a_fault_is_told_with_the_joint_that_it_concerns() -> None:
+def test_a_fault_is_named_with_the_joint_that_it_concerns() -> None:
     """Of a control system fault nothing else says where it is."""
     summariser, frame = Summariser(JOINTS), ResidualFrame(START, (Residual(0.0, 1.0, 0.0),) * 10)
     for stamp, state, wheel in ((START, STATES[0], None), (START + S, STATES[2], 1)):
@@ -162,7 +162,7 @@ def test_a_fault_is_told_with_the_joint_that_it_concerns() -> None:
     assert words in page.partition("What was said")[2]
 
 
-def test_an_episode_keeps_the_severity_told_last() -> None:
+def test_an_episode_keeps_the_severity_reported_last() -> None:
     summariser = Summariser(JOINTS)
     frame = ResidualFrame(START, (Residual(0.0, 1.0, 0.0),) * 10)
     severities = [Severity("x", "N", value, 0.0, 9.0) for value in (1.0, 2.0)]
@@ -184,7 +184,7 @@ def test_a_fault_in_one_phase_only_is_a_fault() -> None:
     assert _exit_code([found], []) == 1
 
 
-def test_a_fault_in_all_phases_is_told_from_the_first() -> None:
+def test_a_fault_in_all_phases_is_reported_from_the_first() -> None:
     found = replayed(summary(("slip", 2.3), ("slip", 3.0)), summary(("slip", 2.0)))
     assert verdict(found) == "slip at 2.00 s"
     assert phases_line(found) == "2 phases: slip in 2, first named at 2.00 to 2.30 s"

@@ -105,7 +105,7 @@ def test_signs_and_places() -> None:
     assert frame.residuals[MOTORS[1]].residual == pytest.approx(10.0, abs=1e-3)
 
 
-def test_slower_than_told_is_negative_whichever_way_it_turns() -> None:
+def test_slower_than_commanded_is_negative_whichever_way_it_turns() -> None:
     stage_frames = _frames(_robot(), {**ALL, "joint_states": lambda t: _slow(t)})
     codes = stage_frames[-1].codes
     assert [codes[place] for place in SPEEDS] == [-1, -1, 0]
@@ -347,7 +347,7 @@ def test_coarse_encoders_widen_bands_until_no_speed_is_known(count: float, is_kn
     assert {speed.stale for one in speeds for speed in one} == {not is_known}
     assert {frame.codes for frame in frames} == {(0,) * 10}
     if not is_known:
-        scatter = "the stamps of joint_states scatter too much to tell a speed"
+        scatter = "the stamps of joint_states scatter too much to measure a speed"
         assert {speed.missing for one in speeds for speed in one} == {scatter}
     standing, least = {one[2].band for one in speeds}, ResidualSettings().bands.speed
     if count < 0.001:

@@ -91,7 +91,7 @@ def test_a_second_of_order_is_enough() -> None:
 
 @pytest.mark.parametrize("turns", [0.4, 1.0, 2.55, 6.7])
 def test_bands_can_hold_what_coarse_encoders_round(turns: float) -> None:
-    """64 counts a motor turn: of the speed's errors 99 % lie within 3.3 of what is told."""
+    """64 counts a motor turn: of the speed's errors 99 % lie within 3.3 of what is stated."""
     count, dice = 2.0 * math.pi / (64 * 15), random.Random(5)
     window, watch = EncoderWindow(70 * MS, 50 * MS, 200 * MS), ScatterWatch(fastest=40.0)
     held = []

@@ -69,13 +69,13 @@ def test_another_wheel_is_another_fault() -> None:
     assert case.verdicts == {"another_named": 31}
 
 
-def test_unknown_silence_and_normal_are_told_apart() -> None:
-    told = track((4.5, "unknown", 0), (6.0, "stale", 0), (7.0, "normal", 0))
-    case = one(seen(told, START, [FAULT], (0, 1)))
+def test_unknown_silence_and_normal_are_distinguished() -> None:
+    named = track((4.5, "unknown", 0), (6.0, "stale", 0), (7.0, "normal", 0))
+    case = one(seen(named, START, [FAULT], (0, 1)))
     assert case.named == {"unknown": 10, "nothing decided": 10, "normal": 11}
     assert case.verdicts == {"unknown": 10, "normal_or_nothing": 21}
     accepting = evolve(FAULT, accept=("unknown",))
-    assert one(seen(told, START, [accepting], (0, 1))).verdicts["right"] == 10
+    assert one(seen(named, START, [accepting], (0, 1))).verdicts["right"] == 10
 
 
 def test_only_observable_time_counts() -> None:
@@ -85,11 +85,11 @@ def test_only_observable_time_counts() -> None:
 
 
 def test_false_alarms_before_a_fault_count_and_those_close_together_are_one() -> None:
-    told = track(
+    named = track(
         (0.5, "slip", 0), (0.8, "normal", 0), (1.2, "slip", 0), (1.3, "normal", 0),
         (3.0, "control system fault", 1), (3.2, "normal", 0), (8.5, "slip", 0),
     )  # fmt: skip
-    found = seen(told, START, [FAULT], (0, 1))
+    found = seen(named, START, [FAULT], (0, 1))
     assert found.alarms == ("slip", "control system fault")  # 8.5 s: the robot recovers
 
 

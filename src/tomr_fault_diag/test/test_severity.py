@@ -75,7 +75,7 @@ def frame(
 Make = Callable[[int], ResidualFrame]
 
 
-def told(state: State, wheel: int | None, ill: Make, well: Make | None = None) -> str:
+def said(state: State, wheel: int | None, ill: Make, well: Make | None = None) -> str:
     """What is said after 5 s of a fault, before it 5 s of a robot that is well."""
     watch = SeverityWatch(ROBOT)
     for tick in range(100):
@@ -93,17 +93,17 @@ def healthy(tick: int) -> ResidualFrame:
 def test_friction_added() -> None:
     # 0.14 N m are 0.2 A, in the direction in which the wheel turns.
     more = CURRENT + np.array([0.0, -0.2, 0.0])
-    words = told(DRAGGING[1], 1, lambda tick: frame(tick, power(more, SPEED)))
+    words = said(DRAGGING[1], 1, lambda tick: frame(tick, power(more, SPEED)))
     assert words == "friction added 0.14 N m (0.133 to 0.147 N m)"
 
 
 def test_a_winding_that_heats_more() -> None:
     shown = power(CURRENT, SPEED) + np.array([0.5 * RESISTANCE * CURRENT[0] ** 2, 0.0, 0.0])
-    words = told(DEGRADED[0], 0, lambda tick: frame(tick, shown))
+    words = said(DEGRADED[0], 0, lambda tick: frame(tick, shown))
     assert words == "winding resistance, or a loss like it, +50 % (+47 to +52 %)"
 
 
-def test_a_wheel_that_stands_tells_nothing_of_its_winding() -> None:
+def test_a_wheel_that_stands_shows_nothing_of_its_winding() -> None:
     shown = power(CURRENT, SPEED) + np.array([0.5 * RESISTANCE * CURRENT[0] ** 2, 0.0, 0.0])
     still = SPEED * np.array([0.0, 1.0, 1.0])
 
@@ -112,11 +112,11 @@ def test_a_wheel_that_stands_tells_nothing_of_its_winding() -> None:
             return frame(tick, power(CURRENT, still) + 1.0, still, still)
         return frame(tick, shown)
 
-    words = told(DEGRADED[0], 0, now_and_then)
+    words = said(DEGRADED[0], 0, now_and_then)
     assert words == "winding resistance, or a loss like it, +50 % (+47 to +52 %)"
 
 
-def test_currents_do_not_tell_what_a_winding_loses() -> None:
+def test_currents_do_not_show_what_a_winding_loses() -> None:
     measurement = evolve(ROBOT.measurement, quantity="motor_current")
     watch = SeverityWatch(evolve(ROBOT, measurement=measurement))
     for tick in range(100):
@@ -124,7 +124,7 @@ def test_currents_do_not_tell_what_a_winding_loses() -> None:
     assert watch.severity(DEGRADED[0], 0) is None
 
 
-def test_a_robot_that_hardly_moves_tells_no_force() -> None:
+def test_a_robot_that_hardly_moves_shows_no_force() -> None:
     speed = 0.01 / RADIUS * np.sin(np.radians([0.0, 120.0, 240.0]))  # 0.01 m/s ahead
     watch = SeverityWatch(ROBOT)
     for tick in range(100):
@@ -132,7 +132,7 @@ def test_a_robot_that_hardly_moves_tells_no_force() -> None:
     assert watch.severity(BURDENED, None) is None
 
 
-def test_a_voltage_that_is_not_told_leaves_out_its_ticks() -> None:
+def test_a_voltage_that_is_not_known_leaves_out_its_ticks() -> None:
     watch = SeverityWatch(ROBOT)
     for tick in range(100):
         supply = NAN if tick % 2 else 0.8
@@ -144,25 +144,25 @@ def test_a_voltage_that_is_not_told_leaves_out_its_ticks() -> None:
 
 def test_a_power_sensor_that_shows_too_little() -> None:
     shown = power(CURRENT, SPEED) * np.array([1.0, 1.0, 0.6])
-    words = told(POWER_SENSOR[2], 2, lambda tick: frame(tick, shown))
+    words = said(POWER_SENSOR[2], 2, lambda tick: frame(tick, shown))
     assert words == "power shown -40 % (-42 to -38 %)"
 
 
 def test_a_motor_without_its_signal_draws_nothing() -> None:
     shown = power(CURRENT * np.array([0.0, 1.0, 1.0]), SPEED)
-    words = told(STATES[CONTROL], 0, lambda tick: frame(tick, shown))
+    words = said(STATES[CONTROL], 0, lambda tick: frame(tick, shown))
     assert words == "motor power -100 % (-105 to -95 %)"
 
 
 def test_an_encoder_that_stands() -> None:
     speed = SPEED * np.array([1.0, 1.0, 0.0])
-    words = told(STATES[MOTOR + 2], 2, lambda tick: frame(tick, power(CURRENT, SPEED), speed))
+    words = said(STATES[MOTOR + 2], 2, lambda tick: frame(tick, power(CURRENT, SPEED), speed))
     assert words == "wheel speed shown -100 % (-105 to -95 %)"
 
 
 def test_what_a_stuck_wheel_withstands() -> None:
     speed, current = SPEED * np.array([0.0, 1.0, 1.0]), CURRENT + np.array([3.5, 0.0, 0.0])
-    words = told(STUCK[0], 0, lambda tick: frame(tick, power(current, speed), speed))
+    words = said(STUCK[0], 0, lambda tick: frame(tick, power(current, speed), speed))
     assert words == "withstands 2.8 N m (2.66 to 2.94 N m)"
 
 
@@ -176,7 +176,7 @@ def test_a_force_that_resists() -> None:
     def pulled(tick: int) -> ResidualFrame:
         return frame(tick, power(torque / CONSTANT, speed), speed, speed, still)
 
-    words = told(
+    words = said(
         BURDENED, None, pulled, lambda tick: frame(tick, power(still, speed), current=still)
     )
     assert words == "resisting force 9 N (8.55 to 9.45 N)"
@@ -190,12 +190,12 @@ def test_traction_is_what_wheels_hand_to_the_floor() -> None:
     def slipping(tick: int) -> ResidualFrame:
         return frame(tick, power(np.full(3, torque / CONSTANT), speed), speed, speed)
 
-    assert told(STATES[SLIP], None, slipping, slipping) == (
+    assert said(STATES[SLIP], None, slipping, slipping) == (
         "traction used 0.05 of the load (0.0449 to 0.0551 of the load)"
     )
 
 
-def test_the_wheels_that_push_hardest_tell_the_traction() -> None:
+def test_the_wheels_that_push_hardest_show_the_traction() -> None:
     # Of the load, by the cubes of the forces: (0.06**4 + 2 * 0.03**4) / (0.06**3 + 2 * 0.03**3).
     load, speed = 5.0 * 9.80665, np.array([4.0, 4.0, 4.0])
     torque = 0.06 + 0.004 * 4.0 + np.array([0.06, 0.03, 0.03]) * load * RADIUS
@@ -244,7 +244,7 @@ def test_currents_need_no_power(signed: bool) -> None:
     assert found.value == pytest.approx(0.14)
 
 
-def test_currents_of_a_supply_whose_voltage_is_not_told_are_powers() -> None:
+def test_currents_of_a_supply_whose_voltage_is_not_known_are_powers() -> None:
     watch = SeverityWatch(ROBOT)
     shown, current = (
         power(CURRENT + more, SPEED) / 24.0 for more in (np.array([0.0, -0.2, 0.0]), 0.0)
@@ -258,7 +258,7 @@ def test_currents_of_a_supply_whose_voltage_is_not_told_are_powers() -> None:
 
 def test_the_other_way_around_it_is_as_bad() -> None:
     more = -CURRENT + np.array([0.0, 0.2, 0.0])
-    words = told(
+    words = said(
         DRAGGING[1],
         1,
         lambda tick: frame(tick, power(more, -SPEED), -SPEED, -SPEED, -CURRENT),
@@ -269,7 +269,7 @@ def test_the_other_way_around_it_is_as_bad() -> None:
 def test_what_a_robot_shows_that_is_well_widens_the_interval() -> None:
     more = CURRENT + np.array([0.0, -0.2, 0.0])
     lacking = CURRENT + np.array([0.0, -0.05, 0.0])
-    words = told(
+    words = said(
         DRAGGING[1],
         1,
         lambda tick: frame(tick, power(more, SPEED)),
@@ -290,13 +290,13 @@ def test_what_a_pushed_robot_shows_is_not_how_it_is_when_it_is_well() -> None:
     assert found.words == "friction added 0.14 N m (0.133 to 0.147 N m)"
 
 
-def test_what_may_be_nothing_is_not_told() -> None:
+def test_what_may_be_nothing_is_not_reported() -> None:
     noise = np.random.default_rng(7)
 
     def noisy(tick: int) -> ResidualFrame:
         return frame(tick, power(CURRENT, SPEED) + noise.normal(0.0, 1.0, 3))
 
-    assert told(DRAGGING[1], 1, noisy) == ""
+    assert said(DRAGGING[1], 1, noisy) == ""
 
 
 def test_nineteen_intervals_of_twenty_hold_the_truth() -> None:
@@ -313,7 +313,7 @@ def test_nineteen_intervals_of_twenty_hold_the_truth() -> None:
     assert 180 <= held <= 199
 
 
-def test_nothing_is_told_of_a_moment_or_of_ticks_without_data() -> None:
+def test_nothing_is_reported_of_a_moment_or_of_ticks_without_data() -> None:
     more = power(CURRENT + np.array([0.0, -0.2, 0.0]), SPEED)
     watch = SeverityWatch(ROBOT)
     for tick in range(30):
@@ -330,7 +330,7 @@ def test_nothing_is_told_of_a_moment_or_of_ticks_without_data() -> None:
 def test_what_is_beyond_all_numbers_is_left_out() -> None:
     more = power(CURRENT + np.array([0.0, -0.2, 0.0]), SPEED)
     huge = np.array([1e300, 1.0, 1.0])
-    words = told(
+    words = said(
         DRAGGING[1],
         1,
         lambda tick: frame(tick, more * huge if tick % 7 == 0 else more),
@@ -359,7 +359,7 @@ def test_every_fault_of_a_part_has_a_measure() -> None:
     assert all(watch.severity(state, None) is None for state in (UNKNOWN, DISOBEYS, PUSHED))
 
 
-def test_a_message_tells_it() -> None:
+def test_a_message_states_it() -> None:
     watch = SeverityWatch(ROBOT)
     more = power(CURRENT + np.array([0.0, -0.2, 0.0]), SPEED)
     for tick in range(100):
@@ -385,7 +385,7 @@ def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
     assert half == pytest.approx(student(3) * math.sqrt(12.667 / 4.0), rel=1e-3)
 
 
-def test_stretches_that_tell_nothing_count_for_nothing() -> None:
+def test_stretches_that_show_nothing_count_for_nothing() -> None:
     """Four that were all but at rest beside one that was not are not five."""
     squares = np.array([1e-31, 2e-31, 5e-31, 4e-31, 128.0])
     products = np.array([-8e-17, 6e-17, 1e-16, 2e-16, -24.0])
@@ -401,11 +401,11 @@ def test_numbers_beyond_all_are_left_out() -> None:
         shown = power(more, SPEED)
         return frame(tick, shown * (1e300 if tick % 7 == 0 else 1.0))
 
-    words = told(DRAGGING[1], 1, beyond_all)
+    words = said(DRAGGING[1], 1, beyond_all)
     assert words == "friction added 0.14 N m (0.133 to 0.147 N m)"
 
 
-def test_after_a_clock_goes_back_it_is_told_anew() -> None:
+def test_after_a_clock_goes_back_it_is_measured_anew() -> None:
     more = power(CURRENT + np.array([0.0, -0.2, 0.0]), SPEED)
     found = []
     classifier = FaultClassifier(Dragging(), SeverityWatch(ROBOT))
@@ -413,8 +413,8 @@ def test_after_a_clock_goes_back_it_is_told_anew() -> None:
         diagnosis = classifier.classify(frame(tick, more))
         if diagnosis is not None:
             found.append((diagnosis.stamp_ns, diagnosis.severity is not None))
-    before = [told for stamp, told in found if stamp > BASE + 500 * 50 * MS]
-    again = [told for stamp, told in found if stamp < BASE + 500 * 50 * MS]
+    before = [known for stamp, known in found if stamp > BASE + 500 * 50 * MS]
+    again = [known for stamp, known in found if stamp < BASE + 500 * 50 * MS]
     assert before[-1]
     assert again
     assert not any(again)

@@ -112,13 +112,13 @@ def test_channels_by_hand() -> None:
     np.testing.assert_allclose(seen[2:5], [one, 0.0, -one])
     # What is measured: 4 W, 2 W and nothing, each against a band of 2 W.
     np.testing.assert_allclose(seen[8:11], [np.arcsinh(6.0), one, 0.0])
-    # "Slower than told" by 0.4 rad/s at -8 rad/s is +0.4 rad/s; an unknown one is as modelled.
+    # "Slower than commanded" by 0.4 rad/s at -8 rad/s is +0.4 rad/s; an unknown one is as modelled.
     np.testing.assert_allclose(seen[11:14], [one, np.arcsinh(6.0), 0.0])
     np.testing.assert_allclose(seen[14:17], np.arcsinh([6.0, -16.0, 10.0]))
     np.testing.assert_allclose(seen[17:20], np.arcsinh([6.4, -15.2, 10.0]))
 
 
-def test_the_battery_tells_whether_a_motor_really_draws_what_its_sensor_says() -> None:
+def test_the_battery_shows_whether_a_motor_really_draws_what_its_sensor_says() -> None:
     """Wheel 1 seems to draw 4 W too much: the battery gives 1 W of it, or all, or is unknown."""
     motor = frame(0, ALL, power=(4.0, 0.0, 0.0))
 
@@ -226,7 +226,7 @@ def test_silence_leaves_a_belief_as_it_is() -> None:
     for _ in range(40):
         belief.update(_against_all_but(ENCODERS.start + 1, 20.0))
     assert belief.shares[ENCODERS.start + 1] > 0.999
-    for _ in range(200):  # ten seconds in which nothing can be told apart
+    for _ in range(200):  # ten seconds in which nothing can be distinguished
         belief.update(np.zeros(len(STATE_OF)))
     assert belief.shares[ENCODERS.start + 1] > 0.97
 
@@ -302,7 +302,7 @@ def test_a_fault_on_a_slippery_floor_or_under_a_load_is_as_rare_as_without(
 
 
 @pytest.mark.parametrize("state", [SLIP, LOADED])
-def test_a_fault_that_lasts_is_told_from_the_slip_or_load_before(state: int) -> None:
+def test_a_fault_that_lasts_is_distinguished_from_the_slip_or_load_before(state: int) -> None:
     belief = Belief(0.4, 11.0)
     belief.shares = np.eye(len(STATE_OF))[state]
     for _ in range(10):  # half a second
@@ -613,7 +613,7 @@ def test_a_fault_stays_named_at_rest_and_recovers_in_motion() -> None:
     assert run(moving + still + healthy)[-1].state.name == "normal"
 
 
-def test_a_lost_signal_tells_its_wheel() -> None:
+def test_a_lost_signal_shows_its_wheel() -> None:
     found = run([frame(t) for t in range(40)] + _coasting(40, 30))
     assert found[-1].state is STATES[CONTROL]
     assert found[-1].wheel == 2
@@ -641,7 +641,7 @@ def test_what_a_motion_cannot_show() -> None:
     assert turning.unseen.words == ()
 
 
-def test_a_wheel_that_moves_without_being_told_is_not_idle() -> None:
+def test_a_wheel_that_moves_without_being_commanded_is_not_idle() -> None:
     found = run([frame(t, IDLE, speed=(2.0, 0.0, 0.0)) for t in range(60)])
     assert found[-1].unseen.wheels == ()
     assert found[-1].unseen.moved == (0,)

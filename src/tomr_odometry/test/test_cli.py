@@ -70,9 +70,9 @@ def test_output_that_cannot_be_written(
     command = f"{words} sys.exit(entry.tomr_odometry())' --parameters {redirection}"
     run = subprocess.run(["bash", "-c", f"{command}; exit ${{PIPESTATUS[0]}}"], check=False)
     assert run.returncode in codes
-    told = capfd.readouterr().err
-    assert "Traceback" not in told
-    assert told.count("\n") <= 1
+    printed = capfd.readouterr().err
+    assert "Traceback" not in printed
+    assert printed.count("\n") <= 1
 
 
 @pytest.mark.parametrize(
@@ -90,9 +90,9 @@ def test_bad_input_is_one_line(
     arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main([str(BAG), "--out", str(tmp_path / "out"), *arguments]) == 2
-    told = capsys.readouterr().err.strip()
-    assert words in told
-    assert told.count("\n") == 0
+    printed = capsys.readouterr().err.strip()
+    assert words in printed
+    assert printed.count("\n") == 0
 
 
 def test_learnt_creep_is_read_again_and_the_rest_stays(tmp_path: Path) -> None:

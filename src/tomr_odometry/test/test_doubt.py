@@ -45,7 +45,7 @@ def test_a_change_of_speed_goes_on_for_less() -> None:
 @pytest.mark.parametrize(
     ("has_imu", "seconds", "is_sure"), [(True, 1.0, True), (True, 0.1, False), (False, 1.0, False)]
 )
-def test_an_imu_tells_its_biases_where_the_robot_stands(
+def test_an_imu_shows_its_biases_where_the_robot_stands(
     has_imu: bool, seconds: float, is_sure: bool
 ) -> None:
     core = standing(has_imu, seconds)

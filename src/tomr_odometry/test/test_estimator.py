@@ -108,7 +108,7 @@ def test_where_one_power_is_left_the_wheels_are_taken_for_gripping(slippery: Rec
     assert "without an IMU and power" in items[-1].assumed[-1]
 
 
-def test_power_alone_tells_of_slides(slippery: Recorded, gripping: Recorded) -> None:
+def test_power_alone_shows_slides(slippery: Recorded, gripping: Recorded) -> None:
     """Without an IMU; where nothing slides the pose is that of the wheels."""
     settings = OdometrySettings(use_imu=False)
     plain = evolve(settings, use_power=False)
@@ -136,7 +136,7 @@ def _tilting_without_weight(message: Any) -> None:
 
 @pytest.mark.parametrize("every", [1, 4], ids=["100 Hz", "25 Hz"])
 @pytest.mark.parametrize("lift", [_heavy, _tilting, _tilting_without_weight])
-def test_a_lifted_robot_is_told_from_one_that_slips(
+def test_a_lifted_robot_is_distinguished_from_one_that_slips(
     gripping: Recorded, lift: Callable[[Any], None], every: int
 ) -> None:
     count = 0

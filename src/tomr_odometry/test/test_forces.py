@@ -72,7 +72,7 @@ def test_forces_are_evidence_with_signs_and_an_imu(signed: bool, aided: bool, ro
     assert np.isnan(core._forces[[0, 2]]).all()
 
 
-def test_without_an_imu_the_force_told_is_the_one_that_the_slides_speak_for() -> None:
+def test_without_an_imu_the_force_reported_is_the_one_that_the_slides_speak_for() -> None:
     core = SlipOdometry(ROBOT)
     core._tractive = [Traction(START, 1, 3.0, 2.0, 5.0, ((3.0, -9.0), (2.0, 1.0)))]
     core._forces = np.array([1.0, 3.0, 1.0])

@@ -123,7 +123,7 @@ def test_intervals_hold_what_ice_transmits(slipping: list[Estimate]) -> None:
     assert (stds > 0.0).all()
 
 
-def test_the_two_kinds_of_slip_are_told_apart(slipping: list[Estimate]) -> None:
+def test_the_two_kinds_of_slip_are_distinguished(slipping: list[Estimate]) -> None:
     lost = next(item for item in slipping if item.is_slipping)
     assert "loss of traction at wheel" in lost.words
     assert np.abs(lost.losing).max() > 0.02

@@ -1,4 +1,4 @@
-"""Slides told from power alone, against hand-worked floors."""
+"""Slides estimated from power alone, against hand-worked floors."""
 
 import math
 from collections.abc import Callable
@@ -18,7 +18,7 @@ FRICTION = np.full(3, 1.0)  # N
 STEP = 0.02  # s
 SHARE = 0.12  # traction coefficient of the slippery floor
 FORWARD = np.array([1.0, 0.0, 0.0])
-Told = Callable[[int, float], float]  # force of a wheel at a time [N]
+Forces = Callable[[int, float], float]  # force of a wheel at a time [N]
 
 
 def reading(wheel: int, force: float, first: bool = True) -> Traction:
@@ -30,7 +30,7 @@ def reading(wheel: int, force: float, first: bool = True) -> Traction:
 
 def played(
     rims: Callable[[float], Array],
-    force: Told | None,
+    force: Forces | None,
     seconds: float,
     first: bool = True,
     settings: ParticleSettings | None = None,
@@ -47,7 +47,7 @@ def played(
     return particles.slides(rims(time)), rims(time)
 
 
-def rolling(acceleration: float) -> tuple[Callable[[float], Array], Told]:
+def rolling(acceleration: float) -> tuple[Callable[[float], Array], Forces]:
     """Rims and forces of wheels that roll, forward at a constant acceleration [m/s^2]."""
     forces = np.linalg.solve(BODY.rows.T, BODY.inertia @ (acceleration * FORWARD))
     return (
@@ -56,7 +56,7 @@ def rolling(acceleration: float) -> tuple[Callable[[float], Array], Told]:
     )
 
 
-def spinning(speed: float = 1.5) -> tuple[Callable[[float], Array], Told, float]:
+def spinning(speed: float = 1.5) -> tuple[Callable[[float], Array], Forces, float]:
     """Rims at full speed at once on a slippery floor, their limits as forces, and what follows.
 
     Two wheels pull with the traction coefficient times their loads, at 30 degrees to the motion:
@@ -119,7 +119,7 @@ def test_wheels_find_their_grip_again() -> None:
 
 
 def test_a_robot_whose_wheels_stand_does_not_slide_off() -> None:
-    """On a floor that may slope: there forces tell nothing, and particles would run away."""
+    """On a floor that may slope: there forces show nothing, and particles would run away."""
     particles = Particles(BODY, FRICTION, 0.0, ParticleSettings(sloping=1.0, slope=1.0))
     for _ in range(500):
         particles.step(STEP, np.zeros(3))
@@ -203,9 +203,9 @@ def test_coarse_counts_that_shake_the_motors_count_less() -> None:
     rims, force = rolling(1.2)
 
     def found(shake: float) -> Slides:
-        def told(wheel: int, time: float) -> float:
+        def shaken(wheel: int, time: float) -> float:
             return 0.5 * force(wheel, time) + shake * math.cos(math.pi * time / STEP)
 
-        return played(rims, told, 0.8)[0]
+        return played(rims, shaken, 0.8)[0]
 
     assert found(20.0).any_probability < 0.5 < found(0.0).any_probability

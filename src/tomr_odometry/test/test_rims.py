@@ -1,4 +1,4 @@
-"""How exactly encoders tell ways: their quantum, their times, and whether they stand still."""
+"""How exactly encoders measure ways: their quantum, their times, and whether they stand still."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_a_way_is_known_as_exactly_as_its_time() -> None:
     assert variance == pytest.approx((1e-4 * speed) ** 2 + (COUNT * RADIUS) ** 2 / 12.0, rel=1e-6)
 
 
-def test_slow_samples_whose_times_are_uneven_tell_less() -> None:
+def test_slow_samples_whose_times_are_uneven_show_less() -> None:
     uneven = [100.0 * k + 20.0 * (k % 2) for k in range(1, 40)]
     counts = [0.0, 3.0, 5.0, *uneven, uneven[-1]]
     quick, slow = (taken(counts, period)[1] for period in (10, 50))

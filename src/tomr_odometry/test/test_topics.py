@@ -54,7 +54,7 @@ def test_covariances_stand_where_their_coordinates_are(resting: Estimate) -> Non
         assert np.count_nonzero(full) == 12
 
 
-def test_the_status_tells_which_robot_it_is_of(resting: Estimate) -> None:
+def test_the_status_names_which_robot_it_is_of(resting: Estimate) -> None:
     item = evolve(resting, stamp_ns=START)
     for namespace, settings, name, hardware_id in (
         ("", SETTINGS, "slip_odometry", "tomr"),

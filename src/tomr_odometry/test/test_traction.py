@@ -77,7 +77,7 @@ def test_speeds_are_those_in_the_middle_of_what_a_power_averages() -> None:
     assert found.speed == pytest.approx(10.0 + 20.0 * 0.19, abs=1e-6)
 
 
-def test_a_power_long_after_the_last_encoder_sample_tells_nothing() -> None:
+def test_a_power_long_after_the_last_encoder_sample_shows_nothing() -> None:
     assert _started(ROBOT, 100).power(1_200_000_000, 0, 20.0) is not None
     assert _started(ROBOT, 100).power(1_300_000_000, 0, 20.0) is None
 
@@ -94,7 +94,7 @@ def test_a_magnitude_of_current_is_taken_to_drive(signed: bool, speed: float, si
     assert math.copysign(1.0, found.force) == sign
 
 
-def test_a_power_leaves_two_forces_of_which_one_is_told() -> None:
+def test_a_power_leaves_two_forces_of_which_one_is_named() -> None:
     found = _started(ROBOT, 100).power(1_000_000_000, 0, 20.0)
     assert found is not None
     (one, other), (std, _) = found.either
@@ -132,7 +132,7 @@ def _one_of_two(law: float, change: float = -20.0) -> tuple[list[float], float, 
     return both[:2], found, noise, power[at.POWER_CURRENT]
 
 
-def test_the_drivers_law_tells_which_current_it_is_and_rolling_where_that_does_not() -> None:
+def test_the_drivers_law_shows_which_current_it_is_and_rolling_where_that_does_not() -> None:
     for law, side in ((0.0, 0), (1.0, 1)):
         both, found, noise, _ = _one_of_two(law)
         assert found == both[side]
@@ -144,7 +144,7 @@ def test_the_drivers_law_tells_which_current_it_is_and_rolling_where_that_does_n
 
 
 def test_what_a_driver_has_summed_up_follows_the_measured_power() -> None:
-    """So its law tells the voltage that it holds, whatever it held when it was heard first."""
+    """So its law gives the voltage that it holds, whatever it held when it was heard first."""
     measurement, motor = evolve(ROBOT.measurement, quantity="motor_current"), ROBOT.motors[0]
     tractions, (body, radius) = Tractions(evolve(ROBOT, measurement=measurement)), body_of(ROBOT)
     x, y, turning = (body.to_twist @ (10.0 * radius)).tolist()  # what the wheels do is asked for

@@ -26,7 +26,7 @@ class Creep:
         coefficient_i f (1 + growth f^2),   f = traction / load
 
     Rollers that drag or are soft let a wheel turn faster than it travels. Neither power nor
-    encoders tell it: `tomr_odometry learn` finds it where the pose is known.
+    encoders show it: `tomr_odometry learn` finds it where the pose is known.
     """
 
     coefficient: Triple = (0.0, 0.0, 0.0)

@@ -38,7 +38,7 @@ _GRID_NS = to_ns(1.0)  # of data, between two maps of the floor
 _TRACTION_TIME = 0.3  # s, over which traction is averaged where creep depends on it
 _GRAVITY_TIME = 0.5  # s, over which a new gravity would be taken for granted
 _AHEAD = 0.25  # s, for which the motion of the last encoder sample is taken to go on
-_REST = 0.3  # s of standstill, in which an IMU tells its biases
+_REST = 0.3  # s of standstill, in which an IMU shows its biases
 _LOST_SPEED = 1.0  # m/s, by which a robot without encoders may be off
 _LOST_MOST = 10.0  # s, after which it may be off no further
 _DOUBTED = 5.0  # s, over which a velocity that turns out wrong is taken to have been so at most
@@ -60,7 +60,7 @@ class SlipOdometry:
         self._body, self._radius = body_of(robot)
         self._flaws = EncoderFlaws.of(robot)
         # Without an IMU wheels may slide unseen: the covariance has to allow for it. With one whose
-        # biases no standstill has told yet, what slides from the start may look like a bias.
+        # biases no standstill has shown yet, what slides from the start may look like a bias.
         noise = given.noise
         self._unsure = noise._replace(way=noise.unaided_way, turn=noise.unaided_turn)
         self._unaided = self._unsure._replace(slip_rate=0.0)
@@ -77,7 +77,7 @@ class SlipOdometry:
         self._time = 0  # of the filter's state [ns]
         self._mode = np.zeros(4)
         self._trusted = 0.0  # s, since the state was doubted last
-        self._has_stood = False  # long enough for the IMU to tell its biases
+        self._has_stood = False  # long enough for the IMU to show its biases
         self._x, self._P = start(self._robot, self.settings.noise, self.settings.creep)
         self._rims = Rims(self._radius)
         self._stamps = RecentStamps()
@@ -109,7 +109,7 @@ class SlipOdometry:
         return self._arrive("command", stamp_ns, twist, periodic=False)
 
     def encoders(self, stamp_ns: int, position: Triple, velocity: Triple) -> Arrival:
-        """Take wheel angles [rad]; the speeds that a message tells are not used."""
+        """Take wheel angles [rad]; the speeds that a message reports are not used."""
         return self._arrive("encoders", stamp_ns, position)
 
     def imu(self, stamp_ns: int, values: tuple[float, ...]) -> Arrival:
@@ -209,7 +209,7 @@ class SlipOdometry:
         self._time = time
 
     def _lose_sight(self) -> None:
-        """The IMU dies while wheels slide: for how long they go on nothing tells."""
+        """The IMU dies while wheels slide: nothing shows for how long they go on."""
         sliding = self._rims.speed - self._body.rows @ self._x[VX : WZ + 1]
         lost = (float(np.abs(sliding).max()) * _SLIDES_ON) ** 2
         for place in (0, 1):
@@ -240,9 +240,9 @@ class SlipOdometry:
 
     def _ask_power(self, dt: float) -> None:
         """What the contacts slid in a step without an IMU."""
-        is_told = self._are_evidence and np.isfinite(self._forces).sum() >= FEWEST_POWERS
+        is_known = self._are_evidence and np.isfinite(self._forces).sum() >= FEWEST_POWERS
         speeds = self._tractions.speeds
-        if self._is_aided or not is_told or speeds is None:
+        if self._is_aided or not is_known or speeds is None:
             self._by_power.rest()
             return
         twist, rims = self._x[VX : WZ + 1], speeds * self._radius
@@ -334,7 +334,7 @@ class SlipOdometry:
         )
 
     def _unseen(self) -> Array:
-        """Variance of a velocity that nothing but the wheels tells."""
+        """Variance of a velocity that nothing but the wheels shows."""
         if self._is_aided and self._has_stood:
             return np.zeros((3, 3))
         noise, travel = self._unsure, math.hypot(*self._travel)
@@ -363,9 +363,9 @@ class SlipOdometry:
         if not self.settings.creep.is_known:
             found.append("wheels do not creep: not learnt, see tomr_odometry learn")
         if "imu/data" in missing and self._by_power.is_at_work:
-            found.append("wheels slide as the motors' power tells: less surely than an IMU would")
+            found.append("wheels slide as the motors' power shows: less surely than an IMU would")
         elif "imu/data" in missing:
-            found.append("wheels do not slide: without an IMU and power nothing tells that they do")
+            found.append("wheels do not slide: without an IMU and power nothing shows that they do")
         return tuple(found)
 
     def _learnt(self) -> tuple[tuple[str, float], ...]:

@@ -111,7 +111,7 @@ def predict(x: Array, P: Array, b: Body, n: Noise, mode: Array, used: Array, dt:
     for i in range(3):
         f[RIM + i, VX : WZ + 1] = b.rows[i] * dt
         f[RIM + i, AX : AW + 1] = b.rows[i] * half
-        if n.slip_rate > 0.0:  # unaided, creep cannot be told from travel: it is taken as known
+        if n.slip_rate > 0.0:  # unaided, creep looks like travel: it is taken as known
             f[RIM + i, CREEP] = used[i] * dt
         x[RIM + i] += b.rows[i] @ step + x[CREEP] * used[i] * dt
         f[VX + i, AX + i] = dt
@@ -141,7 +141,7 @@ def judge(x: Array, P: Array, n: Noise, mode: Array, rims: Array, dt: float) -> 
     wide = (n.slide * dt) ** 2
     for i in range(3):
         k, was = RIM + i, mode[i]
-        if n.slip_rate == 0.0:  # nothing tells: the wheels are taken for gripping
+        if n.slip_rate == 0.0:  # nothing shows it: the wheels are taken for gripping
             mode[i] = 0.0
             continue
         grips = max(P[k, k] - was * wide, 0.0) + TAILS * rims[1, i]
@@ -162,7 +162,7 @@ def correct(
     """Measurements made at once, (m, SIZE), (m,), (m,); returns the covariance.
 
     held: biases, friction, drag and creep stay as they are, and so does what is not known of them:
-    without an IMU the wheels tell nothing of these.
+    without an IMU the wheels show nothing of these.
     """
     ph = P @ h.T
     s = h @ ph

@@ -1,8 +1,8 @@
-"""Slides told from power alone: a particle filter over the floor and what the body does on it.
+"""Slides estimated from power alone: a particle filter over the floor and what the body does on it.
 
 Each particle is a floor (traction coefficient, slope), what friction and drag are off by, and the
 twist that the body has on this floor when its rims turn as the encoders say. It predicts the force
-of each contact; a motor's power has two currents, and so tells one of two forces. A particle whose
+of each contact; a motor's power has two currents, and so gives one of two forces. A particle whose
 forces are those of the power, near either of the two, lives on. Where wheels grip all floors agree.
 
 The contacts are those of the one dynamics (dynamics/contacts.py: sticking up to traction times
@@ -40,7 +40,7 @@ class ParticleSettings(NamedTuple):
     most: float = 1.0
     new_floor: float = 0.03  # 1/s, at which a robot comes to another floor
     regain: float = 0.3  # 1/s, at which its wheels find their grip
-    comes_to_rest: float = 1.0  # 1/s, at which it stands where no wheel turns: forces tell nothing
+    comes_to_rest: float = 1.0  # 1/s, at which it stands where no wheel turns: forces show nothing
     wander: float = 0.1  # 1/sqrt(s), of the logarithm of the traction coefficient
     sloping: float = 0.15  # share of floors that slope
     slope: float = 0.4  # m/s^2, of those
@@ -116,7 +116,7 @@ class Particles:
         return np.asarray(low * (high / low) ** random.random(count))
 
     def take(self, reading: Traction) -> None:
-        """Take what a motor's power tells of its contact's force."""
+        """Take what a motor's power shows of its contact's force."""
         self._readings.append(reading)
 
     def step(self, dt: float, rims: Array) -> bool:

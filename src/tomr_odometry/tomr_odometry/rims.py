@@ -1,4 +1,4 @@
-"""Ways and speeds of the rims, and how exactly encoders tell them."""
+"""Ways and speeds of the rims, and how exactly encoders measure them."""
 
 import math
 from collections import deque

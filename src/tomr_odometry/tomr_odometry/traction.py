@@ -2,7 +2,7 @@
 
     r F = k i - friction(omega) - J omega'
 
-Power leaves two currents of it. The driver's law tells which: the voltage that a driver holds
+Power leaves two currents of it. The driver's law shows which: the voltage that a driver holds
 follows from commands and measured speeds (`dynamics.step.control`); where that is not exact enough,
 the current that rolling would take helps. What doubt is left is part of the force's deviation.
 """
@@ -24,13 +24,13 @@ from tomr_power_model.robot import WHEELS, Robot
 
 Triple = tuple[float, float, float]
 Pair = tuple[tuple[float, float], tuple[float, float]]
-_SPAN_NS = 60_000_000  # of the encoder samples that tell speed and acceleration
+_SPAN_NS = 60_000_000  # of the encoder samples that show speed and acceleration
 _FEWEST = 8  # samples
 _RESTING = 0.3  # rad/s
 _STALE_NS = 250_000_000
 _FOLLOW = 0.05  # of what is missing, by which a driver's sum of errors follows the measured power
 _MOVING = 1.0  # rad/s
-_LAW_VOLTS, _LAW_SHARE = 0.15, 0.03  # V and of it: how exactly a driver's law tells its voltage
+_LAW_VOLTS, _LAW_SHARE = 0.15, 0.03  # V and of it: how exactly a driver's law gives its voltage
 _ROLLING_NEWTONS = 10.0  # of a contact's force that rolling would take, where the wheel may slide
 _ROUGH_SHARE, _ROUGHEST = 0.04, 60.0  # of a new sample in the mean; N
 _POWER_SHARE = 0.01  # of a measured power
@@ -175,7 +175,7 @@ class Tractions:
         return motion
 
     def power(self, stamp_ns: int, wheel: int, drawn: float) -> Traction | None:
-        """Force of a contact from a measured power [W], or current [A]; None if nothing tells."""
+        """Force of a contact from a measured power [W], or current [A]; None if it is not known."""
         motion = self._motion(stamp_ns - self._window)
         if motion is None or not self._is_commanded or drawn != drawn:
             return None

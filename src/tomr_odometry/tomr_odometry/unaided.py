@@ -1,4 +1,4 @@
-"""Where no IMU tells that wheels slide: what the motors' power tells of it."""
+"""Where no IMU shows that wheels slide: what the motors' power shows of it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ class Unaided:
         self.rest()
 
     def rest(self) -> None:
-        """An IMU tells, or nothing does: the wheels are taken for gripping."""
+        """An IMU shows it, or nothing does: the wheels are taken for gripping."""
         self.is_at_work = False
         self._sliding = np.zeros(WHEELS)  # m/s
         self.force = np.zeros(WHEELS)  # N, of each contact

@@ -68,9 +68,9 @@ def test_the_command_writes_a_robot_and_a_page(
     out, page = tmp_path / "fitted.yaml", tmp_path / "report.html"
     command = [bags[0], "--holdout", bags[1], "--robot", "reference", "--out", str(out)]
     assert main([*command, "--report", str(page)]) == 0
-    told = capsys.readouterr().out
-    assert "held out" in told
-    assert "robot.mass" in told
+    printed = capsys.readouterr().out
+    assert "held out" in printed
+    assert "robot.mass" in printed
 
     fitted = load_robot(out)
     assert fitted.mass == pytest.approx(real.mass, rel=0.01)
@@ -109,12 +109,12 @@ def test_a_recorded_fault_is_one_line_and_skipping_it_helps(
 ) -> None:
     command = [str(FAULTY_BAG), "--robot", "reference", "--shared", "all"]
     assert main(command) == 2
-    told = capsys.readouterr().err
-    assert told.startswith(
+    printed = capsys.readouterr().err
+    assert printed.startswith(
         "error: circle_encoder_lost: wheel_3_joint, 8.0 s to 14.0 s: its encoder"
     )
-    assert "--skip circle_encoder_lost=7.0:15.0" in told
-    assert told.count("\n") == 1
+    assert "--skip circle_encoder_lost=7.0:15.0" in printed
+    assert printed.count("\n") == 1
     assert main([*command, "--skip", "circle_encoder_lost=7.0:15.0"]) == 0
 
 
@@ -132,6 +132,6 @@ def test_bad_options_are_one_line(
     arguments: list[str], reason: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main([str(FAULTY_BAG), "--robot", "reference", *arguments]) == 2
-    told = capsys.readouterr().err
-    assert reason in told
-    assert told.count("\n") == 1
+    printed = capsys.readouterr().err
+    assert reason in printed
+    assert printed.count("\n") == 1

@@ -145,8 +145,8 @@ def test_a_power_sensor_that_comes_late_is_named(
 ) -> None:
     drive = make_drive(ROBOT, 1)
     shifted = evolve(drive, power_time=drive.power_time + shift)
-    told = structure_warnings(align([shifted], ROBOT, TIMING), ROBOT)
-    late = [line for line in told if f"{word} against joint_states" in line]
+    warnings = structure_warnings(align([shifted], ROBOT, TIMING), ROBOT)
+    late = [line for line in warnings if f"{word} against joint_states" in line]
     topics = [line.partition(" ")[0] for line in late]
     assert topics == [f"{name}/power" for name in ROBOT.wheel_topics]
 
@@ -172,13 +172,13 @@ def test_wheels_at_rest_say_nothing_where_drivers_hold_them(make_drive: MakeDriv
     np.testing.assert_array_equal(determined(samples, loose), samples.measured)
 
 
-def test_what_the_drives_do_not_tell_is_said(make_drive: MakeDrive) -> None:
+def test_what_the_drives_do_not_determine_is_said(make_drive: MakeDrive) -> None:
     result = calibrated([make_drive(ROBOT, 1)], Choice())
-    told = "\n".join(result.warnings)
+    warnings = "\n".join(result.warnings)
     # Supply power depends on R and k through R / k^2 alone.
-    assert "motor.resistance and motor.torque_constant are determined only together" in told
-    assert "motor.torque_constant of every wheel: not determined" in told
-    assert "robot.inertia_z:" not in told
+    assert "motor.resistance and motor.torque_constant are determined only together" in warnings
+    assert "motor.torque_constant of every wheel: not determined" in warnings
+    assert "robot.inertia_z:" not in warnings
     steady = make_drive(ROBOT, 1)
     change = np.abs(np.gradient(steady.velocity, axis=0)).max(axis=1)
     still = maximum_filter1d(change, 11) < 1e-9

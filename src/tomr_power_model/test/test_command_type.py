@@ -74,7 +74,7 @@ def test_it_changes_to_the_type_that_is_published() -> None:
     assert (graph.heard, graph.look) == ([], None)
 
 
-def test_a_type_that_is_not_heard_is_told_once() -> None:
+def test_a_type_that_is_not_heard_is_reported_once() -> None:
     graph = Graph("twist")
     graph.types = {TWIST_STAMPED}
     for _ in range(3):

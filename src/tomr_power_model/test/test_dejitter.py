@@ -48,7 +48,7 @@ def test_jitter_of_stamps_does_not_pass_for_motion() -> None:
     angles = _angles(1e-9 * even)
     stamps = even + _jitter(300)
     assert _error(stamps, angles) < 0.004
-    assert _error(stamps, angles, known=30) > 0.01  # too few to tell jitter
+    assert _error(stamps, angles, known=30) > 0.01  # too few to detect jitter
 
 
 def test_samples_that_are_really_uneven_keep_their_stamps() -> None:
@@ -82,7 +82,7 @@ def test_coarse_encoders_are_not_taken_for_the_other(speed: float, is_even: bool
         said.append(is_jitter(stamps[part], grid, angles[part]))
     assert (not is_even) not in said
     if speed >= 2.5:
-        assert said.count(is_even) >= 8  # of nine: soon told
+        assert said.count(is_even) >= 8  # of nine: soon detected
 
 
 def test_wheels_that_come_to_rest_are_not_taken_for_uneven_samples() -> None:
@@ -103,7 +103,7 @@ def test_wheels_that_come_to_rest_are_not_taken_for_uneven_samples() -> None:
 
 @pytest.mark.parametrize("speed", [0.5, 6.7])
 def test_the_resolution_of_angles_shows_in_their_steps(speed: float) -> None:
-    """Of steps of ten counts and eleven one is told; before anything turned, none."""
+    """Of steps of ten counts and eleven one is found; before anything turned, none."""
     count, watched = 2.0 * np.pi / (64 * 15), RecentStamps()
     stamps = np.arange(300, dtype=np.int64) * 10 * MS + _jitter(300)
     for number, stamp in enumerate(stamps.tolist()):
@@ -162,7 +162,7 @@ def test_a_driver_that_starts_afresh_is_believed_at_once() -> None:
     assert watched.times(stamps) == stamps
 
 
-def test_at_rest_nothing_is_told_and_what_was_known_stays() -> None:
+def test_at_rest_nothing_is_reported_and_what_was_known_stays() -> None:
     watched, stamps = _watched()
     still = tuple(_angles(np.array([1.19]))[0].tolist())
     for number, off in enumerate(_jitter(300).tolist()):

@@ -82,7 +82,7 @@ def test_energy_is_conserved(
     speed, acceleration = (matrix @ twist)[None, :], (matrix @ rate)[None, :]
     drives = model.power(WheelMotion(speed, acceleration))
     copper = 0.8 * (drives.current**2).sum()
-    # Dry friction fades below 0.1 rad/s, where it cannot be told.
+    # Dry friction fades below 0.1 rad/s, where it cannot be determined.
     friction = ((0.06 * np.tanh(speed / 0.1) + 0.004 * speed) * speed).sum()
     kinetic = twist @ Body.of(robot).mass_matrix @ rate
     kinetic += 2.6e-3 * (speed[0] * acceleration[0]).sum()

@@ -191,15 +191,15 @@ def test_the_longest_correlation_of_any_channel_makes_the_blocks() -> None:
     random = np.random.default_rng(2)
     drive = SimpleNamespace(time=0.1 * np.arange(1000), stretch=np.zeros(1000, dtype=int))
     white, lasting = random.normal(size=1000), np.repeat(random.normal(size=100), 10)  # for 1 s
-    told = block_jackknife(
+    estimated = block_jackknife(
         [drive],
         np.stack([white, lasting], axis=1),
         np.ones((1000, 2, 1)),
         np.ones(2),
         robust=False,
     )
-    assert told.block_length == pytest.approx(8.0, rel=0.3)
-    assert told.blocks == pytest.approx(100.0 / told.block_length, abs=1)
+    assert estimated.block_length == pytest.approx(8.0, rel=0.3)
+    assert estimated.blocks == pytest.approx(100.0 / estimated.block_length, abs=1)
 
 
 def test_coordinates_of_the_mass_centre_are_set_one_by_one() -> None:

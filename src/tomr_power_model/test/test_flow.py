@@ -46,7 +46,7 @@ def test_without_a_stamp_the_time_of_arrival_counts() -> None:
         assert "more than 1200 messages a second" in str(refusals[-1])
 
 
-def test_a_message_that_is_too_large_or_whose_stamp_cannot_be_told() -> None:
+def test_a_message_that_is_too_large_or_whose_stamp_cannot_be_read() -> None:
     flow = Flow(has_header=True)
     assert "2,000,012 bytes" in str(flow.refuses(message(START, 2_000_000), 0))
     assert flow.refuses(b"\x00\x01", START) is None

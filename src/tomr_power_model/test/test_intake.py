@@ -191,14 +191,14 @@ def test_a_flood_of_encoders_is_thinned(period_us: int, taken: int) -> None:
         assert joints.take(message, stamp_ns) is None
         data = jazzy_typestore().serialize_cdr(message, "sensor_msgs/msg/JointState")
         assert Flow(has_header=True).stamp_of(bytes(data)) == stamp_ns
-        # Told by the stamp alone, before and after: the answer is the same.
+        # Decided by the stamp alone, before and after: the answer is the same.
         assert joints.is_too_close is not None
         assert joints.is_too_close(stamp_ns) == (stamp_ns not in stamps)
     assert len(stamps) == taken
     assert min(np.diff(stamps)) >= 10**9 // limits().topic_rate
 
 
-def test_what_repeats_or_goes_back_is_not_thinned_but_told() -> None:
+def test_what_repeats_or_goes_back_is_not_thinned_but_reported() -> None:
     joints = model_inputs(shipped_robot("reference"), MagicMock())[1]
     assert joints.is_too_close is not None
     answers = [joints.is_too_close(STAMP + shift) for shift in (0, 100, 0, -100, 0, 10**6)]

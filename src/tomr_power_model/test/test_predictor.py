@@ -134,7 +134,7 @@ def test_without_encoders_only_the_commands_speak() -> None:
     assert all(math.isfinite(reading.power) for reading in last.motors)
 
 
-def test_motor_currents_are_told_where_they_are_what_is_measured() -> None:
+def test_motor_currents_are_reported_where_they_are_what_is_measured() -> None:
     """Of a robot that publishes them: both paths, and the power that the modelled voltage makes."""
     robot = shipped_robot("robotino_v2_gray")
     last = _run(_events(3000), twist=(0.1, 0.0, 0.0), robot=robot)[-1]

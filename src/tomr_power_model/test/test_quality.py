@@ -27,7 +27,7 @@ def during(time: np.ndarray, start: float = 10.0, end: float = 16.0) -> np.ndarr
 
 
 def lose_encoder(drive: Drive) -> Drive:
-    """Wheel 3 as its encoder tells it when it is cut off: still, while its driver gives all."""
+    """Wheel 3 as its encoder reports it when it is cut off: still, while its driver gives all."""
     position, velocity, power = drive.position.copy(), drive.velocity.copy(), drive.power.copy()
     rows = during(drive.encoder_time)
     position[rows, 2] = position[rows, 2][0]
@@ -127,15 +127,15 @@ def coarse(drive: Drive, quantum: float, top: float) -> Drive:
     return evolve(drive, velocity=speed, reading=np.minimum(reading, top))
 
 
-@pytest.mark.parametrize(("quantum", "top", "told"), [(0.05, np.inf, False), (0.01, 0.08, True)])
+@pytest.mark.parametrize(("quantum", "top", "clipped"), [(0.05, np.inf, False), (0.01, 0.08, True)])
 def test_a_coarse_sensor_is_not_a_saturated_one(
-    make_drive: MakeDrive, quantum: float, top: float, told: bool
+    make_drive: MakeDrive, quantum: float, top: float, clipped: bool
 ) -> None:
     """Its readings repeat at their peak, too, but would not pass it."""
     drive = coarse(make_drive(ROBOT, 1), quantum, top)
     _, counts = np.unique(drive.reading[:, 0], return_counts=True)
     assert counts[-1] > 3 * counts[-2:].min()
-    assert any("saturated" in str(found) for found in faults(drive)) == told
+    assert any("saturated" in str(found) for found in faults(drive)) == clipped
 
 
 def uniform(drive: Drive, twist: tuple[float, float, float]) -> Drive:
@@ -144,7 +144,7 @@ def uniform(drive: Drive, twist: tuple[float, float, float]) -> Drive:
     return evolve(drive, velocity=speed)
 
 
-def test_one_speed_and_heading_tells_nothing(make_drive: MakeDrive) -> None:
+def test_one_speed_and_heading_show_nothing(make_drive: MakeDrive) -> None:
     drive = make_drive(ROBOT, 1)
     creep, other = uniform(drive, (0.05, 0.02, 0.1)), uniform(drive, (0.3, 0.0, 0.1))
     with pytest.raises(InputError, match=r"tour: the wheels turn at one speed .* 100 % of the"):

@@ -71,7 +71,7 @@ def test_jitter_is_taken_off_every_stream(
 
 
 @pytest.mark.parametrize(("encoders", "power"), [(3, 1), (1, 3)])
-def test_slow_encoders_and_slow_power_still_tell(
+def test_slow_encoders_and_slow_power_still_suffice(
     make_drive: MakeDrive, encoders: int, power: int
 ) -> None:
     """33 Hz and 8 Hz."""
@@ -82,7 +82,7 @@ def test_slow_encoders_and_slow_power_still_tell(
     assert friction == pytest.approx(0.06, rel=0.3)
 
 
-def test_twenty_pieces_tell_as_much_as_one(make_drive: MakeDrive) -> None:
+def test_twenty_pieces_show_as_much_as_one(make_drive: MakeDrive) -> None:
     drive = make_drive(ROBOT, 1)
     holed = without(drive, [(2.0 * k + 1.6, 2.0 * k + 2.0) for k in range(20)])
     mass, friction, _ = fitted(holed)

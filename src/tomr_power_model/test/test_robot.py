@@ -88,8 +88,8 @@ def test_what_a_file_may_leave_out_or_say(tmp_path: Path) -> None:
     assert (plain.controller.integrator, plain.sensors.power_window) == ("backward", 0.005)
     assert plain.effect("contact.roller_drag") == {"coefficient": 0.1, "slip": 0.0}
     changes = {"controller__integrator": "forward", "sensors__power_window": 0.02}
-    told = load_robot(_write(tmp_path, **changes))
-    assert (told.controller.integrator, told.sensors.power_window) == ("forward", 0.02)
+    loaded = load_robot(_write(tmp_path, **changes))
+    assert (loaded.controller.integrator, loaded.sensors.power_window) == ("forward", 0.02)
 
 
 @pytest.mark.parametrize("text", ["", "a: [", "/**: {}", "- 1", "/**: {ros__parameters: {}}"])

@@ -25,7 +25,7 @@ from tomr_power_model.wang2024.state import Chassis, state_of
 
 BAG = Path(__file__).parents[3] / "bags" / "square"
 ROBOT = shipped_robot("reference")
-# Of terms of one shape only one is at work: the data cannot tell the others from it.
+# Of terms of one shape only one is at work: the data cannot distinguish the others from it.
 FITTED = Coefficients.of_robot(ROBOT).having(
     dv_max_ours=3.0,
     P_stanby=(1.0, 1.2, 1.4),
@@ -79,7 +79,7 @@ class TestFit:
     def test_known_coefficients_come_back(self) -> None:
         truth, samples = _random_drive()
         found = fit_wang2024(ROBOT, samples)
-        # The data tell only the sums of these pairs apart: compare what the pair amounts to.
+        # The data determine only the sums of these pairs: compare what the pair amounts to.
         assert found.R_T * 400.0 + found.eps_2 == pytest.approx(truth.eps_2, rel=1e-3)
         ours = np.array(found.mu_i) + found.c_1_ours
         np.testing.assert_allclose(ours, truth.mu_i, rtol=1e-3)

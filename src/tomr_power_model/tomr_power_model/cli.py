@@ -65,7 +65,7 @@ def run_main(main: Main, arguments: Sequence[str] | None = None) -> int:
         _drop(sys.stdout)
         return EXIT_PIPE_CLOSED
     except Exception as error:  # noqa: BLE001 the outermost place: 1 must not come of it
-        return _interrupted() if _signals else _fail(*_told(error))
+        return _interrupted() if _signals else _fail(*_unexpected(error))
 
 
 class PrintAndLeave(argparse.Action):
@@ -86,7 +86,7 @@ def _interrupted() -> int:
     return _fail(EXIT_TERMINATED if signal.SIGTERM in _signals else EXIT_INTERRUPTED, "interrupted")
 
 
-def _told(error: Exception) -> tuple[int, str]:
+def _unexpected(error: Exception) -> tuple[int, str]:
     """Exit code and line for what nobody expected."""
     if isinstance(error, OSError) and error.filename is None and error.errno in _UNWRITTEN:
         _drop(sys.stdout)

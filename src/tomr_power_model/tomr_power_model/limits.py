@@ -1,4 +1,4 @@
-"""The largest of everything that is read: one record, told when exceeded, settable.
+"""The largest of everything that is read: one record, reported when exceeded, settable.
 
 A limit is changed by an environment variable, e.g. TOMR_LIMIT_CHUNK_BYTES=1e9. They keep one bad
 or hostile input from taking the memory, the disk or the time of the machine; robots' own data

@@ -180,7 +180,7 @@ def test_what_cannot_be_meant_is_one_line_and_exit_code_2(
     assert asked == []
 
 
-def test_results_that_cannot_be_written_are_told(
+def test_results_that_cannot_be_written_are_reported(
     bags: Path, match: Explanation, answer: Answer, capsys: pytest.CaptureFixture[str]
 ) -> None:
     answer(match)

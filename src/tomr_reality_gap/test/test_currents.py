@@ -1,4 +1,4 @@
-"""Robots that tell the currents of their motors and nothing of power; drivers of another kind."""
+"""Robots that report the currents of their motors and nothing of power; drivers of another kind."""
 
 from pathlib import Path
 
@@ -66,7 +66,7 @@ def robotino() -> Robot:
 
 
 def test_the_current_of_a_steady_spin_is_that_of_its_friction(robotino: Robot) -> None:
-    """Wheels told 2.5 rad/s: k_p (2.5 - w) = R i + k w and k i = c + b w; |i| either way round."""
+    """Commanded 2.5 rad/s: k_p (2.5 - w) = R i + k w, k i = c + b w; |i| either way round."""
     motor, gain = robotino.motors[0], robotino.controller.proportional
     k = motor.torque_constant * motor.gear_ratio
     coulomb, viscous = 0.1300992, 0.006063360
@@ -112,7 +112,7 @@ def test_a_later_robot_is_the_same_robot_later(robotino: Robot) -> None:
 
 @pytest.mark.parametrize("integral", [0.0, 157.0])
 def test_delay_and_loop_are_seen_in_wheel_speeds(robotino: Robot, integral: float) -> None:
-    """A loop without an integral stays behind what it is told; one with it does not."""
+    """A loop without an integral stays behind what is commanded; one with it does not."""
     simulation = _forward(robotino, _to_and_fro(0.3, 0.2))
     controller = evolve(robotino.controller, delay=0.1, integral=integral)
     value = simulation.predict([evolve(robotino, controller=controller)])[0]
@@ -132,7 +132,7 @@ def test_delay_and_loop_are_seen_in_wheel_speeds(robotino: Robot, integral: floa
 
 
 def _written(path: Path, robot: Robot, command: np.ndarray, seed: int) -> Path:
-    """What a robot's encoders and current sensors tell, with their quanta and noise."""
+    """What a robot's encoders and current sensors report, with their quanta and noise."""
     random = np.random.default_rng(seed)
     time = 0.0312 * np.arange(len(command))
     recorded = _recorded(robot, command, time)
@@ -142,12 +142,12 @@ def _written(path: Path, robot: Robot, command: np.ndarray, seed: int) -> Path:
     speed = np.stack([np.interp(time, line.middle, column) for column in run.speed.T], axis=1)
     loss = np.stack([np.interp(time, line.middle, column) for column in run.copper.T], axis=1)
     current = np.sqrt(loss / robot.motors[0].resistance) + random.normal(0.0, 0.05, loss.shape)
-    told = speed + random.normal(0.0, 0.1, speed.shape)
+    measured = speed + random.normal(0.0, 0.1, speed.shape)
     stamps = tuple(START_NS + int(1e9 * stamp) for stamp in time)
     rounded = np.abs(np.round(current / QUANTUM)) * QUANTUM
     angle = np.cumsum(speed, axis=0) * 0.0312
     drive = RobotinoDrive(command, np.zeros_like(command), np.zeros_like(command))
-    write_run(Run(stamps, angle, told, np.zeros_like(told), rounded, drive), path, "mcap")
+    write_run(Run(stamps, angle, measured, np.zeros_like(measured), rounded, drive), path, "mcap")
     return path
 
 

@@ -69,7 +69,7 @@ def test_what_the_users_simulation_resists_resists_in_every_recording(
     np.testing.assert_allclose(found.resisting, expected)
 
 
-def test_a_described_learnt_term_resists_and_tells_what_lies_beyond_its_table(
+def test_a_described_learnt_term_resists_and_states_what_lies_beyond_its_table(
     simulation: RecordingSimulation,  # noqa: F811
 ) -> None:
     """0.02 N m at wheel 1 up to 3 rad/s; the drive goes faster."""

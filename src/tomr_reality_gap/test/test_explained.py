@@ -72,7 +72,7 @@ def test_nodes_draw_what_was_learnt_if_another_drive_repeats_it(
     np.testing.assert_allclose(predicted(learnt, twist, 2.0) - plain, [0.0, more, 0.0], atol=1e-3)
 
 
-def test_a_curve_that_no_driver_holds_is_told_and_not_written(tmp_path: Path) -> None:
+def test_a_curve_that_no_driver_holds_is_reported_and_not_written(tmp_path: Path) -> None:
     """A resistance that falls by 3 N m over 1 rad/s; the drivers hold 1.7 N m s/rad."""
     knots, values = (np.array([0.0, 1.0, 2.0]),), np.array([[0.0, 3.0, 0.0]])
     term = LearntTerm(FAMILIES["torque.speed"], (0,), knots, values)

@@ -49,7 +49,7 @@ def test_cases_may_be_given_one_by_one_and_share_a_description(cases: Path) -> N
     assert [case.inputs.robot for case in found] == ["shared.yaml", str(cases / "c/robot.yaml")]
 
 
-def test_cases_of_one_name_are_told_apart_by_their_folder(cases: Path, tmp_path: Path) -> None:
+def test_cases_of_one_name_are_distinguished_by_their_folder(cases: Path, tmp_path: Path) -> None:
     (tmp_path / "monday" / "a" / "real").mkdir(parents=True)
     found = cases_of([cases / "a", tmp_path / "monday"], evolve(ALIKE, robot="shared.yaml"))
     assert [case.name for case in found] == [f"{tmp_path.name}_a", "monday_a"]
@@ -110,7 +110,7 @@ def test_overview_begins_with_what_needs_to_be_seen(results: list[Outcome]) -> N
     assert "friction.stribeck 2 a , b" in page.rows[-1]
 
 
-def test_effects_are_told_by_how_many_robots_have_them(results: list[Outcome]) -> None:
+def test_effects_are_ordered_by_how_many_robots_have_them(results: list[Outcome]) -> None:
     """One has a payload besides, which comes first by its name; the friction does by its number."""
     (found,) = results[2].findings
     results[2] = evolve(results[2], findings=(evolve(found, effect="body.payload_mass"), found))
@@ -119,7 +119,7 @@ def test_effects_are_told_by_how_many_robots_have_them(results: list[Outcome]) -
     assert "friction.stribeck 2 a , b" in rows[-2]
 
 
-def test_fleet_writes_reports_and_overview_and_tells_of_bad_input(
+def test_fleet_writes_reports_and_overview_and_reports_bad_input(
     cases: Path,
     results: list[Outcome],
     monkeypatch: pytest.MonkeyPatch,

@@ -127,7 +127,7 @@ def test_friction_left_out_altogether_is_friction_and_iron_loss_its_rival(
     simulation: RecordingSimulation,  # noqa: F811
     beside: float,
 ) -> None:
-    """Iron loss brakes as Coulomb and viscous friction do together: no data tell them apart.
+    """Iron loss brakes as Coulomb and viscous friction do together: no data distinguish them.
 
     Nor does what viscous friction brings count for less beside what explains far more.
     """

@@ -41,7 +41,7 @@ def _spring(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return 4.0 * np.maximum(far - 0.5, 0.0) / far * away
 
 
-def test_a_spring_is_told_with_its_anchor_and_reaches_beyond_the_table() -> None:
+def test_a_spring_is_named_with_its_anchor_and_reaches_beyond_the_table() -> None:
     line = np.linspace(-1.0, 1.0, 7)
     x, y = (grid.ravel() for grid in np.meshgrid(line, line, indexing="ij"))
     found, term = _laws(_table("force.place", line, line), _spring(x, y))["spring"]
@@ -73,16 +73,16 @@ def test_a_spring_is_told_with_its_anchor_and_reaches_beyond_the_table() -> None
          {"size": 0.2, "order": 3.0, "phase": 1.0}),
     ],
 )  # fmt: skip
-def test_curves_are_told_as_the_laws_that_they_are(
+def test_curves_are_named_as_the_laws_that_they_are(
     family: str, law: str, values: object, parameters: dict[str, float]
 ) -> None:
     knots = np.linspace(0.0, 8.0, 24)
     if FAMILIES[family].axes[0].is_periodic:
         knots = np.linspace(0.0, 2.0 * np.pi, 36, endpoint=False)
     found = _laws(_table(family, knots), values(knots))  # type: ignore[operator]
-    told, _ = found[law]
+    fitted, _ = found[law]
     for name, value in parameters.items():
-        assert told[name] == pytest.approx(value, rel=0.03, abs=0.02)
+        assert fitted[name] == pytest.approx(value, rel=0.03, abs=0.02)
 
 
 def test_the_order_of_a_periodic_law_is_a_whole_number(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -90,8 +90,8 @@ def test_the_order_of_a_periodic_law_is_a_whole_number(monkeypatch: pytest.Monke
     beside = evolve(LAWS["periodic"], starts=lambda at, values: [[0.1, 3.3, 0.8]])
     monkeypatch.setattr(laws, "LAWS", {"periodic": beside})
     knots = np.linspace(0.0, 2.0 * np.pi, 36, endpoint=False)
-    told, _ = _laws(_table("torque.angle", knots), 0.2 * np.sin(3.0 * knots + 1.0))["periodic"]
-    assert told["order"] == 3.0
+    fitted, _ = _laws(_table("torque.angle", knots), 0.2 * np.sin(3.0 * knots + 1.0))["periodic"]
+    assert fitted["order"] == 3.0
 
 
 @pytest.mark.parametrize(
@@ -108,10 +108,10 @@ def test_the_order_of_a_periodic_law_is_a_whole_number(monkeypatch: pytest.Monke
         ("torque.place", "edge", {"size": 0.3, "azimuth": 0.4, "distance": 0.2}),
     ],
 )
-def test_maps_are_told_as_the_laws_that_they_are(
+def test_maps_are_named_as_the_laws_that_they_are(
     family: str, law: str, parameters: dict[str, float]
 ) -> None:
-    """Values worked out here, by the words that the law is told with."""
+    """Values worked out here, by the words that the law is described with."""
     line = np.linspace(-1.0, 1.0, 9)
     x, y = (grid.ravel() for grid in np.meshgrid(line, line, indexing="ij"))
     p = parameters
@@ -123,24 +123,24 @@ def test_maps_are_told_as_the_laws_that_they_are(
     else:
         values = p["size"] * _on_it(law, p, x, y)[None]
     found = _laws(_table(family, line, line), values)
-    told, _ = found[law]
-    assert told == pytest.approx(parameters, abs=0.01)
+    fitted, _ = found[law]
+    assert fitted == pytest.approx(parameters, abs=0.01)
 
 
 @pytest.mark.parametrize(("width", "azimuth"), [(0.87, 0.31), (1.4, 2.6), (0.75, 1.1)])
-def test_stripes_are_told_on_a_large_floor(width: float, azimuth: float) -> None:
+def test_stripes_are_found_on_a_large_floor(width: float, azimuth: float) -> None:
     """Ten of them: half a stripe more or less at the other end is another fit altogether."""
     line = np.linspace(-4.0, 4.0, 24)
     x, y = (grid.ravel() for grid in np.meshgrid(line, line, indexing="ij"))
     p = {"size": 0.3, "width": width, "azimuth": azimuth, "phase": 1.0}
     soft = 0.25 * float(line[1] - line[0])
     values = p["size"] * _on_it("stripes", p, x, y, soft)[None]
-    told, _ = _laws(_table("torque.place", line, line), values)["stripes"]
-    assert told == pytest.approx(p, abs=0.01)
+    fitted, _ = _laws(_table("torque.place", line, line), values)["stripes"]
+    assert fitted == pytest.approx(p, abs=0.01)
 
 
 def test_a_parameter_more_must_bring_its_price(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two forms that fit alike: the one with less to choose is told first."""
+    """Two forms that fit alike: the one with less to choose is named first."""
     short = LAWS["power law"]
     long = evolve(
         short,
@@ -181,7 +181,7 @@ def _on_it(
     return np.asarray(1.0 / (1.0 + np.exp(-inside / soft)))
 
 
-def test_every_law_belongs_to_families_that_are_known_and_is_told_with_all_its_parameters() -> None:
+def test_every_law_belongs_to_families_that_are_known_and_states_all_its_parameters() -> None:
     for law in LAWS.values():
         assert set(law.families) <= set(FAMILIES)
         assert {name for name in law.units if f"{{{name}}}" in law.words} == set(law.units)
@@ -210,9 +210,9 @@ def test_intervals_are_as_wide_as_the_data_are_inexact(sigma: float) -> None:
     tied = never[::-1] * known[0, 1] / np.diag(known)[::-1]  # by the other, as the data tie them
     for inflation in (1.0, 16.0):
         evidence = evolve(_evidence(values, exact=sigma**-2), inflation=inflation)
-        laws_told = {item.law.name: item.fitted for item in laws_of(table, term, evidence)}
-        told = laws_told["power law"].parameters
-        widths = [told[name].high - told[name].low for name in ("size", "exponent")]
+        laws_found = {item.law.name: item.fitted for item in laws_of(table, term, evidence)}
+        fitted = laws_found["power law"].parameters
+        widths = [fitted[name].high - fitted[name].low for name in ("size", "exponent")]
         expected = 3.92 * np.sqrt(inflation * np.diag(known) + never**2 + tied**2)
         assert widths == pytest.approx(expected, rel=0.02)
 
@@ -222,9 +222,9 @@ def test_what_cannot_be_negative_has_no_interval_below_nothing() -> None:
     table, values = _table("torque.since_stand", knots), 0.3 * np.exp(-knots[None] / 0.9)
     term = LearntTerm(table.family, (), table.knots, values)
     (law, *_) = laws_of(table, term, _evidence(values, exact=10.0))
-    told = law.fitted.parameters
-    assert told["decay"].low == 0.0 < told["decay"].value
-    assert told["size"].low < 0.0
+    fitted = law.fitted.parameters
+    assert fitted["decay"].low == 0.0 < fitted["decay"].value
+    assert fitted["size"].low < 0.0
 
 
 def test_a_curve_that_is_no_law_stays_a_table() -> None:
@@ -240,7 +240,7 @@ def test_a_threshold_that_was_never_met_is_none() -> None:
     assert "square of the excess" not in found
 
 
-def test_a_law_is_told_in_words_with_its_numbers() -> None:
+def test_a_law_is_stated_in_words_with_its_numbers() -> None:
     knots = np.linspace(0.0, 8.0, 24)
     table = _table("torque.since_stand", knots)
     values = 0.3 * np.exp(-knots / 0.9)

@@ -159,9 +159,9 @@ def test_a_patch_of_the_floor_is_one_for_all_wheels_and_the_users_simulation_may
     effect = refitted(rest, SimpleNamespace(table=table), robot)  # type: ignore[arg-type]
     assert effect.term.wheels == (0, 1, 2)
     assert effect.share > 0.8  # by moments: each stretch is on ground of its own
-    told = {name: item.value for name, item in effect.laws[0].parameters.items()}
+    law = {name: item.value for name, item in effect.laws[0].parameters.items()}
     expected = {"size": 0.2, "radius": 0.3, "x": place[0], "y": place[1]}
-    assert told == pytest.approx(expected, abs=0.02)
+    assert law == pytest.approx(expected, abs=0.02)
     for theirs, expected in ((value, True), (simulation.predict([robot])[0], False)):
         recorded = [as_recorded(simulation, theirs)]
         baseline = SimulatorBaseline.of(recorded, dataset, found.noise, robot)
@@ -189,7 +189,7 @@ def test_what_runs_in_is_repeatable_only_if_it_does_so_in_several_recordings(
     assert effect.is_repeatable == (recordings > 1)
 
 
-def test_a_tether_is_told_with_its_anchor_and_a_gust_as_what_comes_and_goes(
+def test_a_tether_is_named_with_its_anchor_and_a_gust_as_what_comes_and_goes(
     simulation: RecordingSimulation,  # noqa: F811
 ) -> None:
     """8 N/m beyond 0.3 m from (0.2, 0.0); 3 N along x for four seconds in eight."""
@@ -213,9 +213,9 @@ def test_a_tether_is_told_with_its_anchor_and_a_gust_as_what_comes_and_goes(
     assert pulls is not None
     assert comes is not None
     assert (pulls.family.family_id, pulls.is_repeatable) == ("force.place", True)
-    told = {name: item.value for name, item in pulls.laws[0].parameters.items()}
+    law = {name: item.value for name, item in pulls.laws[0].parameters.items()}
     expected = {"stiffness": 8.0, "slack": 0.3, "x": 0.2, "y": 0.0}
-    assert told == pytest.approx(expected, abs=0.03)
+    assert law == pytest.approx(expected, abs=0.03)
     assert (comes.family.family_id, comes.is_repeatable, comes.laws) == ("force.time", False, ())
 
 

@@ -72,13 +72,13 @@ def _explained(
     values.update(parameters_of("term_1", term, WHEELS, values))
     path = folder / "robot_explained.yaml"
     path.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}), encoding="utf-8")
-    told = [{"law": k, "parameters": v} for k, v in (laws or {"power law": CUBE}).items()]
-    report = {"findings": [{"effect": "unknown", "learnt": {"family": family, "laws": told}}]}
+    listed = [{"law": k, "parameters": v} for k, v in (laws or {"power law": CUBE}).items()]
+    report = {"findings": [{"effect": "unknown", "learnt": {"family": family, "laws": listed}}]}
     path.with_name("report.json").write_text(json.dumps(report), encoding="utf-8")
     return path
 
 
-def _told(**values: float) -> dict[str, object]:
+def _known(**values: float) -> dict[str, object]:
     """Each known to a tenth."""
     return {
         name: {"value": value, "ci95": [value - 0.1 * abs(value), value + 0.1 * abs(value)]}
@@ -99,24 +99,24 @@ def test_the_formula_of_a_law_is_the_law(law: Law) -> None:
 
 
 @pytest.mark.parametrize(
-    ("family", "law", "told", "stem"),
+    ("family", "law", "known", "stem"),
     [
         ("torque.speed", "power law", CUBE, "power_law_by_speed"),
-        ("torque.speed", "step", _told(size=-0.1, threshold=4.0), "step_by_speed"),
-        ("torque.speed", "exponential", _told(size=0.1, decay=2.0), "exponential_by_speed"),
-        ("driver.current", "square beyond a threshold", _told(size=0.2, threshold=3.0),
+        ("torque.speed", "step", _known(size=-0.1, threshold=4.0), "step_by_speed"),
+        ("torque.speed", "exponential", _known(size=0.1, decay=2.0), "exponential_by_speed"),
+        ("driver.current", "square beyond a threshold", _known(size=0.2, threshold=3.0),
          "square_beyond_a_threshold_by_current"),
-        ("torque.tight_angle", "bump", _told(size=0.05, width=2.0, place=1.0),
+        ("torque.tight_angle", "bump", _known(size=0.05, width=2.0, place=1.0),
          "bump_by_tight_angle"),
-        ("torque.angle", "periodic", _told(size=0.05, order=3.0, phase=-0.5),
+        ("torque.angle", "periodic", _known(size=0.05, order=3.0, phase=-0.5),
          "periodic_by_angle"),
     ],
 )  # fmt: skip
 def test_a_promoted_law_is_an_effect_that_passes_its_own_test(
-    tmp_path: Path, family: str, law: str, told: dict[str, object], stem: str
+    tmp_path: Path, family: str, law: str, known: dict[str, object], stem: str
 ) -> None:
     out = tmp_path / "effects"
-    explained = _explained(tmp_path, family, {law: told})
+    explained = _explained(tmp_path, family, {law: known})
     assert main(["promote", str(explained), "--law", law, "--out", str(out)]) == 0
     assert sorted(path.name for path in out.iterdir()) == [f"{stem}.py", f"test_{stem}.py"]
     own = runpy.run_path(str(out / f"test_{stem}.py"))
@@ -169,7 +169,7 @@ def test_of_several_terms_the_named_one_is_taken(
     values.update(parameters_of("term_2", term, WHEELS, values))
     explained.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}), encoding="utf-8")
     report = json.loads(explained.with_name("report.json").read_text(encoding="utf-8"))
-    law = {"law": "power law", "parameters": _told(size=0.5, exponent=2.0)}
+    law = {"law": "power law", "parameters": _known(size=0.5, exponent=2.0)}
     report["findings"].append({"learnt": {"family": "driver.current", "laws": [law]}})
     explained.with_name("report.json").write_text(json.dumps(report), encoding="utf-8")
     assert main(["promote", str(explained), "--out", str(tmp_path / "e")]) == 2
@@ -203,7 +203,7 @@ def test_units_ranges_and_priors_are_those_of_the_intervals(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("family", "laws", "more", "message"),
     [
-        ("force.place", {"spring": _told(stiffness=4.0, slack=0.5, x=0.1, y=0.1)}, (),
+        ("force.place", {"spring": _known(stiffness=4.0, slack=0.5, x=0.1, y=0.1)}, (),
          "no effect acts on that"),
         ("torque.speed", {"power law": CUBE}, ("--term", "term_2"), "has no learnt term 'term_2'"),
         ("torque.speed", {"power law": CUBE}, ("--law", "step"), "no law 'step'.* power law"),
@@ -212,7 +212,7 @@ def test_units_ranges_and_priors_are_those_of_the_intervals(tmp_path: Path) -> N
          "no value with an interval"),
         ("torque.speed", {"power law": {**CUBE, "size": {"value": math.inf, "ci95": [0, 1]}}}, (),
          "not finite"),
-        ("torque.speed", {"step": _told(size=0.1, threshold=-1.0)}, (), "its threshold is -1"),
+        ("torque.speed", {"step": _known(size=0.1, threshold=-1.0)}, (), "its threshold is -1"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_promoted_is_refused_with_one_line(
@@ -234,7 +234,7 @@ def test_what_cannot_be_promoted_is_refused_with_one_line(
 def test_laws_are_those_of_the_terms_own_family(tmp_path: Path) -> None:
     explained = _explained(tmp_path)
     report = json.loads(explained.with_name("report.json").read_text(encoding="utf-8"))
-    laws = [{"law": "power law", "parameters": _told(size=9.0, exponent=0.5)}]
+    laws = [{"law": "power law", "parameters": _known(size=9.0, exponent=0.5)}]
     other = {"effect": "unknown", "learnt": {"family": "driver.current", "laws": laws}}
     both = {"findings": [other, *report["findings"], other, {"effect": "friction.coulomb"}]}
     explained.with_name("report.json").write_text(json.dumps(both), encoding="utf-8")
@@ -361,12 +361,12 @@ def test_a_promoted_law_is_found_on_another_drive_within_what_is_known_of_both(
     """3e-4 N m at 1 rad/s that grows with the cube of the speed, up to 10 rad/s."""
     true, effect_id = {"size": 3e-4, "exponent": 3.0}, "learnt.power_law_by_speed"
 
-    def promoted(told: dict[str, object]) -> None:
-        explained = _explained(tmp_path, "torque.speed", {"power law": told})
+    def promoted(known: dict[str, object]) -> None:
+        explained = _explained(tmp_path, "torque.speed", {"power law": known})
         assert main(["promote", str(explained), "--out", str(tmp_path / "e")]) == 0
         load_effects(tmp_path / "e")
 
-    promoted(_told(**true))
+    promoted(_known(**true))
     robot = simulation.robot
     theirs = evolve(robot, physics={**robot.physics, effect_id: (true,) * 3})
     law = _learnt(simulation, simulation.predict([theirs])[0])

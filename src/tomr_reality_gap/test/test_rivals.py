@@ -1,4 +1,4 @@
-"""What the data can hardly tell from a finding, from responses made by hand."""
+"""What the data can hardly distinguish from a finding, from responses made by hand."""
 
 from types import SimpleNamespace
 
@@ -98,7 +98,7 @@ def test_what_spans_nearly_the_same_is_a_rival_with_the_size_that_stands_in() ->
     assert tried[0].offsets[0] == pytest.approx((1.5,), rel=0.02)
 
 
-def test_what_only_nuisances_tell_apart_is_a_rival() -> None:
+def test_what_only_nuisances_distinguish_is_a_rival() -> None:
     found, beside, near = map(_hypothesis, ("found", "beside", "near"))
     tried = _nearest((found, SHOWN), (beside, SHOWN + NUISANCE), (near, SHOWN + 0.03 * OTHER))
     assert [model.hypotheses[0].effect for model in tried] == ["beside", "near"]

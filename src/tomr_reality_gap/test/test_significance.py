@@ -1,4 +1,4 @@
-"""Which findings are told apart from nothing, on models made by hand."""
+"""Which findings are distinguished from nothing, on models made by hand."""
 
 import math
 from types import SimpleNamespace

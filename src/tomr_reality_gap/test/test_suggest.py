@@ -29,7 +29,7 @@ def test_no_rivals_no_drive() -> None:
 
 
 def _phases(*effects: str) -> list[dict[str, object]]:
-    """What is driven to tell the first from the others."""
+    """What is driven to distinguish the first from the others."""
     first, *others = effects
     rivals = tuple(Rival(other, ("all_wheels",), -1.0, "drive") for other in others)
     mission = yaml.safe_load(suggested([evolve(finding(), effect=first, rivals=rivals)]))
@@ -52,4 +52,5 @@ def test_only_what_has_rivals_is_separated() -> None:
     alone = evolve(finding(), effect="friction.stribeck", rivals=())
     rival = Rival("sensor.power_bias", ("all_wheels",), -1.0, "drive")
     text = suggested([alone, evolve(finding(), effect="friction.viscous", rivals=(rival,))])
-    assert yaml.safe_load(text)["description"] == "Tells friction.viscous from sensor.power_bias."
+    said = yaml.safe_load(text)["description"]
+    assert said == "Distinguishes friction.viscous from sensor.power_bias."

@@ -52,10 +52,10 @@ def _chosen(
         ({PLACE: 0.9, SPEED: 0.8, TIME: 0.95}, PLACE),  # what predicts a stretch comes first
         ({PLACE: 0.42, TIME: 0.9}, PLACE),  # 0.45 of what time explains: repeatable
         ({PLACE: 0.39, TIME: 0.9}, TIME),
-        ({PLACE: 0.29, TIME: 0.31}, TIME),  # too little to be told
+        ({PLACE: 0.29, TIME: 0.31}, TIME),  # too little to be named
         ({PLACE: 0.29, TIME: 0.29}, None),
         ({SPEED: 0.31}, SPEED),
-        ({SPEED: 0.59, SIGNED: 0.61}, SPEED),  # the way it turns tells no more
+        ({SPEED: 0.59, SIGNED: 0.61}, SPEED),  # the way it turns predicts no more
         ({SPEED: 0.57, SIGNED: 0.61}, SIGNED),
         ({SPEED: 0.61, SIGNED: 0.59}, SPEED),
         ({SIGNED: 0.61, PLACE: 0.6}, SIGNED),
@@ -70,7 +70,7 @@ def test_what_predicts_stretches_is_repeatable_and_what_only_follows_time_is_not
     assert _chosen(monkeypatch, shares) == expected
 
 
-def test_where_something_is_there_for_sure_little_is_told_as_well(
+def test_where_something_is_there_for_sure_little_is_named_as_well(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert _chosen(monkeypatch, {SPEED: 0.1}, is_sure=True) == SPEED
@@ -94,7 +94,7 @@ def test_a_law_of_place_that_explains_nearly_all_is_no_event(
         (0.95, 0.91, FLOOR),
     ],
 )
-def test_a_map_of_the_floor_is_one_where_it_tells_more_than_time_does(
+def test_a_map_of_the_floor_is_one_where_it_predicts_more_than_time_does(
     monkeypatch: pytest.MonkeyPatch, stretches: float, moments: float, expected: str
 ) -> None:
     shares = {FLOOR: stretches, TIME: 0.9}
@@ -122,7 +122,7 @@ def test_a_law_of_the_floor_that_explains_more_than_a_table_over_time_is_no_even
 def test_of_families_that_predict_alike_the_one_that_explains_clearly_more_is_taken(
     monkeypatch: pytest.MonkeyPatch, share: float, speed: float, expected: str
 ) -> None:
-    """What a driver draws by speed and what resists by speed: power tells them apart in turns."""
+    """What a driver draws by speed and what resists by speed: power distinguishes them in turns."""
     explained = {DRIVER: 0.8, SPEED: speed}
     assert _chosen(monkeypatch, {DRIVER: 0.99, SPEED: share}, explained=explained) == expected
 
@@ -283,7 +283,7 @@ def test_what_is_left_is_looked_into_where_it_is_large_or_names_leave_much(
 
 
 @pytest.mark.parametrize(
-    ("share", "has_names", "is_repeatable", "told"),
+    ("share", "has_names", "is_repeatable", "named"),
     [
         (0.02, True, False, False),  # names explain nearly all
         (0.04, True, False, True),
@@ -296,7 +296,7 @@ def test_a_little_that_comes_and_goes_beside_names_is_no_finding(
     share: float,
     has_names: bool,
     is_repeatable: bool,
-    told: bool,
+    named: bool,
 ) -> None:
     found = _selection(int(has_names))
     for state in (found.best, found.without):
@@ -309,7 +309,7 @@ def test_a_little_that_comes_and_goes_beside_names_is_no_finding(
     monkeypatch.setattr(explain, "unexplained", lambda _: (share, 0.5))
     monkeypatch.setattr(explain, "_remainder", lambda *_: None)
     monkeypatch.setattr(explain, "unmodelled_effect", lambda *_, is_sure: effect)
-    assert (explain._unmodelled(dataset, found, ready) is effect) == told  # type: ignore[arg-type]
+    assert (explain._unmodelled(dataset, found, ready) is effect) == named  # type: ignore[arg-type]
 
 
 def _glanced(

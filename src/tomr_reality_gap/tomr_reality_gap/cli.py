@@ -148,7 +148,7 @@ def _on_suggestion(explanation: "Explanation", path: Path) -> str:
 
 
 def _ticks(progress: Progress, count: int) -> Callable[[], None]:
-    """Tells of the pictures, one call each."""
+    """Reports the pictures, one call each."""
     done = 0
 
     def tick() -> None:

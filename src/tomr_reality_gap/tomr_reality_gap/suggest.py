@@ -30,7 +30,7 @@ def suggested(findings: Sequence[Finding]) -> str:
                     phases += [*part, PAUSE]
             mission = {
                 "name": "separate",
-                "description": f"Tells {names[0]} from {', '.join(names[1:])}.",
+                "description": f"Distinguishes {names[0]} from {', '.join(names[1:])}.",
                 "phases": phases,
             }
             return str(_Plain.dump(mission))

@@ -64,7 +64,7 @@ def explanation_of(
 
 
 def _term_notes(effect: Unmodelled | None, robot: Robot) -> tuple[str, ...]:
-    """What no other drive repeats is told, and not predicted; what no driver holds, not written."""
+    """What no other drive repeats is named, not predicted; what no driver holds, not written."""
     if effect is None:
         return ()
     if effect.is_repeatable:
@@ -185,7 +185,7 @@ def _sentence(findings: Sequence[Finding]) -> str:
 def _unnamed(learnt: Learnt | None) -> str:
     """What it depends on, and what law it is like."""
     if learnt is None:
-        return "nothing tells on what it depends"
+        return "nothing shows on what it depends"
     words = learnt.term.family.words
     if learnt.laws:
         return f"{words}; {words_of(learnt.laws[0])}"

@@ -82,7 +82,7 @@ def test_encoder_partly_lost_counts_less(make_robot: MakeRobot, drive: Callable)
     simulation = Simulation(make_robot(ideal=True))
     simulation.set_fault("encoder_lost", wheel=2, severity=0.2)
     run = drive(simulation, 5.0, (0.0, 0.0, -0.5), skip=4.0)
-    assert run.joints()[:, 1].mean() == pytest.approx(2.0, rel=0.005)  # told it is right
+    assert run.joints()[:, 1].mean() == pytest.approx(2.0, rel=0.005)  # by its encoder
     # 2.0 / 0.8 rad/s in truth: yaw by a third of the excess of 0.5 rad/s * r / R
     assert run.twist()[:, 2].mean() == pytest.approx(-0.5 - 0.5 * 0.05 / 0.2 / 3.0, rel=0.01)
 

@@ -267,11 +267,11 @@ def test_the_real_drives_agree_with_the_contract(tmp_path: Path) -> None:
     robot = shipped_robot("robotino_v2")
     for name in ("exp05", "exp144"):
         bag = read_bag(tmp_path / "out" / "gray" / name)
-        told = bag["/cmd_vel"][0].twist
-        expected = twist_to_wheels(robot) @ [told.linear.x, told.linear.y, told.angular.z]
+        command = bag["/cmd_vel"][0].twist
+        expected = twist_to_wheels(robot) @ [command.linear.x, command.linear.y, command.angular.z]
         states = bag["/joint_states"]
         seen = np.median([state.velocity for state in states[30:]], axis=0)
-        # A proportional-only loop: slower than told, in the direction told.
+        # A proportional-only loop: slower than commanded, in the direction commanded.
         for wheel in np.flatnonzero(np.abs(expected) > 0.5):
             assert 0.4 < seen[wheel] / expected[wheel] < 1.0
         turned = states[-1].position - states[0].position
@@ -279,7 +279,7 @@ def test_the_real_drives_agree_with_the_contract(tmp_path: Path) -> None:
         speeds = np.array([state.velocity for state in states])
         integral = np.sum(speeds[1:] * np.diff(stamps)[:, None] * 1e-9, axis=0)
         assert turned == pytest.approx(integral, rel=0.03, abs=0.2)
-        # The camera sees the robot move where it was told to, at some slip.
+        # The camera sees the robot move where it was commanded to, at some slip.
         twists = np.array(
             [
                 [odometry.twist.twist.linear.x, odometry.twist.twist.linear.y]
@@ -287,10 +287,10 @@ def test_the_real_drives_agree_with_the_contract(tmp_path: Path) -> None:
             ]
         )
         moved = twists[30:].mean(axis=0)
-        command = np.array([told.linear.x, told.linear.y])
-        cosine = moved @ command / np.linalg.norm(moved) / np.linalg.norm(command)
+        asked = np.array([command.linear.x, command.linear.y])
+        cosine = moved @ asked / np.linalg.norm(moved) / np.linalg.norm(asked)
         assert cosine > math.cos(math.radians(10.0))
-        assert 0.4 < np.linalg.norm(moved) / np.linalg.norm(command) < 1.0
+        assert 0.4 < np.linalg.norm(moved) / np.linalg.norm(asked) < 1.0
 
 
 @pytest.mark.parametrize("attack", ["zeros", "header", "outside", "members", "cut", "device"])

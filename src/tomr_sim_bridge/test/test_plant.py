@@ -202,7 +202,7 @@ def test_cutting_a_run_into_pieces_changes_nothing(make_robot: MakeRobot) -> Non
     assert repr(found) == repr(whole.step_to(300_000_000))
 
 
-def test_instability_is_told_in_one_line(make_robot: MakeRobot) -> None:
+def test_instability_is_reported_in_one_line(make_robot: MakeRobot) -> None:
     simulation = Simulation(make_robot({"motor.resistance": 1e-4}))
     simulation.command(0.4, 0.0, 0.0)
     with pytest.raises(InputError, match="unstable"):
@@ -240,6 +240,6 @@ def test_slow_and_fast_drivers_reach_the_same_speed(
     assert run.joints().mean(axis=0) == pytest.approx([-6.0, 3.0, 3.0], abs=0.012)
 
 
-def test_what_mujoco_refuses_is_told_in_one_line(make_robot: MakeRobot) -> None:
+def test_what_mujoco_refuses_is_reported_in_one_line(make_robot: MakeRobot) -> None:
     with pytest.raises(InputError, match=r"cannot be simulated \(.*\): check its masses and radii"):
         Simulation(make_robot({"robot.robot_radius": 0.001}))

@@ -120,7 +120,7 @@ def test_picture_shows_a_robot(tmp_path: Path) -> None:
     assert black.mean() > 0.02  # rollers and lidar
 
 
-def test_picture_without_gl_is_told(
+def test_picture_without_gl_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("MUJOCO_GL", "nonsense")
@@ -141,7 +141,7 @@ def test_picture_without_gl_is_told(
         (["--picture", "no/such/robot.png"], "there is no folder no/such: create it first"),
     ],
 )
-def test_bad_input_is_told_in_one_line(
+def test_bad_input_is_reported_in_one_line(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str],
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip

@@ -1,7 +1,7 @@
 """Random drives to learn from and to score on: robots, loads, floors, bumps and faults by chance.
 
-A seed makes a drive, whole: the robot as described, how it really is, what it is told to do and
-what befalls it.
+A seed makes a drive, whole: the robot as described, how it really is, what it is to do and what
+befalls it.
 """
 
 import math

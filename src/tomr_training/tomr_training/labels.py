@@ -1,4 +1,4 @@
-"""What was true at a tick, and whether anybody could have told.
+"""What was true at a tick, and whether anybody could have known.
 
 A fault is observable where it moves something that is measured: the power of a motor or a reported
 wheel speed differs from what the same robot does in the same drive without the fault, both free of

@@ -29,7 +29,7 @@ _BODY = 1  # of MuJoCo's bodies: 0 is the world
 
 
 class ProbedSimulation(Simulation):
-    """A simulation that is pushed about, and that tells what really happens at every tick."""
+    """A simulation that is pushed about, and that reports what really happens at every tick."""
 
     def __init__(self, chosen: Drive) -> None:
         mission = chosen.mission

@@ -1,4 +1,4 @@
-"""What the page is told, from residuals and statuses worked by hand."""
+"""What the page is given, from residuals and statuses worked by hand."""
 
 import json
 import math
@@ -58,7 +58,7 @@ def test_the_robot_moves_as_its_wheels_turn(gatherer: Gatherer) -> None:
     assert gatherer.picture()["pose"][2] == pytest.approx(0.5)
 
 
-def test_speed_is_told_in_the_direction_of_turning(gatherer: Gatherer) -> None:
+def test_speed_is_stated_in_the_direction_of_turning(gatherer: Gatherer) -> None:
     """Slower than expected is negative whichever way a wheel turns."""
     slow = Residual(-1.0, 0.1, -5.0, "rad/s")
     usual = frame(1.0, (2.0, 0.0, 0.0))

@@ -48,7 +48,7 @@ def _pictures(recording: Recording, pipeline: Pipeline, namespace: str | None) -
                     Status(item.name, int(item.level), item.message, dict(item.values))
                     for item in message.statuses
                 )
-        truth.tell(gatherer, receive_ns)
+        truth.hand_on(gatherer, receive_ns)
         for frame in step.frames:
             gatherer.residuals(frame)
             if frame.stamp_ns // PICTURE_PERIOD != shown:
@@ -66,7 +66,7 @@ class _Truth:
         self._messages = iter(recording.messages([topic]) if topic else ())
         self._next = next(self._messages, None)
 
-    def tell(self, gatherer: Gatherer, receive_ns: int) -> None:
+    def hand_on(self, gatherer: Gatherer, receive_ns: int) -> None:
         """Hand on what was received up to then."""
         while self._next is not None and self._next[3] <= receive_ns:
             statuses = map(Status.of_message, self._next[2].status)

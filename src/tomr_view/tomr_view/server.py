@@ -67,7 +67,7 @@ class Server:
         command: Callable[[Json], None] | None = None,
     ) -> None:
         """`hello` is what a page learns first; `kept` pictures are remembered, None: all.
-        `command` is told what pages ask of the robot; without it nothing may be asked."""
+        `command` receives what pages ask of the robot; without it nothing may be asked."""
         self._hello = hello
         self._command = command
         self._pages = page_files()
@@ -94,8 +94,8 @@ class Server:
         self._loop.call_soon_threadsafe(self._send, _text(picture))
 
     def update(self, **hello: Any) -> None:
-        """Change what new pages learn first, and tell those that are there; from any thread."""
-        self._loop.call_soon_threadsafe(self._tell, hello)
+        """Change what new pages learn first, and inform those that are there; from any thread."""
+        self._loop.call_soon_threadsafe(self._renew, hello)
 
     def close(self) -> None:
         """End all connections and the thread."""
@@ -207,7 +207,7 @@ class Server:
                 connection.transport.abort()
         broadcast(ready, f'{{"kind":"picture","picture":{text}}}')
 
-    def _tell(self, hello: Mapping[str, Any]) -> None:
+    def _renew(self, hello: Mapping[str, Any]) -> None:
         self._hello = {**self._hello, **hello}
         broadcast(list(self._clients), _text({"kind": "update", **hello}))
 

@@ -30,7 +30,7 @@ NAME = "tomr_commission_drive"
 _COMMAND = "cmd_vel"
 _WAIT = 10.0  # s for the first sample of the encoders
 _NAMELESS = "_NODE_NAME_UNKNOWN_"  # rmw's word, until a node's name has come after its publisher
-_SETTLE = 1.0  # s in which the graph tells who else is there
+_SETTLE = 1.0  # s in which the graph shows who else is there
 _SPIN = 0.01  # s
 _BACK, _ON = -0.2, 2.0  # s that a clock may go between two looks
 _HALT = 0.5  # s of standing commanded at the end, whatever ended it
@@ -192,10 +192,10 @@ class DriveNode(Node):
 
 
 def drive(request: DriveRequest, out: Path, progress: Progress) -> None:
-    """Drive and record to a new folder; the robot is told to stand whatever ends it.
+    """Drive and record to a new folder; the robot is commanded to stand whatever ends it.
 
     Raises:
-        InputError: nobody is there, somebody else commands, or the robot does otherwise than told.
+        InputError: nobody is there, somebody else commands, or the robot does not as commanded.
         KeyboardInterrupt: after a signal.
     """
     with _Signals() as signals:
@@ -272,7 +272,7 @@ def _follow(node: DriveNode, request: DriveRequest, signals: _Signals, progress:
         problem = node.watch.problem(now, node.silent)
         if not problem and node.rivals:
             first = node.rivals
-            node.halt()  # first of all; meanwhile a node that just came tells its name
+            node.halt()  # first of all; meanwhile a node that just came shows its name
             problem = node.rivals or first
         if is_slow and now >= request.slow_end:
             is_slow = False

@@ -5,7 +5,7 @@
 with l_k the log-likelihood of the newest window if k holds, relative to the likeliest. Windows
 overlap and so say the same several times over: `weight` < 1. That a fault comes on within a tick is
 10^-caution likely: so many decades of evidence must speak for it before it is believed. What cannot
-be told apart from normal in this motion has l = 0 and leaves the belief as it is.
+be distinguished from normal in this motion has l = 0 and leaves the belief as it is.
 
 A force from outside is one hypothesis of the network and two states here: pushes are frequent and
 soon over, loads are as rare as faults and stay. What looks like one fault now and like another
@@ -33,7 +33,7 @@ from tomr_fault_diag.classifier.states import (
 
 Array = NDArray[np.float64]
 
-# What the window network tells apart: normal, slip, and of wheels 1-3 each: signal lost, encoder
+# What the window network distinguishes: normal, slip, and of wheels 1-3 each: signal lost, encoder
 # lost, axle dragging, motor weak, power sensor wrong; a force from outside; anything else.
 HYPOTHESES = 19
 CONTROLS = slice(2, 5)

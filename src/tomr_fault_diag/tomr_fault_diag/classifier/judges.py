@@ -102,7 +102,7 @@ class Opinion:
 
 
 class Judge(Protocol):
-    """One way to tell states from residuals."""
+    """One way to name states from residuals."""
 
     settings: ClassifierSettings
 

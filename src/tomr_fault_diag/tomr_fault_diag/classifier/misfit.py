@@ -68,7 +68,7 @@ class MisfitWatch:
         far = [index for index in range(first, RESIDUALS) if is_far(frame.residuals[index])]
         self._far_since = {index: self._far_since.get(index, now) for index in far}
         is_low = frame.supply < low_supply + (_MORE if self._low_since is not None else 0.0)
-        if not is_low:  # nor where it is not told
+        if not is_low:  # nor where it is not known
             self._low_since = None
         elif self._low_since is None:
             self._low_since = now

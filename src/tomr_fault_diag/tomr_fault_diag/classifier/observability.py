@@ -1,7 +1,7 @@
 """Which faults the present motion could not show, whoever looked.
 
 A motor that need not turn draws standby power with and without its control signal or encoder; a
-wheel slips only while it has to push. Told from what the command asks for and the encoders say.
+wheel slips only while it has to push. Decided from what the command asks for and the encoders say.
 """
 
 from collections import deque
@@ -42,7 +42,7 @@ class Unseen:
         return (*motors, "slip") if self.slip else motors
 
 
-# Stamp [ns], speeds expected [rad/s], which wheels are told to turn, which turn.
+# Stamp [ns], speeds expected [rad/s], which wheels are commanded to turn, which turn.
 _Tick = tuple[int, tuple[float, ...], tuple[bool, ...], tuple[bool, ...]]
 
 
@@ -62,20 +62,20 @@ class MotionWatch:
         """Take the newest tick; returns what the last ticks could not show."""
         speeds = [frame.residuals[index] for index in SPEEDS]
         expected = tuple([speed.modelled for speed in speeds])
-        now, told = frame.stamp_ns, tuple([_is_told_to_turn(speed) for speed in speeds])
-        self._ticks.append((now, expected, told, tuple([_turns(speed) for speed in speeds])))
+        now, asked = frame.stamp_ns, tuple([_is_asked_to_turn(speed) for speed in speeds])
+        self._ticks.append((now, expected, asked, tuple([_turns(speed) for speed in speeds])))
         while self._ticks[0][0] <= now - _LATELY:
             self._ticks.popleft()
         if self._since is None:
             self._since = now
         if now - self._since < _LEAST:
             return Unseen()
-        _, every_expected, every_told, every_turning = zip(*self._ticks, strict=True)
-        told, turning = _ever(every_told), _ever(every_turning)
+        _, every_expected, every_asked, every_turning = zip(*self._ticks, strict=True)
+        asked, turning = _ever(every_asked), _ever(every_turning)
         steady = all(
             max(wheel) - min(wheel) < _SPEEDING for wheel in zip(*every_expected, strict=True)
         )
-        idle = [wheel for wheel in range(_WHEELS) if not told[wheel]]
+        idle = [wheel for wheel in range(_WHEELS) if not asked[wheel]]
         return Unseen(
             wheels=tuple([wheel for wheel in idle if not turning[wheel]]),
             slip=steady,
@@ -88,7 +88,7 @@ def _ever(ticks: Iterable[Iterable[bool]]) -> tuple[bool, ...]:
     return tuple([any(wheel) for wheel in zip(*ticks, strict=True)])
 
 
-def _is_told_to_turn(speed: Residual) -> bool:
+def _is_asked_to_turn(speed: Residual) -> bool:
     """One of which it is not known may be."""
     return not abs(speed.modelled) < _TURNING
 

@@ -62,7 +62,7 @@ class FaultClassifier:
     """
 
     def __init__(self, judge: Judge, severity: SeverityWatch | None = None) -> None:
-        """Without `severity` it is not told how bad a fault is, nor what has changed slowly."""
+        """Without `severity` it is not stated how bad a fault is, nor what has changed slowly."""
         self._judge = judge
         self._severity = severity
         self._motion = MotionWatch()
@@ -260,7 +260,7 @@ def _called(opinion: Opinion, misfit: Misfit) -> State:
 
 
 def _is_one_fault(state: State, other: State) -> bool:
-    """Whether two states are the same, or tell what ails one and the same motor."""
+    """Whether two states are the same, or state what ails one and the same motor."""
     return state == other or (state.paper is not None and state.paper == other.paper)
 
 

@@ -46,7 +46,7 @@ POWER_SENSOR = _of_wheels("power sensor fault", Level.WARN)
 # A force from outside: over soon and nobody's fault, or there to stay.
 PUSHED = State("pushed", Level.OK, paper=NORMAL)
 BURDENED = State("external load", Level.WARN)
-# Something is wrong that is none of these, or what is wrong cannot be told.
+# Something is wrong that is none of these, or what is wrong cannot be decided.
 DISOBEYS = State("does not follow its commands", Level.ERROR)
 UNKNOWN = State("unknown", Level.WARN)
 LOW_SUPPLY = State("low supply", Level.WARN)  # its voltage lies below what is normal
@@ -55,7 +55,7 @@ STALE = State("stale", Level.STALE)  # nothing can be compared
 # Too many gaps to say anything. OK as all that cannot be decided: the status of the stream that
 # has them warns of it, and a pause of the commands is nobody's fault.
 NOT_ENOUGH = State("not enough data", Level.OK)
-# Nothing is wrong as far as can be told, and in this motion nothing could be told.
+# Nothing is wrong as far as can be seen, and in this motion nothing could be detected.
 NOT_OBSERVABLE = State("not observable in this motion", Level.OK)
 FAULTLESS = frozenset(
     {

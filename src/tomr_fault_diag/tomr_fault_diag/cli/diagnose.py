@@ -175,7 +175,7 @@ def _exit_code(done: Sequence[Replayed], failed: Sequence[Failed]) -> int:
     return EXIT_UNDECIDED if any(item.undecided for item in done) else EXIT_OK
 
 
-def _tell(line: str) -> None:
+def _report(line: str) -> None:
     """On stderr, in one line whatever the names in it hold."""
     print(one_line(line), file=sys.stderr)
 
@@ -185,7 +185,7 @@ def _scores(done: Sequence[Replayed]) -> dict[str, Any]:
 
     for item in done:
         if not item.seen:
-            _tell(f"note: {item.task.bag}: nothing is said of it: not scored")
+            _report(f"note: {item.task.bag}: nothing is said of it: not scored")
     seen = tuple(one for item in done for one in item.seen)
     if not seen:
         raise InputError("--labels: nothing is said of any of the recordings: check their names")
@@ -194,7 +194,7 @@ def _scores(done: Sequence[Replayed]) -> dict[str, Any]:
 
 def _print_one(item: Replayed) -> None:
     if item.undecided:
-        _tell(f"{item.task.bag}: {verdict(item)}")
+        _report(f"{item.task.bag}: {verdict(item)}")
     for line in summary_lines(item.phases[0].summary, item.start_ns):
         print(line)
     if len(item.phases) > 1:
@@ -204,7 +204,7 @@ def _print_one(item: Replayed) -> None:
 def _print_notes(item: Replayed, is_alone: bool) -> None:
     place = "" if is_alone else f"{item.task.bag}: "
     for line in notes(item):
-        _tell(f"note: {place}{line}")
+        _report(f"note: {place}{line}")
 
 
 def _print_json(
@@ -237,7 +237,7 @@ def _diagnose(arguments: Sequence[str] | None) -> int:
     for item in [_replayed_alone(tasks[0])] if is_alone else _replayed(tasks, options.jobs):
         if isinstance(item, Failed):
             failed.append(item)
-            _tell(f"error: {item.reason}")
+            _report(f"error: {item.reason}")
         else:
             done.append(item)
     order = {task.bag: number for number, task in enumerate(tasks)}

@@ -36,7 +36,7 @@ class DiagnosisNode(LifecycleNodeMixin, StageNode):
         for file in files:
             given.update(read_node_sections(file, STAGE_NODES))
         StageNode.__init__(self, NAME, PARAMETERS.values(), given)
-        self.pipeline = self._fresh()  # what cannot be used is told at the start
+        self.pipeline = self._fresh()  # what cannot be used is reported at the start
         self.on_change(lambda _: self.pipeline.retune(self._settings()))
         if self.values["managed"]:
             LifecycleNodeMixin.__init__(self)

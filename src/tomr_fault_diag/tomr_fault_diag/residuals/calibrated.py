@@ -46,7 +46,7 @@ def fit_bands(
         within: share of the ticks that stay within.
 
     Raises:
-        InputError: too few residuals to tell.
+        InputError: too few residuals to estimate a band.
     """
 
     def band(channels: Sequence[int]) -> Band | None:

@@ -25,7 +25,7 @@ YAW = "residuals: yaw rate against the gyro"
 NO_COMMAND = "no fresh cmd_vel for the model"
 NOT_MEASURED = "not measured on this robot"
 GAP = "a gap in "  # and which stream: it paused, or went on only just before
-SCATTER = "the stamps of joint_states scatter too much to tell a speed"
+SCATTER = "the stamps of joint_states scatter too much to measure a speed"
 NOT_BELIEVED = "the gyro has not agreed with the wheels for long enough yet"
 NO_GYRO = "no fresh imu/data"
 FROZEN = " repeats itself while the motor works"  # and before it which stream
@@ -68,7 +68,7 @@ class ResidualFrame:
 
     stamp_ns: int
     residuals: tuple[Residual, ...]
-    supply: float = float("nan")  # voltage of the supply over the nominal one, where it is told
+    supply: float = float("nan")  # voltage of the supply over the nominal one, where it is measured
     yaw: Residual = Residual(math.nan, math.nan, math.nan, "rad/s", NO_GYRO)  # gyro - wheels
 
     @property

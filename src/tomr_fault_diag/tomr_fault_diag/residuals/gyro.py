@@ -11,7 +11,7 @@ from tomr_power_model.model.ticks import to_ns
 
 _TURNS = 0.2  # rad/s: slower turning says nothing of how a gyro is mounted
 _AGREED = to_ns(2.0)  # of turning, tick after tick, in which it has to agree
-_MOST_HZ = 60  # samples beyond tell nothing more
+_MOST_HZ = 60  # samples beyond add nothing
 _KEPT = 1024  # samples, should no tick come
 CLOSEST_NS = to_ns(1.0 / _MOST_HZ)
 
@@ -51,7 +51,7 @@ class GyroWatch:
         return sum(found) / len(found) if found else float("nan")
 
     def spread(self, wheels: float) -> float:
-        """How far the yaw rate that the wheels tell [rad/s] moved lately, the newest included."""
+        """How far the yaw rate that the wheels show [rad/s] moved lately, the newest included."""
         if wheels != wheels:  # NaN
             return 0.0
         self._recent.append(wheels)

@@ -21,7 +21,7 @@ class Measured:
 
 
 class SupplyWindow:
-    """Keeps the readings of one supply; where it tells no voltage, its current is compared.
+    """Keeps the readings of one supply; where it reports no voltage, its current is compared.
 
     Nothing is filled in: a window without a sample takes the newest one that is not stale.
     """
@@ -53,7 +53,7 @@ class SupplyWindow:
         return Measured(sum(currents) / len(currents) if currents else NAN, "A")
 
     def voltage_at(self, tick_ns: int) -> float:
-        """Mean voltage over (tick - period, tick] [V], NaN where it is not told."""
+        """Mean voltage over (tick - period, tick] [V], NaN where it is not reported."""
         inside = of_tick(self._samples, tick_ns, self._period, self._stale)
         voltages = [voltage for _, _, _, voltage in inside if not math.isnan(voltage)]
         return sum(voltages) / len(voltages) if voltages else NAN

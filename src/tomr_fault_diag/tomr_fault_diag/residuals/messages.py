@@ -86,11 +86,11 @@ def frame_of(message: Any, stamp_ns: int) -> ResidualFrame:
 
 
 def _supply(status: Any) -> float:
-    told = next((item.value for item in status.values if item.key == "supply"), "nan")
+    found = next((item.value for item in status.values if item.key == "supply"), "nan")
     try:
-        return float(told)
+        return float(found)
     except ValueError:
-        raise Unusable(f"{status.name}: supply {told!r} is no number") from None
+        raise Unusable(f"{status.name}: supply {found!r} is no number") from None
 
 
 def _residual(status: Any) -> Residual:

@@ -27,8 +27,8 @@ _MEMORY = 800.0  # samples, before older ones count half
 class Work:
     """What a motor does at a tick."""
 
-    turns: bool  # the wheel is told to, or does
-    follows: bool  # and as it should, as far as can be told
+    turns: bool  # the wheel is commanded to, or does
+    follows: bool  # and as it should, as far as can be seen
     power: float  # that the model expects [W or A], NaN where it is not known
     band: float  # of that
 

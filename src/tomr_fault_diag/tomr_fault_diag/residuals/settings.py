@@ -36,7 +36,7 @@ RESIDUAL_PARAMETERS: tuple[ParameterSpec, ...] = (
     _live(
         "band.yaw", "least band of a gyro's yaw rate against the wheels'", 0.1, "rad/s", LEAST_BAND
     ),
-    _live("band.yaw_relative", "of the yaw rate that the wheels tell", 0.1),
+    _live("band.yaw_relative", "of the yaw rate that the wheels show", 0.1),
     _live("band.yaw_transient", "part of that yaw rate's change over the last ticks", 1.0),
 )
 

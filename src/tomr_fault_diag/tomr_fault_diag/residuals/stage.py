@@ -249,11 +249,11 @@ class ResidualStage:
         )
 
     def _supply_share(self, tick: int) -> float:
-        """Voltage of the supply over the nominal one, NaN where nothing tells it."""
-        told = [window.voltage_at(tick) for window in self._windows]
-        motors = sorted(voltage for voltage in told[:TOTAL] if voltage == voltage)
-        if told[TOTAL] == told[TOTAL]:
-            voltage = told[TOTAL]
+        """Voltage of the supply over the nominal one, NaN where nothing measures it."""
+        measured = [window.voltage_at(tick) for window in self._windows]
+        motors = sorted(voltage for voltage in measured[:TOTAL] if voltage == voltage)
+        if measured[TOTAL] == measured[TOTAL]:
+            voltage = measured[TOTAL]
         else:
             voltage = motors[len(motors) // 2] if motors else NAN
         return rounded(voltage / self._robot.supply.nominal_voltage)
@@ -329,7 +329,7 @@ class ResidualStage:
         for wheel, value in enumerate(estimate.speed.tolist()):
             models = [past.speed[wheel] for past in self._recent]
             model = models[-1]
-            # Against the set direction: "slower than told" is negative whichever way it turns.
+            # Against the set direction: "slower than commanded" is negative whichever way it turns.
             sign = -1.0 if model < 0.0 else 1.0
             spread = bands.speed_transient * _spread(models)
             band = max(bands.speed, bands.speed_relative * abs(model)) + spread
@@ -339,12 +339,12 @@ class ResidualStage:
             residual = NAN if disorder else rounded(sign * (value - model))
             band = rounded(max(band, _NOISE * noise))
             speeds.append(Residual(residual, band, rounded(model), "rad/s", missing))
-        if unsure:  # all wheels are read at once: where one cannot be told, no other is better
+        if unsure:  # all wheels are read at once: where one cannot be measured, no other is better
             speeds = [evolve(one, residual=NAN, missing=one.missing or SCATTER) for one in speeds]
         return speeds
 
     def _yaw(self, tick: int, estimate: WheelEstimate, speeds: list[Residual]) -> Residual:
-        """What a gyro measures less what the wheels tell."""
+        """What a gyro measures less what the wheels show."""
         bands, measured = self.settings.bands, self._gyro.rate(tick)
         wheels = float(self._turning @ self._flaws.turned(estimate).speed)
         if any(speed.residual != speed.residual for speed in speeds):

@@ -60,7 +60,7 @@ def read_legs(path: Path, robot: Robot, topic: str, turned: float = 0.0) -> list
         for _ in estimates(recording, robot, recorder, Complaints()):
             pass
     if not any(np.any(used) for _, _, used in recorder.rows):
-        raise InputError(f"{path}: no motor power: creep grows with the force that power tells")
+        raise InputError(f"{path}: no motor power: creep grows with the force that power shows")
     stamps = np.array([row[0] for row in recorder.rows], dtype=np.int64)
     rims = np.array([row[1] for row in recorder.rows])
     used = np.array([row[2] for row in recorder.rows])

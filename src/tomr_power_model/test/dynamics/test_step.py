@@ -84,7 +84,7 @@ def test_a_stopped_wheel_is_held_by_its_drivers_integral(
     make_vehicle: MakeVehicle, drive_vehicle: DriveVehicle
 ) -> None:
     # 0.43 N m hold up to 0.43 R / k = 0.491 V. Asked for -0.1 rad/s, 40 periods add up to
-    # 0.02 rad, 12 * 0.02 = 0.24 V; told to stop, that stays and draws 0.24^2 / 0.8 = 0.072 W.
+    # 0.02 rad, 12 * 0.02 = 0.24 V; commanded to stop, that stays and draws 0.24^2 / 0.8 = 0.072 W.
     sticky = make_vehicle(physics={"friction.coulomb": {"torque": 0.43}}, **AT_ONCE)
     commands = np.concatenate([held((0.0, 0.0, 0.025), 40), held((0.0, 0.0, 0.0), 200)])
     steps = drive_vehicle(sticky, commands).steps

@@ -1,4 +1,4 @@
-"""What every effect of the vocabulary must tell, and its laws worked by hand."""
+"""What every effect of the vocabulary must state, and its laws worked by hand."""
 
 import math
 
@@ -12,7 +12,7 @@ BACK = WHEEL._replace(speed=-2.0)
 
 
 @pytest.mark.parametrize("effect", EFFECTS.values(), ids=list(EFFECTS))
-def test_an_effect_tells_all_of_itself(effect: type[Effect]) -> None:
+def test_an_effect_states_all_of_itself(effect: type[Effect]) -> None:
     assert effect.__doc__
     assert effect.label[0].isupper()
     assert effect.mission
@@ -31,7 +31,7 @@ def test_every_effect_is_among_the_samples() -> None:
     assert set(LARGE) == {name for name in EFFECTS if not name.startswith("sensor.")}
 
 
-def test_labels_tell_effects_apart() -> None:
+def test_labels_distinguish_effects() -> None:
     assert len({effect.label for effect in EFFECTS.values()}) == len(EFFECTS)
 
 

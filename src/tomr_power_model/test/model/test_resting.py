@@ -23,7 +23,7 @@ def _path() -> CommandPath:
 
 
 def _standing(robot: Robot) -> CommandPath:
-    """Of a robot that is told to stand and stands."""
+    """Of a robot that is commanded to stand and stands."""
     path = CommandPath(robot, CommandTiming(50 * MS))
     path.command(BASE, REST)
     path.over(BASE + 50 * MS, Seen(REST, REST, 0.0))

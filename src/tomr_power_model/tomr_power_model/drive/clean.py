@@ -57,7 +57,7 @@ def _commanded(drive: Drive, robot: Robot) -> tuple[Drive, list[str]]:
     if np.mean(known) < _HALF:
         raise InputError(
             f"{drive.name}: cmd_vel: messages are missing where the command changes, {len(lost)} "
-            "times: nothing tells what the robot was asked for; record it again"
+            "times: nothing shows what the robot was asked for; record it again"
         )
     note = (
         f"{drive.name}: cmd_vel: messages are missing where the command changes, {len(lost)} "
@@ -142,8 +142,8 @@ def _blanks(drive: Drive, robot: Robot) -> list[str]:
     """Notes of what is NaN."""
     notes = []
     for wheel, name in enumerate(robot.wheel_names):
-        told = np.isfinite(drive.position[:, wheel]) | np.isfinite(drive.velocity[:, wheel])
-        missing = 1.0 - float(np.mean(told))
+        known = np.isfinite(drive.position[:, wheel]) | np.isfinite(drive.velocity[:, wheel])
+        missing = 1.0 - float(np.mean(known))
         if missing > _HALF:
             raise InputError(
                 f"{drive.name}: {name}: {100.0 * missing:.0f} % of the encoder's samples are "

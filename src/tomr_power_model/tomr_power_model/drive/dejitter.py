@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 _FEWEST = 10  # stamps
 _SCATTER = 0.35  # of a period: stamps that scatter wider have no grid
 _GAP = 5.5  # periods: after a longer silence the driver may have started afresh
-_MOVING = 0.3  # rad/s: the single counts of a slower wheel tell nothing
-_ENOUGH = 30  # samples in motion that it takes to tell
+_MOVING = 0.3  # rad/s: the single counts of a slower wheel show nothing
+_ENOUGH = 30  # samples in motion that it takes to decide
 _HALF = 0.5  # between stamps that are right (0) and a grid that is (1)
 _SURE = 4.0  # standard errors; neighbours share samples, which these do not count
 
@@ -92,11 +92,11 @@ def is_jitter(stamps: Array, grid: Grid, position: Array) -> bool | None:
     added = stamped - _off(grid.times, position)
     speed = np.abs(position[2:] - position[:-2]) / (grid.times[2:] - grid.times[:-2])[:, None]
     added[~(np.isfinite(added) & (np.nan_to_num(speed) > _MOVING))] = 0.0
-    told = added.any(axis=1)
-    if np.count_nonzero(told) < _ENOUGH:
+    useful = added.any(axis=1)
+    if np.count_nonzero(useful) < _ENOUGH:
         return None
-    product = (np.nan_to_num(stamped) * added)[told].sum(axis=1)
-    square = (added[told] ** 2).sum(axis=1)
+    product = (np.nan_to_num(stamped) * added)[useful].sum(axis=1)
+    square = (added[useful] ** 2).sum(axis=1)
     share = float(product.sum() / square.sum())
     error = float(np.linalg.norm(product - share * square) / square.sum())
     return share > _HALF if abs(share - _HALF) > _SURE * error else None

@@ -1,4 +1,4 @@
-"""Whether recordings hold enough motion, and varied motion, to tell anything."""
+"""Whether recordings hold enough motion, and varied motion, to determine anything."""
 
 from collections.abc import Sequence
 
@@ -51,17 +51,17 @@ def _refuse_little(
 
 
 def _refuse_uniform(names: str, speeds: Array) -> None:
-    """At one speed and heading every friction is a constant: none can be told from another, nor
-    from a motor's values."""
+    """At one speed and heading every friction is a constant: none can be distinguished from
+    another, nor from a motor's values."""
     moving = speeds[np.isfinite(speeds).all(axis=1) & (np.abs(speeds) > _MOVING).any(axis=1)]
     if not len(moving):
-        return  # no sample has all wheels: there is no telling
+        return  # no sample has all wheels: nothing can be decided
     usual = np.median(moving, axis=0)
     off = np.abs(moving - usual).max(axis=1) > _SAME * np.abs(usual).max()
     if np.mean(off) < _VARIED:
-        told = ", ".join(f"{value:.1f}" for value in usual)
+        usual_text = ", ".join(f"{value:.1f}" for value in usual)
         raise InputError(
-            f"{names}: the wheels turn at one speed ({told} rad/s) for "
-            f"{100.0 * (1.0 - np.mean(off)):.0f} % of the motion, which tells no effect from "
-            "another: add drives at other speeds and headings, with starts and stops"
+            f"{names}: the wheels turn at one speed ({usual_text} rad/s) for "
+            f"{100.0 * (1.0 - np.mean(off)):.0f} % of the motion, which distinguishes no effect "
+            "from another: add drives at other speeds and headings, with starts and stops"
         )

@@ -37,7 +37,7 @@ _ENCODERS, _COMMANDS, _GYRO = ENCODER_TOPIC, "cmd_vel", "imu/data"
 _AROUND = 60.0  # s before and after the encoders, in which commands count
 _TOGETHER = 2e-4  # s: samples of several supplies that were taken at once
 _CLOCK_OFF = 5e-3  # by which two clocks may run apart
-_MOST_KINDS = 20  # of complaints that are told apart
+_MOST_KINDS = 20  # of complaints that are distinguished
 _NO_CLOCK = 0.1  # simulated time is no clock that is off
 
 

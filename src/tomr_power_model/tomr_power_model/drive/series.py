@@ -74,7 +74,7 @@ class Series:
         return np.float64(1e-9) * (self._times - start_ns), rows[self._kept]
 
     def fast(self) -> float:
-        """Part by which its clock runs faster than the recorder's; NaN where none can tell."""
+        """Part by which its clock runs faster than the recorder's; NaN where it is not known."""
         arrived = np.frombuffer(self._received, np.int64)[self._kept]
         received, stamped = 1e-9 * (arrived - arrived[0]), 1e-9 * (self._times - self._times[0])
         spread = received - received.mean()
@@ -87,7 +87,7 @@ def _together(stamps: Stamps, place: str) -> NDArray[np.bool_]:
     """Which samples are stamped near the most of them.
 
     Raises:
-        InputError: too many are not, so that nothing tells which are right.
+        InputError: too many are not, so that nothing shows which are right.
     """
     widest = limits().stamp_jump_seconds * NANOSECONDS
     order = np.argsort(stamps, kind="stable")

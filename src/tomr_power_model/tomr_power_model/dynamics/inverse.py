@@ -3,7 +3,7 @@
     tau = K^-T (M nu' + c(nu) + drag - floor) + J omega' + friction
     i = tau / k,  v = R i + k omega,  P = supplied(v i) + driver losses
 
-A wheel at rest may hold any torque up to its dry friction, which motion does not tell: there dry
+A wheel at rest may hold any torque up to its dry friction, which motion does not show: there dry
 friction fades over STICKING_SPEED, unless the voltage that its driver holds is known.
 """
 

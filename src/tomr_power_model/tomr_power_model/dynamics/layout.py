@@ -159,7 +159,7 @@ OUT_HEADER = 2
 ) = range(10)
 OUT_WHEEL = 10
 
-# Motion of the wheels, of which inverse dynamics tells the power: m[FIELD].
+# Motion of the wheels, of which inverse dynamics computes the power: m[FIELD].
 MOTION_YAW = 0  # of a gyro [rad/s]; NaN: as the wheels say
 MOTION_HEADING = 1  # against the start [rad]; NaN: no floor's slope
 MOTION_HEADER = 2

@@ -60,7 +60,7 @@ class HypothesisPrior:
     # Starts of the parameters that shape it; their prior_std is relative to them.
     shapes: Callable[[Scales], Sequence[Mapping[str, float]]] = _no_shape
     sign: int = 1  # of the permitted side of the sizes; 0: both
-    least: Size = lambda scales: 0.0  # size below which sampling cannot tell it from none
+    least: Size = lambda scales: 0.0  # size below which sampling cannot distinguish it from none
     # Effects whose work it does alone: it must bring the evidence of as many.
     stands_for: tuple[str, ...] = ()
     log_prior: float = 0.0  # against the usual effects

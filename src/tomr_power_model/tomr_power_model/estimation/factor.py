@@ -12,8 +12,8 @@ _ROUNDING = 1e-10  # of a squared column, by which sums of many terms may be off
 def posterior_factor(information: Array) -> tuple[Array, bool]:
     """Of I + A^T A, for scipy's `cho_solve`; `information`: A^T A of the data, (p, p).
 
-    Where columns of A are alike and so large that rounding outweighs the prior, they are told apart
-    by as much as rounding may be.
+    Where columns of A are alike and so large that rounding outweighs the prior, they are
+    distinguished by as much as rounding may be.
     """
     matrix = information + np.eye(len(information))
     try:

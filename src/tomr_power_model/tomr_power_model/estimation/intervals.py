@@ -113,7 +113,7 @@ def jackknife_covariance(scores: Array, informed: Array) -> Array:
 
 
 def interval_factor(blocks: int) -> float:
-    """Times the standard deviation that many blocks tell it is half of the 95 % interval."""
+    """Times the standard deviation that many blocks estimate is half of the 95 % interval."""
     return float(student.ppf(0.5 + _LEVEL / 2.0, max(blocks - 1, 1)))
 
 

@@ -153,8 +153,8 @@ class CommandPath:
     def over(self, tick_ns: int, seen: Seen) -> Commanded | None:
         """Means over the window that ends at a tick, or None without a command.
 
-        The simulation starts with the motion that the first command finds, where encoders tell it
-        within a while, else at rest.
+        The simulation starts with the motion that the first command finds, where encoders measure
+        it within a while, else at rest.
         """
         if self.state is None and not self._started(tick_ns, seen):
             return None

@@ -22,7 +22,7 @@ _EVERY = 25  # samples: how often
 LONG_S = 0.2  # of the fit beside a simulation
 _FIT = 5  # samples that it takes
 _PART = 50_000_000  # ns of a window for which a fit stands
-_FREE = 2  # more samples than unknowns, to tell how they scatter
+_FREE = 2  # more samples than unknowns, to show how they scatter
 _MOVING = 1.0  # rad/s of the fastest wheel, likewise
 _LEEWAY = 0.05  # s that a stamp may be late: angles that no motor reaches till then are bad
 _NEW_ZERO = 3  # such angles in a row are those of an encoder that counts from elsewhere
@@ -106,9 +106,9 @@ class RecentStamps:
     def _look_at_steps(self, positions: Array) -> None:
         """Whole counts: what steps differ by is one of them at least."""
         uneven = np.abs(np.diff(positions, n=2, axis=0))
-        told = uneven[uneven > _SAME]
-        if len(told):
-            self.resolution = float(told.min())
+        differing = uneven[uneven > _SAME]
+        if len(differing):
+            self.resolution = float(differing.min())
 
 
 class EncoderWindow:
@@ -320,6 +320,6 @@ def _weights(times: tuple[int, ...], degree: int) -> Array:
     powers = (seconds[:, None] / unit) ** exponents
     try:
         scaled = np.linalg.solve(powers.T @ powers, powers.T)
-    except np.linalg.LinAlgError:  # stamps too close together to tell a speed
+    except np.linalg.LinAlgError:  # stamps too close together to measure a speed
         scaled = np.full((degree + 1, len(times)), np.nan)
     return np.asarray(scaled / unit ** exponents[:, None])

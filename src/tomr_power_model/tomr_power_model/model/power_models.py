@@ -189,7 +189,7 @@ class Physical:
         return [*drawn, *flowing, *work, (sum(power), sum(tilt))]
 
     def measured(self, motion: MeasuredMotion) -> Means:
-        """As inverse dynamics tell, mean over the parts of the tick."""
+        """As inverse dynamics compute, mean over the parts of the tick."""
         sums = tuple([0.0] * WHEELS for _ in range(4))
         share = 1.0 / len(self._instants)
         for instant in self._instants:

@@ -250,10 +250,10 @@ class PowerPredictor:
         ]
 
     def _is_silent(self, tick: int, commanded: Commanded, speed: Sequence[float]) -> bool:
-        """Whether the commands paused lately, so that what the robot was told is not known.
+        """Whether the commands paused lately, so that what the robot was commanded is not known.
 
         Nor is it known for a moment of a robot that was moving already, nobody knows how.
-        After `command_timeout` it was told to stop; that it stands as it should ends the doubt.
+        After `command_timeout` it was commanded to stop; standing as it should ends the doubt.
         Without a timeout commands may come when they change only, and no silence means anything.
         """
         if self._begun is not None and tick - self._begun < _UNSURE:

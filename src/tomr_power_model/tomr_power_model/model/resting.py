@@ -1,7 +1,7 @@
 """The voltages that drivers hold while their wheels are at rest, from what the drivers see.
 
-A wheel at rest may hold any torque up to its dry friction: its motion does not tell. Its driver's
-law does, on the measured speeds:
+A wheel at rest may hold any torque up to its dry friction: its motion does not show it. Its
+driver's law does, on the measured speeds:
 
     v = k_p (asked - omega) + k_i I,   I = integral of (asked - omega) = I_sim + theta_sim - theta
 

@@ -17,7 +17,7 @@ _EMPTY_FOOTER = _RECORD_HEAD.pack(_FOOTER, 20) + bytes(20)
 
 
 def is_unclosed_mcap(path: Path) -> bool:
-    """Tell whether a file begins as mcap and does not end as one."""
+    """Whether a file begins as mcap and does not end as one."""
     try:
         with path.open("rb") as file:
             if file.read(len(MAGIC)) != MAGIC:

@@ -34,7 +34,7 @@ from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.robot import WHEELS, Robot
 
-_MOST_KINDS = 200  # of complaints that are told apart: their words may be a message's
+_MOST_KINDS = 200  # of complaints that are distinguished: their words may be a message's
 Take = Callable[[Any, int], Arrival | str | None]
 
 
@@ -47,13 +47,13 @@ class Input:
     type_name: str
     take: Callable[[Any, int], str | None]
     other_types: tuple[str, ...] = ()
-    # Whether a message of this stamp [ns] is left out, told before the rest of it is read.
+    # Whether a message of this stamp [ns] is left out, decided before the rest of it is read.
     is_too_close: Callable[[int], bool] | None = None
     is_optional: bool = False  # whether a robot may well lack it
 
 
 class Thinning:
-    """Leaves out samples that come more closely than nodes take those of a topic: they tell nothing
+    """Leaves out samples that come more closely than nodes take those of a topic: they add nothing
     more. What `Flow` lets through of a flood is uneven, and recordings know nothing of it."""
 
     def __init__(self, closest_ns: int = 0) -> None:
@@ -196,7 +196,7 @@ def _with_power(
 
 
 def _encoders(wheels: WheelFinder, take: Callable[[int, Triple, Triple], Arrival | str]) -> Take:
-    """Reads the wheels out of joint_states for a stage's `encoders`; tells of missing wheels."""
+    """Reads the wheels out of joint_states for a stage's `encoders`; reports missing wheels."""
 
     def encoders(message: Any, receive_ns: int) -> Arrival | str:
         found = wheels.read(message)

@@ -40,7 +40,7 @@ def terms_of(
 
 
 def _owner(values: Mapping[str, object]) -> list[float]:
-    """What tells one robot from another: mass, its radius and that of the wheels [kg, m, m]."""
+    """What distinguishes robots: mass, their radius and that of the wheels [kg, m, m]."""
     return [float(values[key]) for key in _OWNER]  # type: ignore[arg-type]
 
 

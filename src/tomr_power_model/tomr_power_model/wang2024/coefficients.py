@@ -38,8 +38,8 @@ def _number(
 
 @frozen
 class Coefficients:
-    """Every constant of Eqs 1-17. The paper uses k_1, k_2 and P_stanby twice each: a letter tells
-    them apart (h: Eq. 6, m: Eq. 9, c: Eq. 11). Those that end in `_ours` the paper lacks."""
+    """Every constant of Eqs 1-17. The paper uses k_1, k_2 and P_stanby twice each: a letter
+    distinguishes them (h: Eq. 6, m: 9, c: 11). Those that end in `_ours` the paper lacks."""
 
     # Given by the robot or by the conditions of the fit.
     M: float = _number("Eq. 5", "mass of the robot fitted", "kg", most=1e5)

@@ -80,10 +80,10 @@ def fit_wang2024(robot: Robot, samples: Samples, turning: bool = False) -> Coeff
     if samples.total is None:
         return motors.having(P_sensor=other)
     rest = samples.total - samples.power.sum(axis=1)
-    told = np.isfinite(rest)
-    if not told.any():
+    known = np.isfinite(rest)
+    if not known.any():
         return motors.having(P_sensor=other)
-    return _solve(motors, OTHER_COEFFICIENTS, lambda c: _other(state, c)[told], rest[told])
+    return _solve(motors, OTHER_COEFFICIENTS, lambda c: _other(state, c)[known], rest[known])
 
 
 def _fit_motors(

@@ -40,7 +40,7 @@ class Channel:
 
 
 def channels_of(recorded: Drive, robot: Robot) -> tuple[Channel, ...]:
-    """All channels of a recording that hold enough to tell their noise."""
+    """All channels of a recording that hold enough to determine their noise."""
     found = [*_powers(recorded, robot), *_speeds(recorded, robot)]
     if len(recorded.yaw_time) > 1:
         found.append(_blocks(recorded))

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 _AS_WELL = 0.9  # of what the table explains
 _LISTED = 3
 _COST = 10.0  # log evidence that a parameter must bring
-_NOTHING = 1e-300  # variance of a parameter that the data do not tell
+_NOTHING = 1e-300  # variance of a parameter that the data do not determine
 _NEGLIGIBLE = 1e-6  # of the largest eigenvalue
 _POSITIVE = ("slack", "radius", "decay", "width")
 _THRESHOLD = "threshold"
@@ -124,7 +124,7 @@ def laws_of(table: Table, learnt: LearntTerm, evidence: Evidence) -> list[LawAt]
 
 @frozen
 class _Misfit:
-    """Of values at a table's knots, in standard deviations; of m that the recordings tell."""
+    """Of values at a table's knots, in standard deviations; of m that the recordings determine."""
 
     matrix: Array  # of the values of all rows, (m, c k)
     target: Array  # (m,)

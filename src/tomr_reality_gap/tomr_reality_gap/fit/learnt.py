@@ -30,7 +30,7 @@ _ALL = -1  # wheels at once
 def with_terms(
     simulation: RecordingSimulation, robot: Robot, terms: Sequence[LearntTerm]
 ) -> RecordingSimulation:
-    """The recording, simulated with learnt terms besides; `robot` tells the motion."""
+    """The recording, simulated with learnt terms besides; `robot` determines the motion."""
     for term in terms:
         found = term.actions(motion_in(simulation, robot))
         before = 0.0 if simulation.resisting is None else simulation.resisting

@@ -61,7 +61,7 @@ class Remainder:
 
 
 def _scatter(value: Array, residual: Array, quantum: float) -> float:
-    """Noise of a channel from one sample to the next, and what no simulator tells of it."""
+    """Noise of a channel from one sample to the next, and what no simulator reproduces of it."""
     steps = np.abs(np.diff(residual))
     noise = max(0.5 * robust_scale(steps) ** 2, 0.5 * float(np.mean(steps**2)) / 4.0)
     return float(np.sqrt(max(noise, quantum**2 / 12.0) + (_INEXACT * np.std(value)) ** 2)) + 1e-12

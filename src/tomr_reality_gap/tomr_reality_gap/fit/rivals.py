@@ -1,4 +1,4 @@
-"""What the data can hardly tell from a finding, by calculation: the angle between responses.
+"""What the data can hardly distinguish from a finding, by calculation: the angle between responses.
 
 What a finding shows, d, whitened, is explained as well by other columns B as the angle between d
 and them is small, nuisances N and other findings projected out of both:

@@ -1,7 +1,7 @@
 """How well the values of findings are known: by how leaving out blocks of the data moves them.
 
 Whatever the model lacks is no noise: it is wrong for a whole straight, or a whole drive. What each
-block of the recordings pulls the values towards tells how wrong they may be for it.
+block of the recordings pulls the values towards shows how wrong they may be for it.
 """
 
 import numpy as np

@@ -31,14 +31,14 @@ Array = NDArray[np.float64]
 
 _CLEARLY = 0.005  # of the squares that are left, that other wheels must explain
 _WHEEL_SHARE = 0.1  # of the wheel that shows most
-_TOLD = 0.3  # share of what is left that a term must predict
+_NAMED = 0.3  # share of what is left that a term must predict
 _SMALL = 0.02  # of a channel's standard deviation: less is not worth a word
 _LAGS = 80
 _LAW = 0.8  # of the squares that are left: a law that explains so much is no chance
 _AS_MUCH = 0.95  # of what a wider family predicts
-_ALIKE = 0.02  # shares that tell no more of one family than of another
+_ALIKE = 0.02  # shares that say no more for one family than for another
 _NEAR = 0.35  # of the best share: worth a closer look
-_HINT = 0.1  # share that shows at a glance of what will predict `_TOLD`: no closer look gave less
+_HINT = 0.1  # share that shows at a glance of what will predict `_NAMED`: no closer look gave less
 _EVENT = 0.45  # of what a term of time explains: as much of it, and it is repeatable
 
 
@@ -109,9 +109,9 @@ def unmodelled_effect(
     )
     events = _by_moments(tried, event)
     best = lasting or events
-    if lasting and events and lasting.share < max(_EVENT * events.share, _TOLD):
+    if lasting and events and lasting.share < max(_EVENT * events.share, _NAMED):
         best = events
-    if best is None or (best.share < _TOLD and not is_sure):
+    if best is None or (best.share < _NAMED and not is_sure):
         return None
     if best is not events:
         alike = [item for item in tried if not item.table.family.is_event and item is not best]
@@ -141,9 +141,9 @@ def _most(
 
 
 def _by_moments(tried: Sequence[Tried], event: Tried | None) -> Tried | None:
-    """The best event, or a map that tells more of moments: a drive shows most places but once."""
+    """The best event, or a map that explains more moments: a drive shows most places but once."""
     mapped = max(tried, key=lambda item: item.moments)
-    if mapped.moments < max(event.share if event else 0.0, _TOLD):
+    if mapped.moments < max(event.share if event else 0.0, _NAMED):
         return event
     return evolve(mapped, share=mapped.moments)
 

@@ -42,16 +42,16 @@ def learnt_law(explained: Path, term: str = "", law: str = "") -> LearntLaw:
     robot = robot_from_parameters(values, str(explained))
     chosen = _term(robot, values, term, str(explained))
     report = explained.with_name(_REPORT)
-    told = _laws_told(report, chosen.family)
+    laws = _laws_reported(report, chosen.family)
     family = chosen.family.family_id
-    known = [name for name in told if name in LAWS and family in LAWS[name].families]
+    known = [name for name in laws if name in LAWS and family in LAWS[name].families]
     wanted = law or next(iter(known), "")
     if wanted not in known:
         listed = ", ".join(known) or "none"
         raise InputError(f"{report}: no law {wanted!r} of {family}: it has {listed}")
     found = LAWS[wanted]
     parameters = {
-        name: _estimate(told[wanted].get(name), unit_of(unit, chosen), f"{report}: {wanted}.{name}")
+        name: _estimate(laws[wanted].get(name), unit_of(unit, chosen), f"{report}: {wanted}.{name}")
         for name, unit in found.units.items()
     }
     points = chosen.knots[0]
@@ -71,7 +71,7 @@ def _term(robot: Robot, values: Mapping[str, object], name: str, place: str) -> 
     return robot.unmodelled[names.index(name) if name else 0]
 
 
-def _laws_told(report: Path, family: type[Family]) -> dict[str, Mapping[str, Any]]:
+def _laws_reported(report: Path, family: type[Family]) -> dict[str, Mapping[str, Any]]:
     """Parameters by law, of the report's finding that is of this family."""
     found = load_yaml(read_text(report), str(report))  # JSON is YAML
     try:
@@ -86,9 +86,9 @@ def _laws_told(report: Path, family: type[Family]) -> dict[str, Mapping[str, Any
         raise InputError(f"{report}: is no report of tomr_gap explain: give its folder") from None
 
 
-def _estimate(told: Any, unit: str, place: str) -> Estimate:
+def _estimate(given: Any, unit: str, place: str) -> Estimate:
     try:
-        value, (low, high) = float(told["value"]), told["ci95"]
+        value, (low, high) = float(given["value"]), given["ci95"]
         found = Estimate(value, float(low), float(high), unit)
     except (KeyError, TypeError, ValueError):
         raise InputError(

@@ -34,7 +34,7 @@ examples:
 
 The recording holds cmd_vel, joint_states, <wheel>/power, battery_state, imu/data, odom, and the
 truth on ground_truth/odom and ground_truth/faults. The same mission, robot and seed give the same
-recording. Exit code 0: done; 2: bad input, told in one line.
+recording. Exit code 0: done; 2: bad input, reported in one line.
 """
 
 

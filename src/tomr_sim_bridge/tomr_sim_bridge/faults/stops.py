@@ -1,4 +1,4 @@
-"""The robot does not do what it is told, for a reason that lies with no wheel."""
+"""The robot does not do what it is commanded, for a reason that lies with no wheel."""
 
 from tomr_sim_bridge.faults.base import Fault, FaultActions, register, severity_spec
 
@@ -26,7 +26,7 @@ class CommandsIgnored(Fault):
     """A collision monitor, a multiplexer or a safety stop zeroes the commands.
 
     The drivers brake the robot to a halt and hold it; below severity 1 they drive that much slower
-    than told.
+    than commanded.
     """
 
     fault_id = "commands_ignored"

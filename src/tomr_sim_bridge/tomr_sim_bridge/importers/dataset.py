@@ -123,7 +123,7 @@ def import_files(
 
 
 def index_row(file: SourceFile, run: Run) -> IndexRow:
-    """Describe a run: heading and speed are those told in its first sample."""
+    """Describe a run: heading and speed are those commanded in its first sample."""
     heading = speed = ""
     if run.drive is not None:
         v_x, v_y, _ = (float(value) for value in run.drive.command[0])

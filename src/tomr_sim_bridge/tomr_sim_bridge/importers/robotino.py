@@ -73,7 +73,7 @@ UNITS = {
 class Drive:
     """What only a drive on the floor has."""
 
-    command: Array  # (samples, 3): v_x, v_y [m/s], omega_z [rad/s] told, in base_link
+    command: Array  # (samples, 3): v_x, v_y [m/s], omega_z [rad/s] commanded, in base_link
     pose: Array  # (samples, 3): x, y [m], yaw [rad], unwrapped, in map
     twist: Array  # (samples, 3): v_x, v_y [m/s], omega_z [rad/s] seen, in base_link
 
@@ -85,7 +85,7 @@ class Run:
     stamps_ns: tuple[int, ...]
     position: Array | None  # (samples, 3) wheel angles [rad]; None: not usable
     velocity: Array  # (samples, 3) wheel speeds [rad/s]
-    wheel_command: Array  # (samples, 3) wheel speeds told [rad/s]
+    wheel_command: Array  # (samples, 3) wheel speeds commanded [rad/s]
     current: Array  # (samples, 3) magnitude of the motor currents [A]
     drive: Drive | None  # None: on the bench, wheels in the air
 
@@ -147,8 +147,8 @@ def write_run(run: Run, path: Path, storage: str) -> None:
 
     Topics: `joint_states`, `wheel_<i>/power` (voltage NaN, current the negative magnitude of the
     motor current) and, on the floor, `cmd_vel` and `ground_truth/odom`, on the bench
-    `wheel_command` (JointState, velocities told). A command is repeated at every sample, because
-    every row of the data states the one in force.
+    `wheel_command` (JointState, velocities commanded). A command is repeated at every sample,
+    because every row of the data states the one in force.
     """
     with RecordingWriter(path, storage) as writer:
         for index, stamp_ns in enumerate(run.stamps_ns):

@@ -57,7 +57,7 @@ class BagReplay:
     """Publishes a recording in its own time."""
 
     def __init__(self, node: Node, stopped: Callable[[], bool]) -> None:
-        """Publish through `node`; `stopped` tells when to end early. Raises InputError."""
+        """Publish through `node`; `stopped` returns whether to end early. Raises InputError."""
         self._node = node
         self._log = node.get_logger()
         self._values: dict[str, Any] = dict(declare_specs(node, REPLAY_PARAMETERS))

@@ -22,7 +22,7 @@ from tomr_sim_bridge.plant.samples import Sample
 from tomr_sim_bridge.plant.wheels import Vector, rolling_rows
 
 FAULT_RATE = 20.0  # Hz of ground_truth/faults
-_SLIPPING = "floor_slippery"  # the fault whose truth tells how fast wheels slip
+_SLIPPING = "floor_slippery"  # the fault whose truth states how fast wheels slip
 # Of wheel odometry, as drivers state it: x, y, z [m^2], roll, pitch, yaw [rad^2].
 ODOMETRY_VARIANCES = (1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-2)
 

@@ -32,7 +32,7 @@ class Expected:
 
     motion: Motion
     # Of each tick, (ticks, 3): speeds and accelerations in its middle as `EncoderWindow.beside`
-    # tells them [rad/s, rad/s^2], voltages of the drivers as the power sensors see them [V].
+    # gives them [rad/s, rad/s^2], voltages of the drivers as the power sensors see them [V].
     speed: Array = field(repr=False)
     acceleration: Array = field(repr=False)
     held: Array = field(repr=False)
@@ -101,7 +101,7 @@ def _seen(
 ) -> tuple[Array, Array, Array]:
     """Angle at the end of a tick, and speed and acceleration in its middle, (3,) each.
 
-    As `EncoderWindow.beside` tells them beside a simulated motion, whose speed changes by `change`
+    As `EncoderWindow.beside` gives them beside a simulated motion, whose speed changes by `change`
     [rad/s^2].
     """
     edges = TICK * np.array([tick, tick + 0.5, tick + 1.0])

@@ -78,7 +78,7 @@ def simulate(drive: Drive, bands: BandSettings | None = None) -> LabelledTicks:
 
 
 def _labels(drive: Drive, truth: GroundTruth) -> Labels:
-    """True states, whether they show or not: what cannot be told apart has even odds."""
+    """True states, whether they show or not: what cannot be distinguished has even odds."""
     labels = np.zeros(len(truth.slip), dtype=np.int8)
     labels[truth.slip.max(axis=1) > SLIPPING] = IGNORED
     if drive.bumps:

@@ -77,7 +77,7 @@ def _power(
 
 
 def _misread(drive: Drive, time: Array, voltage: Array, drawn: Array) -> Array:
-    """Currents [A], (k, 4), as faulty sensors tell them."""
+    """Currents [A], (k, 4), as faulty sensors report them."""
     for fault in drive.mission.faults:
         if fault.fault_id in READINGS:
             wheel = wheel_of(fault)

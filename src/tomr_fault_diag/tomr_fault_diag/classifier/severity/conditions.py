@@ -10,10 +10,10 @@ with s a share of every winding's resistance, f friction [N m] and p standby pow
 motor, and m and n a payload's mass and inertia as shares of the robot's, which take as much more of
 the torques that move it and turn it; i - i_e = tau / k where currents are measured. Least squares
 over the last five minutes of driving that were called normal, drawn to 0 by how much each may
-change, with intervals of 95 % by the jackknife. What is told is surer, for it is looked for all the
-time, and windings only beyond what a payload's jerks may feign.
+change, with intervals of 95 % by the jackknife. What is reported is surer, for it is looked for all
+the time, and windings only beyond what a payload's jerks may feign.
 
-It is told and nothing else: no residual is corrected by it, so that it can swallow no fault.
+It is reported and nothing else: no residual is corrected by it, so that it can swallow no fault.
 """
 
 from collections import deque
@@ -47,7 +47,7 @@ _UNKNOWNS = 3 + 2 * WHEELS
 
 # How much each may change: a share of the resistance, of the mass, of the friction; W.
 _CHANGES = (0.5, 0.5, 1.0, 1.0)
-# What is worth telling, in the same units; a share of the nominal voltage.
+# What is worth reporting, in the same units; a share of the nominal voltage.
 _WORTH = (0.1, 0.1, 0.2, 0.5)
 _WORTH_VOLTAGE = 0.05
 _SURE = 1.5  # halves of an interval: eight unknowns are looked at again and again
@@ -77,7 +77,7 @@ class ConditionsWatch:
         self.changes: tuple[Severity, ...] = ()
 
     def take(self, tick: Tick, last: Tick) -> None:
-        """Take a tick of a robot that is called normal, and the one before; at rest none tells."""
+        """Take a tick of a robot that is called normal, and the one before; at rest none counts."""
         rows = _rows(tick, last, self._friction)
         if not len(rows):
             return
@@ -143,7 +143,7 @@ def _rows(tick: Tick, last: Tick, friction: Array) -> Array:
     motors = tick.motors
     rows = np.zeros((WHEELS, 8))
     rows[:, _WHEEL] = np.arange(WHEELS)
-    if motors.tells_currents:
+    if motors.reports_currents:
         rows[:, _GAIN] = 1.0 / motors.constant
         rows[:, _SHOWN] = tick.current - tick.expected_current
     else:
@@ -196,6 +196,6 @@ def _equations(rows: Array, value: Array) -> tuple[Array, Array]:
 def _change(
     quantity: str, unit: str, value: float, half: float, worth: float
 ) -> Iterator[Severity]:
-    """Nothing where it is not worth telling, or not sure."""
+    """Nothing where it is not worth reporting, or not sure."""
     if abs(value) > max(_SURE * half, worth):
         yield Severity(quantity, unit, float(value), float(value - half), float(value + half))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _LEAST = 4  # stretches that an interval needs
-_NOTHING = 1e-9  # of what the stretch that tells most does: one of less tells nothing
+_NOTHING = 1e-9  # of what the stretch that shows most does: one of less shows nothing
 
 
 @frozen
@@ -32,14 +32,14 @@ class Severity:
 
 
 def slope(squares: Array, products: Array) -> tuple[float, float] | None:
-    """Slope of a line through the origin, and half its interval; None where too little tells.
+    """Slope of a line through the origin, and half its interval; None where too little shows it.
 
     Args:
         squares: of the independent quantity, summed over each stretch, (n,).
         products: of it with the dependent one, likewise.
     """
-    told = squares > _NOTHING * squares.max(initial=0.0)
-    x, y = squares[told], products[told]
+    kept = squares > _NOTHING * squares.max(initial=0.0)
+    x, y = squares[kept], products[kept]
     if len(x) < _LEAST:
         return None
     others = (y.sum() - y) / (x.sum() - x)

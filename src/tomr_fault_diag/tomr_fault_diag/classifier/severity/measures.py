@@ -1,4 +1,4 @@
-"""Quantities that tell how bad a fault is: each a change, and what it is a share of.
+"""Quantities that state how bad a fault is: each a change, and what it is a share of.
 
 A measure gives sum x^2 and sum x y of a tick, y being a change and x what it is a share of (1: it
 has a unit of its own), for each wheel or for the robot as a whole.
@@ -36,7 +36,7 @@ _NOTHING: Sums = (np.zeros(1), np.zeros(1))
 
 @frozen
 class Measure:
-    """A quantity that tells how bad some states are."""
+    """A quantity that states how bad some states are."""
 
     quantity: str
     unit: str  # empty: a share
@@ -63,7 +63,7 @@ def _withstood(tick: Tick) -> Sums:
 def _copper(tick: Tick) -> Sums:
     """Losses of a winding beyond those of its current: a share of its resistance."""
     losses = tick.motors.resistance * tick.expected_current**2 * (np.abs(tick.speed) > MOVES)
-    if tick.motors.tells_currents:  # they do not show it
+    if tick.motors.reports_currents:  # they do not show it
         losses = np.zeros_like(losses)
     return losses**2, losses * (tick.power - tick.from_encoders)
 
@@ -75,7 +75,7 @@ def _scale(tick: Tick) -> Sums:
 
 def _drawn(tick: Tick) -> Sums:
     """Power beyond what the commanded motion takes, as a share of what drives the motor."""
-    idle = 0.0 if tick.motors.tells_currents else tick.motors.idle
+    idle = 0.0 if tick.motors.reports_currents else tick.motors.idle
     expected = tick.commanded - idle
     return expected**2, expected * (tick.power - tick.commanded)
 

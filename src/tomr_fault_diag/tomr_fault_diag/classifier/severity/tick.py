@@ -41,8 +41,8 @@ class Motors:
         self.load = wheels[:, at.LOAD]  # N
         self.radius = wheels[:, at.RADIUS]  # m
         self.voltage = robot.supply.nominal_voltage
-        self.tells_currents = robot.measurement.quantity == "motor_current"
-        self.tells_signs = robot.measurement.signed
+        self.reports_currents = robot.measurement.quantity == "motor_current"
+        self.reports_signs = robot.measurement.signed
         body = Body.of(robot)
         self.to_twist = body.to_twist
         self.to_force = np.linalg.pinv(body.from_force)  # wheel torques to the body's force
@@ -115,7 +115,7 @@ class Tick:
         if last is not None and 0 < frame.stamp_ns - last.stamp_ns <= NEXT:
             change = (speed - last.speed) * (NANOSECONDS / (frame.stamp_ns - last.stamp_ns))
         expected = _modelled(speeds)
-        is_supplied = powers[0].unit == "A" and not motors.tells_currents
+        is_supplied = powers[0].unit == "A" and not motors.reports_currents
         scale = motors.voltage if is_supplied else 1.0  # a supply's current without its voltage
         measured = scale * np.array([item.modelled + item.residual for item in powers])
         from_encoders, commanded = scale * _modelled(derived), scale * _modelled(powers)
@@ -124,9 +124,9 @@ class Tick:
         way = np.where(turns < 0.0, -1.0, 1.0)
 
         def current(drawn: Array) -> Array:
-            if not motors.tells_currents:
+            if not motors.reports_currents:
                 return motors.currents(drawn, speed, way)
-            return drawn if motors.tells_signs else way * drawn
+            return drawn if motors.reports_signs else way * drawn
 
         return cls(
             *(frame.stamp_ns, motors, speed, change, expected, measured, from_encoders, commanded),

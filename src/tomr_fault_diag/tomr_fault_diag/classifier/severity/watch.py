@@ -8,7 +8,7 @@ the ticks since the fault was named,
 The interval is of 95 %, by the jackknife over stretches of half a second, which the next one hardly
 knows of; it is wider by the slope that the same robot showed while it was called well, which is
 what its description lacks, or the fault before it was noticed, and by what a description does not
-know: its constants to 5 %, the friction of an axle to a tenth. What includes 0 is not told.
+know: its constants to 5 %, the friction of an axle to a tenth. What includes 0 is not reported.
 """
 
 from collections import deque
@@ -88,7 +88,7 @@ class SeverityWatch:
         return tick
 
     def _look_at_well(self, frame: ResidualFrame) -> None:
-        """Take two ticks in a row now and then: one alone does not tell how speeds change."""
+        """Take two ticks in a row now and then: one alone does not show how speeds change."""
         last = self._last
         tick = self._look(frame)
         if last is None or tick is None or frame.stamp_ns - last.stamp_ns > NEXT:
@@ -99,18 +99,18 @@ class SeverityWatch:
     def _fault_of(
         self, state: State, wheel: int | None
     ) -> tuple[int | None, int | None, str] | None:
-        """What tells one fault from another; what ails a motor may turn out while it lasts."""
+        """What distinguishes faults; what ails a motor may turn out while it lasts."""
         if state not in self._places:
             return None
         return state.paper, wheel, "" if state.paper is not None else state.name
 
     @property
     def conditions(self) -> tuple[Severity, ...]:
-        """What has changed slowly, and is no fault, as far as it can be told."""
+        """What has changed slowly, and is no fault, as far as it can be estimated."""
         return self._conditions.changes
 
     def severity(self, state: State, wheel: int | None) -> Severity | None:
-        """Of what is named, or None where there is nothing to tell yet."""
+        """Of what is named, or None where there is nothing to report yet."""
         if state not in self._places:
             return None
         measure, place = self._places[state]

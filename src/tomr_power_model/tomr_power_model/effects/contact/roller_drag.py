@@ -22,7 +22,7 @@ class RollerDrag(Effect):
 
         coefficient N_i u / sqrt(u^2 + (slip r omega)^2)
 
-    with u the sliding along the axle [m/s] as the wheels tell it; the rest is part of traction.
+    with u the sliding along the axle [m/s] as the wheels show it; the rest is part of traction.
     """
 
     effect_id = "contact.roller_drag"
