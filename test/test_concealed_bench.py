@@ -356,6 +356,27 @@ def test_sureness_about_next_to_nothing_is_counted() -> None:
     assert not score_case(hardly, report(modest)).overconfident
 
 
+@pytest.mark.parametrize(("snr", "plain"), [(24.9, (0, 0)), (25.0, (1, 2)), (None, (0, 0))])
+def test_plain_effects_are_those_of_a_signal_to_noise_of_25(
+    snr: float | None, plain: tuple[int, int]
+) -> None:
+    """Of all samples together; one is named, one is not, and what has no name is counted apart."""
+    oracle = truth(VISCOUS).oracle
+    shares = {"nrmse_before": 0.5, "nrmse_after": oracle}
+    shown = {} if snr is None else {"snr_by_effect": {"e1": snr}}
+    changes = {"oracle": {"real": shown, "real_holdout": {"total": shares}}}
+    unknown = {**VISCOUS, "effect": "unknown", "where": ["body"], "parameters": {}}
+    found = totals(
+        [
+            score_case(truth(VISCOUS, **changes), report(VISCOUS)),
+            score_case(truth(VISCOUS, **changes), None),
+            score_case(truth(unknown, **changes), report(VISCOUS)),
+        ]
+    )
+    assert (found["exact_from_snr_25"], found["class_from_snr_25"]) == (plain, plain)
+    assert found["confident_findings"] == 2
+
+
 def test_totals_close_the_gap_and_hold_against_the_oracle() -> None:
     halfway = finding("friction.viscous", holdout={"nrmse_before": 0.5, "nrmse_after": 0.3})
     there = finding("friction.viscous", holdout={"nrmse_before": 0.5, "nrmse_after": 0.11})

@@ -121,6 +121,7 @@ class TrueEffect:
     size: str  # of its recipe, or empty
     snr: float | None  # per power sample
     nature: str = ""  # of one without a name
+    strength: float | None = None  # signal to noise of all its samples together
 
 
 @frozen
@@ -154,7 +155,8 @@ def truth_of(document: Mapping[str, Any]) -> Truth:
     """A truth from its JSON; the practice set's or ours."""
     oracle = document["oracle"]
     holdout = oracle["real_holdout"].get("wheels") or oracle["real_holdout"]["total"]
-    per_sample = oracle.get("real", {}).get("snr_per_sample", {})
+    real = oracle.get("real", {})
+    per_sample, whole = real.get("snr_per_sample", {}), real.get("snr_by_effect", {})
     effects = tuple(
         TrueEffect(
             effect=item["effect"],
@@ -163,6 +165,7 @@ def truth_of(document: Mapping[str, Any]) -> Truth:
             size=str(item.get("size", "")),
             snr=per_sample.get(item.get("id")),
             nature=str(item.get("nature", "")),
+            strength=whole.get(item.get("id")),
         )
         for item in document["effects"]
     )

@@ -30,6 +30,7 @@ NULL = "(null)"
 MATCH, MISMATCH = "match", "mismatch"
 ORACLE_AIM = 1.2
 _SURE = 0.8
+_PLAIN = 25.0  # signal to noise, of all samples together, from which an effect has to be found
 
 
 @frozen
@@ -44,6 +45,7 @@ class Hit:
     alike: bool  # class
     called: str  # the name that it was given
     comparisons: tuple[Comparison, ...]
+    is_plain: bool = False  # named effects whose whole signal to noise is `_PLAIN`
 
 
 @frozen
@@ -99,6 +101,7 @@ def _hit(true: TrueEffect, truth: Truth, findings: Sequence[Finding]) -> Hit:
         alike=alike,
         called=_called(true, truth, findings),
         comparisons=comparisons,
+        is_plain=true.effect != UNKNOWN and (true.strength or 0.0) >= _PLAIN,
     )
 
 
@@ -165,6 +168,7 @@ def totals(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     real = [item for item in outcomes if not item.truth.null]
     nulls = [item for item in outcomes if item.truth.null]
     hits = [hit for item in outcomes for hit in item.hits]
+    plain = [hit for hit in hits if hit.is_plain]
     unknown = [item for item in real if any(hit.effect == UNKNOWN for hit in item.hits)]
     compared = [comparison for hit in hits for comparison in hit.comparisons]
     covered = [item.covered for item in compared if item.covered is not None]
@@ -176,6 +180,8 @@ def totals(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "exact": _share(hits, lambda hit: hit.exact),
         "named_anywhere": _share(hits, lambda hit: hit.named),
         "class": _share(hits, lambda hit: hit.alike),
+        "exact_from_snr_25": _share(plain, lambda hit: hit.exact),
+        "class_from_snr_25": _share(plain, lambda hit: hit.alike),
         "all_exact": _share(real, lambda item: all(hit.exact for hit in item.hits)),
         "verdict_right": _share(outcomes, lambda item: item.verdict_right),
         "null_right": _share(nulls, lambda item: item.verdict_right and not item.false),
@@ -183,6 +189,7 @@ def totals(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "false_on_others": sum(len(item.false) for item in real),
         "unknown_recognised": _share(unknown, lambda item: any(h.exact for h in item.hits)),
         "unknown_misnamed": _share(unknown, lambda item: bool(item.false)),
+        "confident_findings": sum(len(o.report.confident) for o in outcomes if o.report),
         "overconfident": sum(len(item.overconfident) for item in outcomes),
         "place": _mean([item.place for item in real if item.place is not None]),
         "parameter_error_median": _median([item.error for item in compared]),
