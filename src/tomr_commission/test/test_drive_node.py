@@ -21,6 +21,7 @@ from tomr_commission.nodes.drive_node import DriveNode, DriveRequest, _follow
 from tomr_power_model.cli import EXIT_BAD_INPUT, EXIT_INTERRUPTED
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.errors import InputError
+from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import shipped_robot
 
 ROBOT = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")
@@ -51,6 +52,7 @@ def bridge(spawn: Callable, request: pytest.FixtureRequest) -> Callable:
     return spawn(["sim_bridge", "--ros-args", "--params-file", str(ROBOT), *pairs])
 
 
+@pytest.mark.parametrize("bridge", [["measurement.motor_voltage:=true"]], indirect=True)
 def test_it_drives_and_records(bridge: object, spawn: Callable, command: list[str]) -> None:
     drive = spawn(command)
     assert drive.popen.wait(40.0) == 0, drive.output
@@ -64,6 +66,8 @@ def test_it_drives_and_records(bridge: object, spawn: Callable, command: list[st
     assert first == pytest.approx(0.09)  # slowly
     assert not seen.command[-5:].any()  # commanded to stand
     assert len(seen.command_time) > 100
+    with open_recording(Path(command[5])) as recording:
+        assert {"/imu/data", "/odom", "/motor_voltage"} <= {*recording.topics}
 
 
 def test_it_stops_when_the_driver_dies(
