@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 _RIVAL = 5.0  # log odds within which data do not separate two explanations
 _UNMODELLED_COST = 60.0  # log evidence that an effect without a name must bring
-_WIDE = 1.96
+HALF_WIDTH = 1.96  # standard deviations of half a 95 % interval
 _MUCH = 0.3  # of the mismatch left: what was named is not the whole story
 _GROSS = 10.0  # times the noise: no match, even if nothing is named; slow noise reaches 1
 _SURE = 0.97
@@ -50,7 +50,7 @@ def estimate_of(
     The simulator is not exact either: a part of the offset from the description is never known, nor
     all of what the user's simulation shows of it (`baseline`).
     """
-    half = _WIDE * math.hypot(sigma, SIMULATOR.parameter * offset, 0.5 * baseline)
+    half = HALF_WIDTH * math.hypot(sigma, SIMULATOR.parameter * offset, 0.5 * baseline)
     if unit == "rad":
         value = math.remainder(value, 2.0 * math.pi)
     return Estimate(value, max(value - half, bounds[0]), min(value + half, bounds[1]), unit)

@@ -21,10 +21,9 @@ from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.refine import refine
 from tomr_reality_gap.fit.uncertainty import own_sigma
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
+from tomr_reality_gap.rules import HALF_WIDTH
 
 Array = NDArray[np.float64]
-
-_HALF = 1.96  # standard deviations of half a 95 % interval
 
 
 def significant(dataset: Dataset, found: Selection, tick: Tick = lambda done: None) -> Selection:
@@ -78,7 +77,7 @@ def distances(model: Model, sigma: Array) -> list[float]:
     besides = {key: offset for parameter, offset in nuisances for key in parameter.keys}
     found, at = [], 0
     for hypothesis, offsets in zip(model.hypotheses, model.offsets, strict=True):
-        widths = _HALF * sigma[at : (at := at + len(offsets))]
+        widths = HALF_WIDTH * sigma[at : (at := at + len(offsets))]
         away = [
             abs(_beyond_nothing(model, hypothesis, item, besides) + offset) / max(width, 1e-300)
             for item, offset, width in zip(hypothesis.parameters, offsets, widths, strict=True)

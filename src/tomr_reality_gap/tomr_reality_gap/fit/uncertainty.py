@@ -18,10 +18,9 @@ from tomr_power_model.estimation.statistics import autocorrelation_time
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection
 from tomr_reality_gap.fit.jacobian import Jacobian
+from tomr_reality_gap.rules import HALF_WIDTH
 
 Array = NDArray[np.float64]
-
-_NORMAL = 1.96
 
 
 def own_sigma(dataset: Dataset, found: Selection, jacobian: Jacobian) -> Array:
@@ -37,7 +36,7 @@ def own_sigma(dataset: Dataset, found: Selection, jacobian: Jacobian) -> Array:
     scores = np.stack([columns[row].T @ residual[row] for row in rows])
     informed = np.stack([columns[row].T @ columns[row] for row in rows])
     deviation = np.sqrt(np.diag(jackknife_covariance(scores, informed)))
-    deviation *= interval_factor(len(rows)) / _NORMAL
+    deviation *= interval_factor(len(rows)) / HALF_WIDTH
     own = best.model.own
     return np.maximum(best.own_sigma, deviation[len(deviation) - len(own) :] * prior_stds(own))
 
