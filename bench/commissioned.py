@@ -140,7 +140,7 @@ def scored(task: tuple[int, int, str | None, Path]) -> Outcome:
         chosen, bumps=bumps(believed, random, int(random.integers(0, 4)), chosen.length)
     )
     labelled = simulated_drive(chosen)
-    named = named_by(kind, rebanded(labelled.frames, kind.bands))
+    named = named_by(kind, rebanded(labelled.frames, kind.bands), believed)
     if fault is None:
         return score_healthy(labelled, named)
     rows = labelled.first - 1 + np.arange(len(labelled.frames))

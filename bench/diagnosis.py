@@ -40,14 +40,13 @@ from diagnosis_report import NAMES, Codes, Onset, Outcome, publish, report
 from stages import as_arrays
 from tqdm import tqdm
 
-from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.classifier.states import FAULTLESS, NORMAL, SLIP, State
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
 from tomr_power_model.cli import run_main
-from tomr_power_model.robot import shipped_robot
+from tomr_power_model.robot import Robot, shipped_robot
 from tomr_training.drives import Drive, random_drive, severity_of, wheel_of
 from tomr_training.labels import LASTING, SLIPPING, Flags, GroundTruth, Noise, deviates, lasting
 from tomr_training.planar.faults import class_of
@@ -114,9 +113,9 @@ def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[Resid
     ]
 
 
-def named_by(kind: Kind, frames: Sequence[ResidualFrame]) -> Codes:
+def named_by(kind: Kind, frames: Sequence[ResidualFrame], robot: Robot) -> Codes:
     """State that stands at each tick (n,), as the paper calls it; what names no fault is normal."""
-    classifier = FaultClassifier(make_judge(kind.settings))
+    classifier = FaultClassifier.of(kind.settings, robot)
     state, named = NORMAL, []
     for frame in frames:
         diagnosis = classifier.classify(frame)
@@ -263,7 +262,7 @@ def scored(
     drive, labelled, twin = seen(seed, kind, folder, resolution)
     outcomes = {}
     for name, classifier in kinds().items():
-        named = named_by(classifier, rebanded(labelled.frames, classifier.bands))
+        named = named_by(classifier, rebanded(labelled.frames, classifier.bands), drive.believed)
         outcomes[name] = (
             score_healthy(labelled, named)
             if twin is None

@@ -28,7 +28,6 @@ from attrs import evolve, frozen
 from diagnosis_report import publish
 from tqdm import tqdm
 
-from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.diagnosis.labels import Label, simulated
@@ -183,9 +182,9 @@ def pushed_drive(seed: int) -> Drive:
     return evolve(drive, mission=evolve(drive.mission, faults=tuple(pushes)))
 
 
-def said_of(labelled: LabelledDrive) -> Track:
+def said_of(drive: Drive, labelled: LabelledDrive) -> Track:
     """What the classifier as shipped says of each tick."""
-    classifier, tracker = FaultClassifier(make_judge(ClassifierSettings())), Tracker(False)
+    classifier, tracker = FaultClassifier.of(ClassifierSettings(), drive.believed), Tracker(False)
     for frame in labelled.frames:
         diagnosis = classifier.classify(frame)
         if diagnosis is not None:
@@ -229,7 +228,7 @@ def score_fault(seed: int, name: str) -> Seen | None:
     label = _label(drive, name, size)
     # The onset is when it first shows: what comes before, nobody could detect.
     label = evolve(label, onset=observable[0][0] - 4 * _PERIOD, observable=observable)
-    return seen(said_of(labelled), START_NS, [label], (0, 1))
+    return seen(said_of(drive, labelled), START_NS, [label], (0, 1))
 
 
 def _label(drive: Drive, name: str, size: float) -> Label:
@@ -244,8 +243,8 @@ def _label(drive: Drive, name: str, size: float) -> Label:
 
 def score_healthy(seed: int) -> Seen:
     """A healthy drive with pushes: whatever is named is an alarm."""
-    labelled = simulated_drive(pushed_drive(seed))
-    return seen(said_of(labelled), START_NS, [], (0, 1))
+    drive = pushed_drive(seed)
+    return seen(said_of(drive, simulated_drive(drive)), START_NS, [], (0, 1))
 
 
 def _work(task: tuple[int, str]) -> Seen | None:

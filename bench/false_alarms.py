@@ -18,7 +18,6 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 from tqdm import tqdm
 
-from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.classifier.states import FAULTLESS
@@ -37,9 +36,10 @@ _UNITS: list[Unit] = ["rad/s" if channel in SPEEDS else "W" for channel in range
 
 def alarms(seed: int) -> tuple[list[str], int, int]:
     """Faults named in a drive, those where a wheel did slip, and ticks."""
-    drive = simulate(random_drive(shipped_robot("reference"), seed, None))
+    drawn = random_drive(shipped_robot("reference"), seed, None)
+    drive, robot = simulate(drawn), drawn.believed
     values = np.stack([*drive.compared.residuals(BandSettings()), drive.compared.modelled])
-    classifier = FaultClassifier(make_judge(ClassifierSettings()))
+    classifier = FaultClassifier.of(ClassifierSettings(), robot)
     found: list[str] = []
     slipped = 0
     for tick, rows in enumerate(values.transpose(1, 2, 0).tolist()):

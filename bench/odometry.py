@@ -40,19 +40,18 @@ from tqdm import tqdm
 from tomr_odometry.cli import main as tomr_odometry
 from tomr_odometry.creep import Creep
 from tomr_odometry.estimator import SlipOdometry
-from tomr_odometry.kernel import STICKING, Body
 from tomr_odometry.learn.cli import learnt_text
 from tomr_odometry.learn.drives import Leg, read_legs
 from tomr_odometry.learn.fit import Batch, fit_creep
 from tomr_odometry.offline import estimates
 from tomr_odometry.reference import reference_of, wheel_path
 from tomr_odometry.settings import OdometrySettings
-from tomr_odometry.start import body_of
 from tomr_odometry.summary import end_error, estimated_path
 from tomr_power_model.cli import run_main
 from tomr_power_model.messages.types import ODOMETRY
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import GRAVITY, Robot, load_robot
+from tomr_power_model.slides.body import STICKING, ContactBody, body_of
 from tomr_power_model.topics.inputs import Complaints
 from tomr_sim_bridge.cli.import_robotino import import_robotino
 
@@ -230,7 +229,9 @@ def _is_within(spells: Sequence[Sequence[float]], times: Array) -> NDArray[np.bo
     return within
 
 
-def _advanced(body: Body, twist: Array, force: Array, pull: Array, drag: float, dt: float) -> Array:
+def _advanced(
+    body: ContactBody, twist: Array, force: Array, pull: Array, drag: float, dt: float
+) -> Array:
     """Twist after dt by the forces of the contacts [N] and the pull of a slope [N]."""
     along = np.tanh(body.along @ twist / STICKING) * body.load
     wrench = body.rows.T @ force + pull - drag * (body.along.T @ along)
@@ -238,7 +239,9 @@ def _advanced(body: Body, twist: Array, force: Array, pull: Array, drag: float, 
     return np.asarray(twist + dt * (np.linalg.solve(body.inertia, wrench) + turning))
 
 
-def _floor(floor: Mapping[str, float], yaw: float, body: Body, robot: Robot) -> tuple[Array, float]:
+def _floor(
+    floor: Mapping[str, float], yaw: float, body: ContactBody, robot: Robot
+) -> tuple[Array, float]:
     """Pull of a slope on the body [N], and the rollers' drag."""
     fall = body.mass * GRAVITY * np.sin(floor.get("slope", 0.0))
     heading = floor.get("azimuth", 0.0) - yaw

@@ -24,9 +24,8 @@ from faults.recordings import Recordings
 from stages import pipeline_of, steps_of
 from tqdm import tqdm
 
-from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.settings import ClassifierSettings
-from tomr_fault_diag.classifier.severity import Severity, SeverityWatch
+from tomr_fault_diag.classifier.severity import Severity
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import (
     BURDENED,
@@ -93,8 +92,7 @@ def _true_size(name: str, settings: Mapping[str, object]) -> float:
 def _simulated(task: tuple[int, str]) -> Case:
     seed, name = task
     drive, _ = faulty_drive(seed, name)
-    judge = make_judge(ClassifierSettings())
-    classifier = FaultClassifier(judge, SeverityWatch(drive.believed))
+    classifier = FaultClassifier.of(ClassifierSettings(), drive.believed)
     found = (classifier.classify(frame) for frame in simulated_drive(drive).frames)
     said = _last((item for item in found if item is not None), _STATES[name])
     return Case(name, _true_size(name, drive.mission.faults[0].settings), said)

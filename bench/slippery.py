@@ -30,11 +30,11 @@ from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.offline import estimates
 from tomr_odometry.reference import reference_of
 from tomr_odometry.settings import OdometrySettings
-from tomr_odometry.start import body_of
 from tomr_odometry.summary import end_error, estimated_path
 from tomr_power_model.cli import run_main
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import GRAVITY, Robot, load_robot
+from tomr_power_model.slides.body import body_of
 from tomr_power_model.topics.inputs import Complaints
 from tomr_sim_bridge.faults import check_settings
 from tomr_sim_bridge.faults.floor_slippery import SLIPPERIEST

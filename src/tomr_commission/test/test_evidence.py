@@ -18,23 +18,25 @@ from tomr_commission.observed import Observed, frames_of
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.frame import GAP
 from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_power_model.robot import shipped_robot
 
+ROBOT = shipped_robot("reference")
 SETTINGS = ClassifierSettings()
 COMMISSIONED = evolve(SETTINGS, caution=20.0)
 
 
 def test_healthy_driving_has_no_evidence_and_no_alarm(healthy: Observed) -> None:
     frames = frames_of(healthy, BandSettings())
-    assert evidence_in(frames, SETTINGS).max() < SETTINGS.caution
-    assert decisions(frames, SETTINGS).alarms == ()
+    assert evidence_in(frames, SETTINGS, ROBOT).max() < SETTINGS.caution
+    assert decisions(frames, SETTINGS, ROBOT).alarms == ()
 
 
 def test_alarm_comes_where_evidence_passes_the_caution(faulty: Observed) -> None:
     frames = frames_of(faulty, BandSettings())
-    evidence = evidence_in(frames, SETTINGS)
+    evidence = evidence_in(frames, SETTINGS, ROBOT)
     assert evidence.max() >= MOST_CAUTION
     for caution in (4.0, 8.0, 11.0, 20.0):
-        alarms = decisions(frames, evolve(SETTINGS, caution=caution)).alarms
+        alarms = decisions(frames, evolve(SETTINGS, caution=caution), ROBOT).alarms
         first = faulty.seconds[np.argmax(evidence >= caution + SURE)]
         assert abs(alarms[0].begin - first) <= 0.1001
         assert alarms[0].state == "motor system fault 3"
@@ -46,9 +48,9 @@ def test_evidence_of_a_fault_that_is_rarer_than_others(
     healthy: Observed, kind: InjectedKind
 ) -> None:
     frames = frames_of(injected(healthy, kind, kind.sizes[0], 1), BandSettings())
-    evidence = evidence_in(frames, SETTINGS)
+    evidence = evidence_in(frames, SETTINGS, ROBOT)
     for caution in (8.0, 11.0, 20.0, 27.0):
-        alarms = decisions(frames, evolve(SETTINGS, caution=caution)).alarms
+        alarms = decisions(frames, evolve(SETTINGS, caution=caution), ROBOT).alarms
         first = healthy.seconds[np.argmax(evidence >= caution + SURE)]
         assert alarms[0].state == "power sensor fault 2"
         assert abs(alarms[0].begin - first) <= 0.0501
@@ -59,7 +61,7 @@ def test_clock_that_jumps_in_a_fault_does_not_lose_it(faulty: Observed, jump: in
     stamps = faulty.stamp_ns + np.where(faulty.seconds > 11.0, jump * 1_000_000_000, 0)
     jumped = evolve(faulty, stamp_ns=stamps)
     frames = frames_of(jumped, BandSettings())
-    alarms = decisions(frames, COMMISSIONED).alarms
+    alarms = decisions(frames, COMMISSIONED, ROBOT).alarms
     assert {alarm.state for alarm in alarms} == {"motor system fault 3"}
     # Of the three seconds that are left of the fault.
     assert any(alarm.end - jump > 12.5 for alarm in alarms if abs(alarm.end) > 3000.0)
@@ -67,7 +69,7 @@ def test_clock_that_jumps_in_a_fault_does_not_lose_it(faulty: Observed, jump: in
 
 def test_diagnosis_restarted_in_a_fault_names_it(faulty: Observed) -> None:
     rest = faulty.without([(0.0, 10.0)])
-    alarms = decisions(frames_of(rest, BandSettings()), COMMISSIONED).alarms
+    alarms = decisions(frames_of(rest, BandSettings()), COMMISSIONED, ROBOT).alarms
     assert [alarm.state for alarm in alarms] == ["motor system fault 3"]
     assert alarms[0].begin < 2.0
 
@@ -77,13 +79,13 @@ def test_ticks_without_data_in_a_fault_are_no_evidence(faulty: Observed) -> None
     residual, missing = faulty.residual.copy(), faulty.missing.astype("<U32")
     residual[lost], missing[lost] = np.nan, GAP
     gappy = evolve(faulty, residual=residual, missing=missing)
-    evidence = evidence_in(frames_of(gappy, BandSettings()), SETTINGS)
+    evidence = evidence_in(frames_of(gappy, BandSettings()), SETTINGS, ROBOT)
     assert evidence[lost].max() == 0.0
     assert evidence[faulty.seconds < 11.0].max() > 0.0
 
 
 def test_evidence_before_the_fault_is_none(faulty: Observed) -> None:
-    evidence = evidence_in(frames_of(faulty, BandSettings()), SETTINGS)
+    evidence = evidence_in(frames_of(faulty, BandSettings()), SETTINGS, ROBOT)
     assert evidence[faulty.seconds < 7.5].max() < SETTINGS.caution
 
 

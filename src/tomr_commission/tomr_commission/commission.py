@@ -23,7 +23,7 @@ from tomr_commission.explained import EXPLAINED, FOLDER, Split, explain_drives
 from tomr_commission.injected import kinds_for, try_injected
 from tomr_commission.observed import Observed, frames_of, observe, reports_currents, unit_of_motors
 from tomr_commission.parallel import on_all_cores
-from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse
+from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse, robot_of
 from tomr_commission.request import CommissionRequest
 from tomr_commission.simulated import try_simulated
 from tomr_commission.store import Store, digest, fingerprint
@@ -41,6 +41,7 @@ from tomr_power_model.effects.user import named_files
 from tomr_power_model.errors import InputError
 from tomr_power_model.files.write import make_folder, write_together
 from tomr_power_model.robot import (
+    Robot,
     load_robot,
     read_description,
     read_node_sections,
@@ -115,12 +116,13 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     tuned = work.tuned(described, fitted, classifier, plan)
     bands, level = tuned.bands, tuned.level
     chosen = evolve(classifier, caution=level.caution)
+    robot = robot_of(str(work.source(described)))
     progress("validating", 0.85)
     held_said, fitted_said = (
-        tuple(decisions(frames_of(drive, bands), chosen) for drive in part)
+        tuple(decisions(frames_of(drive, bands), chosen, robot) for drive in part)
         for part in (held, fitted)
     )
-    trials = try_injected(longest, bands, chosen, kinds_for(longest))
+    trials = try_injected(longest, bands, chosen, kinds_for(longest), robot)
     notes = [note for drive in work.drives for note in drive.notes]
     if reports_currents(longest):
         notes.append(_CURRENTS)
@@ -257,11 +259,12 @@ class _Work:
     ) -> Tuned:
         """The narrowest bands with which false alarms can be as rare as wanted."""
         choice, share = self.request.bands, 0.55
+        robot = robot_of(str(self.source(described)))
         first = evolve(plan, shoves=plan.first)
         while True:
             self.progress("simulating healthy hours", share)
             bands = bands_of(fitted, choice)
-            evidence = _real_peaks(fitted, bands, settings, self.request.alarm.block)
+            evidence = _real_peaks(fitted, bands, settings, robot, self.request.alarm.block)
             wider = choice.wider * choice.margin
             # A few shoves show where many are not worth while.
             for asked, most in (
@@ -341,11 +344,15 @@ class _Real:
 
 
 def _real_peaks(
-    fitted: Sequence[Observed], bands: BandSettings, settings: ClassifierSettings, block: float
+    fitted: Sequence[Observed],
+    bands: BandSettings,
+    settings: ClassifierSettings,
+    robot: Robot,
+    block: float,
 ) -> _Real:
     peaks: list[float] = []
     for drive in fitted:
-        evidence = evidence_in(frames_of(drive, bands), settings)
+        evidence = evidence_in(frames_of(drive, bands), settings, robot)
         peaks += block_peaks(evidence, drive.seconds, block)
     return _Real(tuple(peaks), sum(drive.hours for drive in fitted))
 

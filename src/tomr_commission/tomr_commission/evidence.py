@@ -5,6 +5,7 @@ decades of `caution` a tick would have overcome. It is read off the classifier i
 most caution there is, so that it follows whatever the classifier becomes.
 """
 
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -14,11 +15,13 @@ from numpy.typing import NDArray
 from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
+from tomr_fault_diag.classifier.slides import SlideWatch
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import FAULTLESS
 from tomr_fault_diag.classifier.window_network import WindowNetwork
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_power_model.model.ticks import NANOSECONDS
+from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -35,16 +38,20 @@ class _Witness(WindowJudge):
         )
         self.newest = 0.0
 
-    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
-        opinion = super().judge(frame, elapsed_ns, unseen)
+    def judge(
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = math.nan
+    ) -> Opinion:
+        opinion = super().judge(frame, elapsed_ns, unseen, slides)
         self.newest = self.evidence()
         return opinion
 
 
-def evidence_in(frames: Iterable[ResidualFrame], settings: ClassifierSettings) -> Array:
+def evidence_in(
+    frames: Iterable[ResidualFrame], settings: ClassifierSettings, robot: Robot
+) -> Array:
     """Decades of evidence for a fault at each tick, 0 where nothing could be decided, (n,)."""
     witness = _Witness(settings)
-    classifier = FaultClassifier(witness)
+    classifier = FaultClassifier(witness, slides=SlideWatch(robot))
     found = []
     for frame in frames:
         witness.newest = 0.0
@@ -81,9 +88,9 @@ def together(said: Sequence[Decided]) -> Decided:
     )
 
 
-def decisions(frames: list[ResidualFrame], settings: ClassifierSettings) -> Decided:
-    """Diagnose frames with a classifier of given settings."""
-    classifier = FaultClassifier(make_judge(settings))
+def decisions(frames: list[ResidualFrame], settings: ClassifierSettings, robot: Robot) -> Decided:
+    """Diagnose frames of a described robot with a classifier of given settings."""
+    classifier = FaultClassifier(make_judge(settings), slides=SlideWatch(robot))
     alarms: list[Episode] = []
     current: Diagnosis | None = None
     undecided = 0

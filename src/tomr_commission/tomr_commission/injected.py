@@ -17,6 +17,7 @@ from tomr_commission.trials import Trial, first_alarm, smallest_found
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, TOTAL
 from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -98,6 +99,7 @@ def try_injected(
     bands: BandSettings,
     settings: ClassifierSettings,
     kinds: Sequence[InjectedKind],
+    robot: Robot,
 ) -> list[Trial]:
     """Each kind at each wheel, down to the smallest size that is found."""
     shown = drive.part(slice(0, _SHOWN), drive.name)
@@ -105,7 +107,7 @@ def try_injected(
     def attempt(kind: InjectedKind, wheel: int, size: float) -> Trial:
         frames = frames_of(injected(shown, kind, size, wheel), bands)
         begin = float(shown.seconds[min(_HEALTHY, len(frames) - 1)])
-        found = first_alarm(decisions(frames, settings).alarms, begin)
+        found = first_alarm(decisions(frames, settings, robot).alarms, begin)
         delay = None if found is None else found.begin - begin
         name = "" if found is None else found.state
         return Trial(kind.name, size, kind.unit, wheel, delay, name)

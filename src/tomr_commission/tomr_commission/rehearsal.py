@@ -98,9 +98,10 @@ def _one(
 ) -> tuple[list[float], int]:
     """Peaks of a drive's shoves, and its ticks."""
     described, bands, settings, usage, plan, seed = job
-    drive = shoved_drive(robot_of(described), usage, plan, seed)
+    robot = robot_of(described)
+    drive = shoved_drive(robot, usage, plan, seed)
     seen = observed_of(drive).silenced(plan.silent)
-    evidence = evidence_in(frames_of(seen, bands), settings)
+    evidence = evidence_in(frames_of(seen, bands), settings, robot)
     peaks = []
     for bump in drive.bumps:
         first = math.floor(bump.start * 1e9 / TICK_NS)

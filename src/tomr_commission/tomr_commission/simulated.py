@@ -110,7 +110,7 @@ def _tried(job: _Job) -> list[Trial]:
             raise InputError(
                 f"the recordings hold {unit} of the motors, the simulator {unit_of_motors(seen)}"
             )
-        said = decisions(frames_of(seen, bands), settings)
+        said = decisions(frames_of(seen, bands), settings, robot_of(robot))
         begin = _ONSET - (int(seen.stamp_ns[0]) - START_NS) / NANOSECONDS
         found = first_alarm(said.alarms, begin)
         delay = None if found is None else found.begin - begin

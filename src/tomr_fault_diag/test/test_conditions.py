@@ -7,9 +7,10 @@ import pytest
 from attrs import evolve
 
 from tomr_fault_diag.classifier.messages import diagnosis_message
+from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.severity import Severity, SeverityWatch
 from tomr_fault_diag.classifier.severity.conditions import ConditionsWatch, _rows
-from tomr_fault_diag.classifier.severity.tick import Motors, Tick
+from tomr_fault_diag.classifier.severity.tick import Tick
 from tomr_fault_diag.classifier.stage import Diagnosis
 from tomr_fault_diag.classifier.states import DRAGGING, NORMAL, PUSHED, STATES, State
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame, Unit

@@ -283,7 +283,9 @@ class Fixed:
 
     def interrupt(self) -> None: ...
 
-    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+    def judge(
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = 0.0
+    ) -> Opinion:
         return Opinion(np.eye(6)[MOTOR + self.wheel], sure=True, wheel=self.wheel)
 
 
@@ -327,7 +329,9 @@ class Leading(Fixed):
         super().__init__(**settings)
         self.state, self.sure = state, sure
 
-    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+    def judge(
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = 0.0
+    ) -> Opinion:
         return Opinion(np.eye(6)[NORMAL], self.sure, state=self.state)
 
 
@@ -401,7 +405,9 @@ class OfWheel(Leading):
 
     wheel = 0
 
-    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+    def judge(
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = 0.0
+    ) -> Opinion:
         return evolve(super().judge(frame, elapsed_ns, unseen), wheel=self.wheel)
 
 

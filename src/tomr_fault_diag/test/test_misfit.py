@@ -52,7 +52,9 @@ class Sure:
     def interrupt(self) -> None:
         pass
 
-    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+    def judge(
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = 0.0
+    ) -> Opinion:
         return Opinion(np.eye(6)[self.state], sure=True)
 
 
@@ -243,7 +245,9 @@ def test_other_faults_are_named_beside_a_low_supply_and_leave_it_behind() -> Non
 
 def test_a_fault_that_is_not_sure_is_not_named_beside_a_low_supply() -> None:
     class Unsure(Sure):
-        def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+        def judge(
+            self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = 0.0
+        ) -> Opinion:
             return evolve(super().judge(frame, elapsed_ns, unseen), sure=False)
 
     classifier = FaultClassifier(Unsure(CONTROL))

@@ -9,12 +9,13 @@ from attrs import evolve
 
 from tomr_fault_diag.classifier.judges import Opinion
 from tomr_fault_diag.classifier.messages import diagnosis_message
+from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.severity import SeverityWatch
 from tomr_fault_diag.classifier.severity.interval import jackknife_half, slope, student
 from tomr_fault_diag.classifier.severity.measures import MEASURES
-from tomr_fault_diag.classifier.severity.tick import Motors, Tick
+from tomr_fault_diag.classifier.severity.tick import Tick
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import (
     BURDENED,
@@ -431,5 +432,7 @@ class Dragging:
     def interrupt(self) -> None:
         pass
 
-    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+    def judge(
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = 0.0
+    ) -> Opinion:
         return Opinion(np.eye(6)[MOTOR + 1], sure=True, wheel=1, state=DRAGGING[1])

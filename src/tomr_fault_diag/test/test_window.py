@@ -32,6 +32,7 @@ from tomr_fault_diag.classifier.features import (
     CHANNELS,
     INPUTS,
     WINDOW,
+    band_ratios,
     by_wheel,
     channels,
     channels_of,
@@ -767,3 +768,36 @@ def test_channels_of_a_frame_are_those_of_arrays() -> None:
     found = channels_of(ResidualFrame(BASE, residuals))
     expected = channels(values[:, 0], np.abs(values[:, 1]), values[:, 2])
     np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_ratios_to_bands_are_those_of_the_frame() -> None:
+    item = frame(0, ALL, (0.1, -0.3, 0.02), (1.0, -6.0, 0.5), (0.2, 0.0, math.nan))
+    want = [item.residuals[0], *item.residuals[1:4], *item.residuals[7:10], *item.residuals[4:7]]
+    ratios = np.nan_to_num([one.residual / one.band for one in want])
+    ways = np.array([1.0] * 7 + [1.0, -1.0, 1.0])  # speeds as the wheels turn
+    assert band_ratios(channels_of(item)) == pytest.approx(ratios * ways)
+
+
+def _says(hypothesis: int, newest: float) -> np.ndarray:
+    """What a network that sees 10 nats for a hypothesis says, the motors of the newest tick so many
+    bands off."""
+    network = WindowNetwork.load()
+    seen = np.full(HYPOTHESES, -3.0)
+    seen[[0, hypothesis]] = 0.0, 10.0
+    stub = evolve(network, prior=np.ones(HYPOTHESES))
+    window = np.zeros((WINDOW, CHANNELS))
+    window[-1, 2] = np.arcsinh(3.0 * newest)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(WindowNetwork, "scores_of", lambda *_: seen)
+        return stub.log_likelihoods(window)
+
+
+def test_a_window_says_no_more_than_its_newest_tick_allows() -> None:
+    # One motor a third of a band off: (3.3 / 3)^2 / 2 = 0.605 nats, and all in proportion.
+    said = _says(2, 1.0 / 3.0)
+    assert said[2] == pytest.approx(0.605)
+    assert said[0] == 0.0
+    assert said[5] == pytest.approx(-0.1815)
+    assert _says(2, 0.0)[2] == 0.0
+    assert _says(2, 2.0)[2] == pytest.approx(10.0)  # 21.8 would be allowed
+    assert _says(14, 0.0)[14] == pytest.approx(10.0)  # a power sensor is slightly off, for long

@@ -12,8 +12,8 @@ from odometry_drives import ROBOT, START, Recorded, contained, drive, ice, off, 
 
 from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.settings import OdometrySettings
-from tomr_odometry.start import body_of
 from tomr_odometry.topics import estimate_messages
+from tomr_power_model.slides.body import body_of
 
 ICE = (3.0, 6.0)  # s
 

@@ -13,9 +13,9 @@ from tomr_odometry.creep import Creep
 from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.kernel import CREEP
 from tomr_odometry.settings import OdometrySettings
-from tomr_odometry.start import body_of
 from tomr_odometry.traction import Traction
 from tomr_odometry.unaided import Unaided
+from tomr_power_model.slides.body import body_of
 
 SETTINGS = OdometrySettings(creep=Creep((0.5, 1.0, 1.5), 0.0, 0.05))
 

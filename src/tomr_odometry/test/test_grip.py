@@ -10,9 +10,9 @@ from tomr_odometry import grip
 from tomr_odometry.estimate import Estimate
 from tomr_odometry.grip import SIDE, UNKNOWN, Available, Floor
 from tomr_odometry.settings import OdometrySettings
-from tomr_odometry.start import body_of
 from tomr_odometry.topics import FLOOR_TOPIC, STATUS_TOPIC, estimate_messages
 from tomr_power_model.messages.bag import to_bag
+from tomr_power_model.slides.body import body_of
 
 NO, YES = np.zeros(3, dtype=bool), np.ones(3, dtype=bool)
 STD = np.full(3, 0.5)

@@ -21,8 +21,8 @@ from tomr_odometry.kernel import (
     motion_rows,
     predict,
 )
-from tomr_odometry.start import body_of
 from tomr_power_model.robot import shipped_robot
+from tomr_power_model.slides.body import body_of
 
 Array = NDArray[np.float64]
 BODY, NOISE = body_of(shipped_robot("reference"))[0], Noise()

@@ -12,11 +12,11 @@ from tomr_odometry.learn import drives
 from tomr_odometry.learn.drives import Leg, leg_of, read_legs
 from tomr_odometry.learn.fit import Batch, fit_creep
 from tomr_odometry.reference import Path2D, reference_of
-from tomr_odometry.start import body_of
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.bag import bag_header, bag_message
 from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import shipped_robot
+from tomr_power_model.slides.body import body_of
 
 BAG = Path(__file__).parents[3] / "bags" / "square"
 BODY = body_of(shipped_robot("robotino_v2"))[0]

@@ -5,13 +5,13 @@ import math
 import pytest
 from attrs import evolve
 
-from tomr_odometry.start import body_of
 from tomr_odometry.traction import Tractions
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.binding import plain
 from tomr_power_model.dynamics.numbers import laid_out
 from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.robot import Robot, shipped_robot
+from tomr_power_model.slides.body import body_of
 
 ROBOT = shipped_robot("reference")
 WHEELS = 3

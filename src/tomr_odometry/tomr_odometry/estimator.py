@@ -13,7 +13,7 @@ from tomr_odometry.grip import Available, Floor
 from tomr_odometry.kernel import AX, CREEP, DRAG, FRICTION, GYRO, RIM, SLOPE, VX, WZ, YAW, step
 from tomr_odometry.rims import Rims
 from tomr_odometry.settings import OdometrySettings
-from tomr_odometry.start import body_of, is_incredible, start, start_again
+from tomr_odometry.start import is_incredible, start, start_again
 from tomr_odometry.traction import Traction, Tractions
 from tomr_odometry.unaided import FEWEST_POWERS, Unaided
 from tomr_power_model.drive.sources import PowerReading
@@ -21,6 +21,7 @@ from tomr_power_model.model.encoder_flaws import EncoderFlaws
 from tomr_power_model.model.encoders import RecentStamps
 from tomr_power_model.model.ticks import Arrival, TickClock, to_ns
 from tomr_power_model.robot import GRAVITY, WHEELS, Robot
+from tomr_power_model.slides.body import body_of
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]

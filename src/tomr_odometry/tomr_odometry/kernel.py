@@ -17,13 +17,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_power_model.slides.body import STICKING, ContactBody
+
 Array = NDArray[np.float64]
 
 X, Y, YAW, VX, VY, WZ, AX, AY, AW = range(9)
 RIM, ACCELEROMETER, GYRO, SLOPE, FRICTION, DRAG, CREEP = 9, 12, 14, 15, 17, 20, 21
 SIZE = 22
 FORCE_WHEEL, FORCE, FORCE_VARIANCE, FORCE_SPEED = range(4)  # columns of measured tractions
-STICKING = 0.01  # m/s, sliding below which the rollers' drag fades
 RESTING = 0.3  # rad/s, below which dry friction does
 TAILS = 2.0  # of the encoders' variance, where sliding is looked for
 
@@ -67,19 +68,9 @@ class Noise(NamedTuple):
     rim: float = 3e-5  # m, of a rim besides the quantum
 
 
-class Body(NamedTuple):
-    """The robot's numbers that the filter needs."""
-
-    rows: Array  # rim speed per twist [-, -, m], (3, 3)
-    to_twist: Array  # its inverse
-    along: Array  # sliding along the axles per twist, (3, 3)
-    load: Array  # N, (3,)
-    inertia: Array  # (3, 3)
-    mass: float  # kg
-    center: Array  # of the mass [m], (2,)
-
-
-def predict(x: Array, P: Array, b: Body, n: Noise, mode: Array, used: Array, dt: float) -> Array:
+def predict(
+    x: Array, P: Array, b: ContactBody, n: Noise, mode: Array, used: Array, dt: float
+) -> Array:
     """Go on by dt [s]; returns the covariance.
 
     mode: probabilities that the wheels slide, and whether one did a moment ago (1 to 0), (4,).
@@ -216,7 +207,7 @@ def motion_rows(x: Array, n: Noise, rims: Array, inertial: Array) -> tuple[Array
     return h[:m], innovation[:m], variance[:m]
 
 
-def force_rows(x: Array, b: Body, forces: Array) -> tuple[Array, Array, Array]:
+def force_rows(x: Array, b: ContactBody, forces: Array) -> tuple[Array, Array, Array]:
     """Rows of tractions: wheel, force [N], variance, speed of the wheel [rad/s], (m, 4)."""
     count = len(forces)
     h, innovation, variance = np.zeros((count, SIZE)), np.zeros(count), np.zeros(count)
@@ -246,7 +237,7 @@ def force_rows(x: Array, b: Body, forces: Array) -> tuple[Array, Array, Array]:
 
 
 def step(
-    x: Array, P: Array, b: Body, n: Noise, mode: Array, used: Array, dt: float,
+    x: Array, P: Array, b: ContactBody, n: Noise, mode: Array, used: Array, dt: float,
     rims: Array, inertial: Array, forces: Array,
 ) -> Array:  # fmt: skip
     """From one encoder sample to the next; `x` and `mode` go on in place; the covariance."""

@@ -7,12 +7,12 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_odometry.start import body_of
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.intake import MALFORMED, WheelFinder, stamp_of
 from tomr_power_model.messages.types import ODOMETRY, TF
 from tomr_power_model.recordings import Recording, require_topic
 from tomr_power_model.robot import Robot
+from tomr_power_model.slides.body import body_of
 
 Array = NDArray[np.float64]
 POSES = (ODOMETRY, "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped")

@@ -18,34 +18,13 @@ from tomr_odometry.kernel import (
     VX,
     WZ,
     Array,
-    Body,
     Noise,
     X,
     Y,
 )
-from tomr_power_model.dynamics import layout as at
-from tomr_power_model.dynamics.numbers import laid_out, wheel_records
-from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.robot import WHEELS, Robot
 
 _INCREDIBLE = 2.5  # standard deviations of a bias
-
-
-def body_of(robot: Robot) -> tuple[Body, Array]:
-    """Numbers of the filter from those of the dynamics, and the wheels' radii [m]."""
-    p = laid_out(vehicle_of(robot))
-    wheel = wheel_records(p)
-    rows = wheel[:, at.ROLL : at.ROLL + 3] * wheel[:, at.RADIUS, None]
-    body = Body(
-        rows=rows,
-        to_twist=np.asarray(np.linalg.inv(rows), dtype=np.float64),
-        along=wheel[:, at.ALONG : at.ALONG + 3].copy(),
-        load=wheel[:, at.LOAD].copy(),
-        inertia=p[at.INERTIA : at.INERTIA + 9].reshape(3, 3).copy(),
-        mass=float(p[at.MASS]),
-        center=p[[at.CENTER_X, at.CENTER_Y]],
-    )
-    return body, wheel[:, at.RADIUS].copy()
 
 
 def start(robot: Robot, n: Noise, creep: Creep) -> tuple[Array, Array]:

@@ -21,9 +21,10 @@ from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.model.encoder_flaws import EncoderFlaws
 from tomr_power_model.model.encoders import WheelEstimate
 from tomr_power_model.robot import WHEELS, Robot
+from tomr_power_model.slides.particles import Pair
+from tomr_power_model.slides.roughness import Roughness
 
 Triple = tuple[float, float, float]
-Pair = tuple[tuple[float, float], tuple[float, float]]
 _SPAN_NS = 60_000_000  # of the encoder samples that show speed and acceleration
 _FEWEST = 8  # samples
 _RESTING = 0.3  # rad/s
@@ -32,7 +33,6 @@ _FOLLOW = 0.05  # of what is missing, by which a driver's sum of errors follows 
 _MOVING = 1.0  # rad/s
 _LAW_VOLTS, _LAW_SHARE = 0.15, 0.03  # V and of it: how exactly a driver's law gives its voltage
 _ROLLING_NEWTONS = 10.0  # of a contact's force that rolling would take, where the wheel may slide
-_ROUGH_SHARE, _ROUGHEST = 0.04, 60.0  # of a new sample in the mean; N
 _POWER_SHARE = 0.01  # of a measured power
 _LEAST_SLOPE = 2.0  # W/A
 _SURE = 1e-3  # odds of the other current below which the measurement is taken at its word
@@ -53,26 +53,6 @@ class Traction:
         """Of the two forces the one that is nearer to another [N], and its deviation."""
         first, second = zip(*self.either, strict=True)
         return min(first, second, key=lambda one: abs(one[0] - force))
-
-
-class Roughness:
-    """Variance of what changes from sample to sample [N^2]: a driver that sees coarse counts shakes
-    its motor."""
-
-    def __init__(self) -> None:
-        self._seen: deque[tuple[float, ...]] = deque(maxlen=3)
-        self._variance = 0.0
-
-    def take(self, *forces: float) -> float:
-        """The variance with another sample; of several forces, one of which is the contact's, that
-        of the smoothest."""
-        self._seen.append(forces)
-        if len(self._seen) == self._seen.maxlen:
-            samples = zip(*self._seen, strict=True)
-            change = min(abs(older - 2.0 * before + new) for older, before, new in samples)
-            new_one = min(change, _ROUGHEST) ** 2 / 6.0
-            self._variance += _ROUGH_SHARE * (new_one - self._variance)
-        return self._variance
 
 
 class Tractions:

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomr_odometry.estimate import SLIDES
-from tomr_odometry.kernel import Body
-from tomr_odometry.particles import Particles
 from tomr_odometry.traction import Traction
 from tomr_power_model.robot import WHEELS, Robot
+from tomr_power_model.slides.body import ContactBody
+from tomr_power_model.slides.particles import Particles
 
 Array = NDArray[np.float64]
 FEWEST_POWERS = 2  # motors whose power has to be known
@@ -16,7 +16,7 @@ FEWEST_POWERS = 2  # motors whose power has to be known
 class Unaided:
     """The ways that contacts slid, for a filter that takes its wheels for gripping."""
 
-    def __init__(self, robot: Robot, body: Body, radius: Array) -> None:
+    def __init__(self, robot: Robot, body: ContactBody, radius: Array) -> None:
         self._body = body
         friction = np.array(robot.everywhere("friction.coulomb", "torque")) / radius
         drag = robot.everywhere("contact.roller_drag", "coefficient")[0]
@@ -42,7 +42,7 @@ class Unaided:
             self._particles.start(twist)
             self.is_at_work = True
         for reading in readings:
-            self._particles.take(reading)
+            self._particles.take(reading.wheel, reading.either)
         if self._particles.step(dt, rims):
             found = self._particles.slides(rims)
             slides = found.any_probability > SLIDES

@@ -36,6 +36,7 @@ _SPEED = 0.5  # rad/s
 _TOTALS = 2  # channels that belong to no wheel
 _SIGNED = slice(11, CHANNELS)
 _EXPECTED = slice(14, 17)
+_RATIOS = [0, *range(2, 8), *range(11, 14)]  # total, motors, encoders, speeds
 _MOTORS, _SPEEDS, _ENCODERS = list(MOTORS), list(SPEEDS), list(ENCODERS)
 
 
@@ -113,6 +114,11 @@ def _balance(frame: ResidualFrame) -> float:
 def _finite(ratio: float) -> float:
     """As the network sees a ratio to a band; what is unknown, or beyond all, is "as modelled"."""
     return math.asinh(ratio) if math.isfinite(ratio) else 0.0
+
+
+def band_ratios(tick: Array) -> Array:
+    """Residuals over their bands (10,) of a tick (20,), 0 where unknown."""
+    return np.asarray(np.sinh(tick[_RATIOS]) / _FINE)
 
 
 def by_wheel(window: NDArray[Real]) -> NDArray[Real]:

@@ -76,7 +76,8 @@ _SLIP_MARGIN = 4.0  # that slip need be less striking: a short one shows in few 
 # it would say it again and again.
 _CREEPING = (DRAGS, WEAKS, METERS)
 _SLIGHT = 1.0
-# What a gyro says for slip in a tick: so much for each band beyond the first, so much at most.
+# What a gyro says for slip in a tick: so much for each band beyond the first, so much at most, as
+# forces do.
 _PER_BAND, _MOST_SAID = 8.0, 10.0
 _HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
 _OF_A_WHEEL = (*_HIDDEN, METERS)
@@ -114,8 +115,11 @@ class Judge(Protocol):
         """What comes next does not join up with what was seen."""
         ...
 
-    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
-        """Look at the newest frame, so long after the one before, and what it cannot show."""
+    def judge(
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = math.nan
+    ) -> Opinion:
+        """Look at the newest frame, so long after the one before, what it cannot show, and how
+        likely a wheel slides as the forces of contacts have it (NaN: not known)."""
         ...
 
 
@@ -150,7 +154,9 @@ class WindowJudge:
         """Say nothing new until the window holds no other than joined frames."""
         self._slot, self._lacking = None, WINDOW
 
-    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+    def judge(
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = math.nan
+    ) -> Opinion:
         """Look at the newest frame."""
         if elapsed_ns > _TOO_LONG:
             self.interrupt()
@@ -158,16 +164,14 @@ class WindowJudge:
         count = 1 if self._slot is None else slot - self._slot
         self._slot = slot
         for _ in range(count):
-            self._opinion = self._step(
-                channels_of(frame), unseen, _astray(frame), _said_by_gyro(frame)
-            )
+            self._opinion = self._step(frame, unseen, _said_by_gyro(frame), slides)
         return self._opinion
 
-    def _step(self, seen: Array, unseen: Unseen, astray: list[int], gyro: Array) -> Opinion:
-        """Opinion after one more tick of the network; `astray`: wheels that turn otherwise,
-        `gyro`: what one says of the network's hypotheses besides."""
+    def _step(self, frame: ResidualFrame, unseen: Unseen, gyro: Array, slides: float) -> Opinion:
+        """Opinion after one more tick of the network; `gyro`: what one says of the network's
+        hypotheses besides."""
         self._window[:-1] = self._window[1:]
-        self._window[-1] = seen
+        self._window[-1] = channels_of(frame)
         self._lacking = max(self._lacking - 1, 0)
         if self._lacking:
             return self._opinion
@@ -181,6 +185,7 @@ class WindowJudge:
             likelihoods[faults] = np.maximum(likelihoods[faults], likelihoods[NORMAL])
         for moved in unseen.moved:  # no fault turns a wheel that stands: somebody pushes
             likelihoods[[kind.start + moved for kind in _HIDDEN]] = likelihoods[NORMAL]
+        astray = _astray(frame)  # wheels that turn otherwise
         meters = [METERS.start + number for number in astray]
         # No power sensor makes a wheel turn otherwise.
         likelihoods[meters] = np.minimum(likelihoods[meters], likelihoods[NORMAL])
@@ -191,7 +196,10 @@ class WindowJudge:
             over = likelihoods[kind] - likelihoods[NORMAL]
             plain = np.sign(over) * np.maximum(np.abs(over) - _SLIGHT, 0.0)
             likelihoods[kind] = likelihoods[NORMAL] + plain
-        likelihoods = of_states(likelihoods + gyro)
+        likelihoods += gyro
+        if slides > 0.5 and not astray:
+            likelihoods[SLIP] += _MOST_SAID * (2.0 * slides - 1.0)
+        likelihoods = of_states(likelihoods)
         shares = self._belief.update(likelihoods)
         striking = _ratios(likelihoods)
         striking[ENCODERS] -= gyro[ENCODERS]  # a gyro alone accuses no encoder
@@ -314,7 +322,9 @@ class CodeJudge:
         """What leads has to lead anew."""
         self._smoothed, self._led = None, 0
 
-    def judge(self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen) -> Opinion:
+    def judge(
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = math.nan
+    ) -> Opinion:
         """Look at the newest frame."""
         now = self._answer(frame.codes)
         if self._smoothed is None or not elapsed_ns:

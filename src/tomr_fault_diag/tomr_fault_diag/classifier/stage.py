@@ -1,12 +1,16 @@
 """The classifier stage: residual frames in, diagnoses out at 1 Hz and at once on a change."""
 
+from typing import Self
+
 from attrs import evolve, field, frozen
 
-from tomr_fault_diag.classifier.judges import Judge, Opinion
+from tomr_fault_diag.classifier.judges import Judge, Opinion, make_judge
 from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
 from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.severity import Severity, SeverityWatch
+from tomr_fault_diag.classifier.slides import UNKNOWN as SLIDES_UNKNOWN
+from tomr_fault_diag.classifier.slides import SlideWatch
 from tomr_fault_diag.classifier.states import (
     BURDENED,
     DISOBEYS,
@@ -25,6 +29,7 @@ from tomr_fault_diag.classifier.states import (
 )
 from tomr_fault_diag.classifier.sufficiency import Sufficiency, SufficiencyWatch
 from tomr_fault_diag.residuals.frame import GAP, MOTORS, NO_COMMAND, ResidualFrame
+from tomr_power_model.robot import Robot
 
 
 @frozen
@@ -61,14 +66,26 @@ class FaultClassifier:
     Where data are missing nothing is concluded.
     """
 
-    def __init__(self, judge: Judge, severity: SeverityWatch | None = None) -> None:
-        """Without `severity` it is not stated how bad a fault is, nor what has changed slowly."""
+    def __init__(
+        self,
+        judge: Judge,
+        severity: SeverityWatch | None = None,
+        slides: SlideWatch | None = None,
+    ) -> None:
+        """Without `severity` it is not stated how bad a fault is, nor what has changed slowly;
+        without `slides` residuals alone show a slip."""
         self._judge = judge
         self._severity = severity
+        self._slides = slides
         self._motion = MotionWatch()
         self._misfits = MisfitWatch()
         self._data = SufficiencyWatch()
         self.clear()
+
+    @classmethod
+    def of(cls, settings: ClassifierSettings, robot: Robot) -> Self:
+        """With all that a described robot allows; raises InputError for weights that do not fit."""
+        return cls(make_judge(settings), SeverityWatch(robot), SlideWatch(robot))
 
     @property
     def settings(self) -> ClassifierSettings:
@@ -87,6 +104,8 @@ class FaultClassifier:
         self._data.clear()
         if self._severity is not None:
             self._severity.clear()
+        if self._slides is not None:
+            self._slides.clear()
         self._stamp = 0
         self._opinion: Opinion | None = None
         self._unseen = Unseen()
@@ -154,6 +173,7 @@ class FaultClassifier:
         """Look at a frame, if there is something in it, and name a state."""
         data = self._data.take(frame)
         self._unseen = evolve(self._motion.take(frame), blind=data.blind)
+        slides = SLIDES_UNKNOWN if self._slides is None else self._slides.take(frame)
         misfit, self._usable = self._misfits.take(frame, self.settings.low_supply), data.usable
         if not data.usable:
             self._pause(frame, data)
@@ -168,7 +188,7 @@ class FaultClassifier:
             self._candidate = DISOBEYS
             self._enter(DISOBEYS, frame.stamp_ns, None)
             return
-        self._opinion = self._judge.judge(frame, elapsed, self._unseen)
+        self._opinion = self._judge.judge(frame, elapsed, self._unseen, slides)
         if data.enough or self._state not in _QUIET:
             self._weigh(self._opinion, misfit, frame.stamp_ns)
         else:

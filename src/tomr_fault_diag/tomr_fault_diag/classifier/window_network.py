@@ -17,14 +17,18 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_fault_diag.classifier.belief import HYPOTHESES
-from tomr_fault_diag.classifier.features import INPUTS, by_wheel
+from tomr_fault_diag.classifier.belief import CONTROLS, ENCODERS, EXTERNAL, HYPOTHESES, OTHER
+from tomr_fault_diag.classifier.features import INPUTS, band_ratios, by_wheel
+from tomr_fault_diag.classifier.states import NORMAL, SLIP
 from tomr_fault_diag.classifier.stored import Shapes, Stored
+from tomr_fault_diag.residuals.frame import BAND_SIGMAS
 
 Array = NDArray[np.float64]
 
 COMMON = 4  # outputs of a view that are no single wheel's
 VIEWS = 9  # outputs of one view
+# Not so what shows slightly and for long: an axle that drags, a weak motor, a wrong power sensor.
+_SHOWN = [SLIP, *range(CONTROLS.start, ENCODERS.stop), EXTERNAL, OTHER]
 _NAMES = ("weight_1", "bias_1", "weight_2", "bias_2", "weight_3", "bias_3", "prior")
 
 
@@ -78,8 +82,21 @@ class WindowNetwork:
         return self.scores(by_wheel(windows))
 
     def log_likelihoods(self, window: Array) -> Array:
-        """Log-likelihoods (19,), up to a constant, of a window (WINDOW, 20)."""
-        return np.asarray(self.scores_of(window) - self._log_prior)
+        """Log-likelihoods (19,) of a window (WINDOW, 20), over that of a robot that is well.
+
+        Where something leads that shows while it lasts, they say at most what the newest tick
+        allows: the best of all hypotheses over noise alone, sum (r / sigma)^2 / 2. Else a wheel
+        that catches up after a shove, within a fraction of its band, goes on to look like a lost
+        signal: the network knows how residuals of faults come about, not how small they are.
+        """
+        found = np.asarray(self.scores_of(window) - self._log_prior)
+        with np.errstate(over="ignore"):
+            most = 0.5 * BAND_SIGMAS**2 * float(np.square(band_ratios(window[-1])).sum())
+        over = np.asarray(found - found[NORMAL])
+        leading = int(np.argmax(over))
+        if leading in _SHOWN and over[leading] > most:
+            over *= most / over[leading]
+        return over
 
     @cached_property
     def _log_prior(self) -> Array:

@@ -10,9 +10,7 @@ from typing import Any
 from attrs import frozen
 
 from tomr_fault_diag.classifier.commissioned import commissioned_words
-from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message, silence_message
-from tomr_fault_diag.classifier.severity import SeverityWatch
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import ResidualFrame
@@ -64,7 +62,7 @@ class Pipeline:
         compiled = has_numba() if is_compiled is None else is_compiled
         self._predictor = PowerPredictor(robot, settings.model, is_compiled=compiled)
         self._residuals = ResidualStage(robot, settings.residuals)
-        self._classifier = FaultClassifier(make_judge(settings.classifier), SeverityWatch(robot))
+        self._classifier = FaultClassifier.of(settings.classifier, robot)
         self._commissioned = commissioned_words(settings.classifier, robot)
         wheels = WheelFinder(robot.wheel_names)
         self.inputs: tuple[Input, ...] = (

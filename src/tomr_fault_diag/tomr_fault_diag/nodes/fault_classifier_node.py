@@ -7,10 +7,8 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from tomr_fault_diag.classifier.commissioned import commissioned_words
-from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.messages import TOPIC, diagnosis_message, silence_message
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
-from tomr_fault_diag.classifier.severity import SeverityWatch
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
 from tomr_fault_diag.residuals.messages import frame_of
@@ -39,8 +37,8 @@ class FaultClassifierNode(StageNode):
 
     def __init__(self) -> None:
         super().__init__("fault_classifier", CLASSIFIER_PARAMETERS)
-        judge = make_judge(ClassifierSettings.of(self.values))
-        self.classifier = FaultClassifier(judge, SeverityWatch(self._robot))
+        settings = ClassifierSettings.of(self.values)
+        self.classifier = FaultClassifier.of(settings, self._robot)
         self._commissioned = commissioned_words(self.classifier.settings, self._robot)
         self.offer(TOPIC, DiagnosticMessage)
         self.listen([Input(RESIDUALS, DIAGNOSTICS, guarded(self._take))], self._advance, STAGE_QOS)

@@ -19,6 +19,8 @@ INPUT_ORDERS: Mapping[str, tuple[int, ...]] = {
     "powers_first": (TOTAL, *MOTORS, *ENCODERS, *SPEEDS),
 }
 
+BAND_SIGMAS = 3.3  # standard deviations of the noise that a band holds: 99.9 %
+
 YAW = "residuals: yaw rate against the gyro"
 
 # Why a residual is unknown: until the first command, and on robots without power of single motors.

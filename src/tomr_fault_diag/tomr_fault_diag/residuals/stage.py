@@ -7,6 +7,7 @@ from typing import Self
 from attrs import evolve, frozen
 
 from tomr_fault_diag.residuals.frame import (
+    BAND_SIGMAS,
     FROZEN,
     GAP,
     MOTORS,
@@ -60,7 +61,6 @@ _TRANSIENT = to_ns(0.15)
 _FEWEST = 2  # ticks, of slow decisions
 
 _UNSURE = 1.0  # bands: a speed is not known whose standard deviation is larger
-_NOISE = 3.3  # standard deviations of a speed that its band holds: 99.9 %
 _TURNS = 0.3  # rad/s: a slower wheel may rest
 
 _UNKNOWN_READINGS = (UNKNOWN_READING, UNKNOWN_READING, UNKNOWN_READING)
@@ -337,7 +337,7 @@ class ResidualStage:
             unsure = unsure or noise > _UNSURE * band
             missing = _missing(NAN if disorder else value, model, reason, absent)
             residual = NAN if disorder else rounded(sign * (value - model))
-            band = rounded(max(band, _NOISE * noise))
+            band = rounded(max(band, BAND_SIGMAS * noise))
             speeds.append(Residual(residual, band, rounded(model), "rad/s", missing))
         if unsure:  # all wheels are read at once: where one cannot be measured, no other is better
             speeds = [evolve(one, residual=NAN, missing=one.missing or SCATTER) for one in speeds]

@@ -13,11 +13,11 @@ from tqdm import tqdm
 from tomr_odometry.creep import Creep
 from tomr_odometry.learn.drives import Leg, read_legs
 from tomr_odometry.learn.fit import Batch, fit_creep
-from tomr_odometry.start import body_of
 from tomr_power_model.cli import EXIT_OK
 from tomr_power_model.errors import InputError
 from tomr_power_model.files import make_folder, write_together
 from tomr_power_model.robot import load_robot, read_node_sections, shipped_robots
+from tomr_power_model.slides.body import body_of
 
 ROBOT_FILE, REPORT_FILE, NODE = "robot_learnt.yaml", "learnt.json", "slip_odometry"
 _EPILOG = """\

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tomr_odometry.creep import Creep
-from tomr_odometry.kernel import Body
 from tomr_odometry.learn.drives import Leg
+from tomr_power_model.slides.body import ContactBody
 
 Array = NDArray[np.float64]
 _NOISE = 0.03  # of the way: what a leg's end is off besides
@@ -26,7 +26,7 @@ _ROUNDS = 12  # of the fixed point for the speed of travel
 class Batch:
     """Legs of equal length, the shorter ones filled up with rest."""
 
-    def __init__(self, legs: Sequence[Leg], body: Body) -> None:
+    def __init__(self, legs: Sequence[Leg], body: ContactBody) -> None:
         longest = max(len(leg.steps) for leg in legs)
         self.steps, self.used = np.zeros((2, len(legs), longest, 3))
         for place, leg in enumerate(legs):
@@ -78,7 +78,7 @@ def _one(given: Array) -> Array:
     return np.array([given[0], given[0], given[0], 0.0])
 
 
-def fit_creep(floors: Mapping[str, Sequence[Leg]], body: Body) -> Creep:
+def fit_creep(floors: Mapping[str, Sequence[Leg]], body: ContactBody) -> Creep:
     """The creep of one floor in its details, or what several have in common."""
     batches = [Batch(legs, body) for legs in floors.values()]
     if len(batches) == 1:

@@ -23,8 +23,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.severity.interval import Severity, jackknife_half
-from tomr_fault_diag.classifier.severity.tick import MOVES, Motors, Tick
+from tomr_fault_diag.classifier.severity.tick import MOVES, Tick
 from tomr_power_model.robot import WHEELS
 
 Array = NDArray[np.float64]

@@ -11,7 +11,8 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_fault_diag.classifier.severity.tick import MOVES, Motors, Tick
+from tomr_fault_diag.classifier.motors import Motors
+from tomr_fault_diag.classifier.severity.tick import MOVES, Tick
 from tomr_fault_diag.classifier.states import (
     BURDENED,
     CONTROL,

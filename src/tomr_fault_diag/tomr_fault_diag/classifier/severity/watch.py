@@ -17,10 +17,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.severity.conditions import ConditionsWatch
 from tomr_fault_diag.classifier.severity.interval import Severity, slope
 from tomr_fault_diag.classifier.severity.measures import MEASURES, Measure
-from tomr_fault_diag.classifier.severity.tick import NEXT, Motors, Tick
+from tomr_fault_diag.classifier.severity.tick import NEXT, Tick
 from tomr_fault_diag.classifier.states import NORMAL, STATES, State
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_power_model.model.ticks import to_ns

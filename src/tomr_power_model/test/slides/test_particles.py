@@ -6,14 +6,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from odometry_drives import ROBOT
 
-from tomr_odometry.particles import Particles, ParticleSettings, Slides
-from tomr_odometry.start import body_of
-from tomr_odometry.traction import Traction
+from tomr_power_model.robot import shipped_robot
+from tomr_power_model.slides.body import body_of
+from tomr_power_model.slides.particles import Pair, Particles, ParticleSettings, Slides
 
 Array = NDArray[np.float64]
-BODY, _ = body_of(ROBOT)
+BODY, _ = body_of(shipped_robot("reference"))
 FRICTION = np.full(3, 1.0)  # N
 STEP = 0.02  # s
 SHARE = 0.12  # traction coefficient of the slippery floor
@@ -21,11 +20,11 @@ FORWARD = np.array([1.0, 0.0, 0.0])
 Forces = Callable[[int, float], float]  # force of a wheel at a time [N]
 
 
-def reading(wheel: int, force: float, first: bool = True) -> Traction:
+def either(force: float, first: bool = True) -> Pair:
     """A power that leaves two forces, on either side of that at which it is least."""
     other = -300.0 - force
     pair = (force, other) if first else (other, force)
-    return Traction(0, wheel, force, 0.2, 5.0, (pair, (0.2, 0.2)))
+    return pair, (0.2, 0.2)
 
 
 def played(
@@ -42,7 +41,7 @@ def played(
         time += STEP
         for wheel in times * [0, 1, 2]:
             if force is not None:
-                particles.take(reading(wheel, force(wheel, time), first=first))
+                particles.take(wheel, either(force(wheel, time), first=first))
         assert particles.step(STEP, rims(time))
     return particles.slides(rims(time)), rims(time)
 
@@ -209,3 +208,40 @@ def test_coarse_counts_that_shake_the_motors_count_less() -> None:
         return played(rims, shaken, 0.8)[0]
 
     assert found(20.0).any_probability < 0.5 < found(0.0).any_probability
+
+
+def test_a_gyro_decides_which_particles_live_on() -> None:
+    """Of those that slide without traction, one half turns and the other does not."""
+    found = []
+    for rate in (0.0, 1.0):
+        particles = _alike(0.02, np.array([0.5, 0.0, 0.0]))
+        particles._twist[::2, 2] = 1.0
+        for _ in range(10):
+            particles.turns(rate, 0.1)
+            particles.step(STEP, BODY.rows @ np.array([0.5, 0.0, 0.5]))
+        found.append(particles.slides(np.zeros(3)).twist[2])
+    assert found[0] < 0.4
+    assert found[1] > 0.6
+
+
+def test_a_rate_of_the_gyro_counts_for_one_step() -> None:
+    particles = Particles(BODY, FRICTION, 0.0)
+    particles.turns(1.0, 0.02)
+    particles.step(STEP, np.zeros(3))
+    before = particles._weight.copy()
+    particles.step(STEP, np.zeros(3))
+    assert particles._weight == pytest.approx(before)
+
+
+def test_shoves_come_and_go() -> None:
+    settings = ParticleSettings(shoved=1.0, shove=2.0, shove_ends=5.0)
+    particles = Particles(BODY, FRICTION, 0.0, settings)
+    for _ in range(400):
+        particles.step(STEP, np.zeros(3))
+    hit = particles._shove.any(axis=1)
+    # One in a second that lasts a fifth of it: a sixth of the time, 2 N per kg in each direction.
+    assert hit.mean() == pytest.approx(1.0 / 6.0, abs=0.05)
+    assert particles._shove[hit].std() == pytest.approx(2.0 * BODY.mass, rel=0.15)
+    particles._slope[:], particles._drag[:] = 0.0, 0.0
+    assert particles._wrench()[:, :2] == pytest.approx(particles._shove)
+    assert not Particles(BODY, FRICTION, 0.0)._shove.any()

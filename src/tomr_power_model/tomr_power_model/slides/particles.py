@@ -16,11 +16,12 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_odometry.kernel import STICKING, Body
-from tomr_odometry.traction import Roughness, Traction
 from tomr_power_model.robot import GRAVITY, WHEELS
+from tomr_power_model.slides.body import STICKING, ContactBody
+from tomr_power_model.slides.roughness import Roughness
 
 Array = NDArray[np.float64]
+Pair = tuple[tuple[float, float], tuple[float, float]]
 
 _SEED = 20_240_101  # the same messages give the same numbers
 _LEAST_STEP = 0.018  # s
@@ -53,6 +54,9 @@ class ParticleSettings(NamedTuple):
     drag: float = 0.3  # of the rollers' drag
     dragging: float = 0.2  # share of floors on which rollers drag by anything up to
     drag_most: float = 0.4
+    shoved: float = 0.0  # 1/s, at which somebody shoves the robot
+    shove: float = 1.5  # N per kg of the robot, standard deviation of each direction
+    shove_ends: float = 6.0  # 1/s
     walk_twist: float = 0.02  # m/s/sqrt(s), while wheels slide
     force: float = 0.07  # N per kg of the robot, by which predicted forces are off
     force_share: float = 0.1  # of a force and of dry friction, the same
@@ -78,7 +82,11 @@ class Particles:
     """Encoder samples and tractions in, the twist of the body on a floor nobody knows out."""
 
     def __init__(
-        self, body: Body, friction: Array, drag: float, settings: ParticleSettings | None = None
+        self,
+        body: ContactBody,
+        friction: Array,
+        drag: float,
+        settings: ParticleSettings | None = None,
     ) -> None:
         """friction: dry friction of each wheel [N] at its rim; drag: of the rollers [-]."""
         self._set = settings or ParticleSettings()
@@ -102,10 +110,12 @@ class Particles:
         near = self._described_drag * (1.0 + s.drag * self._random.standard_normal(n))
         other = s.drag_most * self._random.random(n) ** 2
         self._drag = np.where(self._random.random(n) < s.dragging, other, near)
+        self._shove = np.zeros((n, 2))  # N, on the body
         self._force = np.zeros((n, WHEELS))
         self._off = np.zeros((n, WHEELS))  # standard deviations, averaged
         self._weight = np.full(n, 1.0 / n)
-        self._readings: list[Traction] = []
+        self._readings: list[tuple[int, Pair]] = []
+        self._turning: tuple[float, float] | None = None
         self._rough = [Roughness() for _ in range(WHEELS)]
         self._since = 0.0
 
@@ -115,9 +125,15 @@ class Particles:
         low, high = np.where(good, s.grips, s.least), np.where(good, s.most, s.grips)
         return np.asarray(low * (high / low) ** random.random(count))
 
-    def take(self, reading: Traction) -> None:
-        """Take what a motor's power shows of its contact's force."""
-        self._readings.append(reading)
+    def take(self, wheel: int, either: Pair) -> None:
+        """Take what a motor's power shows of its contact: the forces of both currents that the
+        power leaves, and their standard deviations [N]."""
+        self._readings.append((wheel, either))
+
+    def turns(self, rate: float, std: float) -> None:
+        """Take what a gyro shows of the body until the next step: yaw rate and its standard
+        deviation [rad/s]."""
+        self._turning = rate, std
 
     def step(self, dt: float, rims: Array) -> bool:
         """Go on by dt [s] to rims that turn so fast [m/s]; False: too soon for a step."""
@@ -160,6 +176,10 @@ class Particles:
             self._drag[drags] = s.drag_most * random.random(len(drags)) ** 2
         if float(np.abs(rims).max()) < _RESTING:
             self._twist[random.random(n) < s.comes_to_rest * dt] = 0.0
+        if s.shoved:
+            self._shove[random.random(n) < s.shove_ends * dt] = 0.0
+            hit = np.flatnonzero(random.random(n) < s.shoved * dt)
+            self._shove[hit] = s.shove * self._body.mass * random.standard_normal((len(hit), 2))
         self._traction *= np.exp(s.wander * math.sqrt(dt) * random.standard_normal(n))
         np.clip(self._traction, 0.5 * s.least, 1.2 * s.most, out=self._traction)
         self._slope += s.walk_slope * math.sqrt(dt) * random.standard_normal((n, 2))
@@ -193,6 +213,7 @@ class Particles:
         pull = b.mass * np.minimum(1.0, most / np.maximum(steep, 1e-9))
         wrench[:, 0] += pull * (cos * self._slope[:, 0] + sin * self._slope[:, 1])
         wrench[:, 1] += pull * (cos * self._slope[:, 1] - sin * self._slope[:, 0])
+        wrench[:, :2] += self._shove
         return np.asarray(wrench)
 
     def _judge(self, dt: float, rims: Array) -> None:
@@ -202,23 +223,28 @@ class Particles:
         turning = np.tanh(rims / _RESTING)
         for i in range(WHEELS):
             expected = self._force[:, i] + self._friction[:, i] * turning[i]
-            apart = [self._apart(one, expected) for one in self._readings if one.wheel == i]
+            apart = [self._apart(i, one, expected) for wheel, one in self._readings if wheel == i]
             if apart:  # as much evidence in a time, however often power is measured
                 off = np.mean(apart, axis=0)
                 self._off[:, i] += share * (off - self._off[:, i])
                 square = np.log1p(self._off[:, i] ** 2 / s.tails)
                 logs -= 0.5 * (s.tails + 1.0) * s.trust * dt / s.time * square
         self._readings.clear()
+        if self._turning is not None:
+            rate, std = self._turning
+            off = np.clip((self._twist[:, 2] - rate) / std, -s.farthest, s.farthest)
+            logs -= 0.5 * s.trust * dt / s.time * off**2
+            self._turning = None
         weight = np.exp(logs - logs.max())
         self._weight = weight / weight.sum()
         if self._weight @ self._weight > 2.0 / s.particles:
             self._draw()
 
-    def _apart(self, reading: Traction, expected: Array) -> Array:
+    def _apart(self, i: int, either: Pair, expected: Array) -> Array:
         """Standard deviations between expected forces [N] and the nearer one of the power's."""
-        s, i = self._set, reading.wheel
-        forces, stds = np.array(reading.either)
-        rough = s.roughness * self._rough[i].take(*reading.either[0])
+        s = self._set
+        forces, stds = np.array(either)
+        rough = s.roughness * self._rough[i].take(*either[0])
         common = (s.force * self._body.mass) ** 2 + rough
         share = s.force_share * (self._dry[i] + np.abs(forces))
         spread = np.sqrt(common + stds**2 + share**2)
@@ -237,6 +263,7 @@ class Particles:
         self._friction = self._spread(self._friction, kept)
         self._drag = self._spread(self._drag, kept)
         self._force, self._off = self._force[kept], self._off[kept]
+        self._shove = self._shove[kept]
         self._weight = np.full(n, 1.0 / n)
 
     def _spread(self, values: Array, kept: NDArray[np.intp]) -> Array:

@@ -1,0 +1,258 @@
+"""Whether wheels slide, from ticks: hand-made motions of the reference robot and their powers."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from attrs import evolve
+from numpy.typing import NDArray
+
+from tomr_fault_diag.classifier.belief import EXTERNAL
+from tomr_fault_diag.classifier.judges import WindowJudge, make_judge
+from tomr_fault_diag.classifier.motors import Motors
+from tomr_fault_diag.classifier.observability import Unseen
+from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.classifier.slides import SlideWatch
+from tomr_fault_diag.classifier.stage import FaultClassifier
+from tomr_fault_diag.classifier.states import SLIP
+from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
+from tomr_power_model.robot import shipped_robot
+from tomr_power_model.slides.body import body_of
+
+Array = NDArray[np.float64]
+Twist = Callable[[float], Array]  # of the rims as if they rolled, at a time [s]
+Forces = Callable[[float, Array, Array], Array]  # of contacts [N]; of rolling, at rims [m/s]
+
+ROBOT = shipped_robot("reference")
+MOTORS = Motors(ROBOT)
+BODY, RADIUS = body_of(ROBOT)
+BASE = 1_700_000_000_000_000_000
+MS = 1_000_000
+BAND = 0.7  # W
+TRACTION = 0.08
+FASTER = 0.8  # m/s^2
+
+
+def ahead(time: float) -> Array:
+    """Half a metre per second, then for half a second faster and slower by turns."""
+    phase = time % 2.0 if time > 2.0 else 0.0
+    more = min(phase, 0.5) - max(0.0, min(phase - 1.0, 0.5))
+    return np.array([0.5 + FASTER * more, 0.2, 0.3])
+
+
+def rolling(_: float, forces: Array, __: Array) -> Array:
+    return forces
+
+
+def pushed(wrench: Array, begin: float, end: float) -> Forces:
+    """What contacts that grip withstand: a force on the body [N, N, N m] for some time."""
+
+    def forces(time: float, of_rolling: Array, _: Array) -> Array:
+        return of_rolling - (BODY.to_twist.T @ wrench if begin <= time < end else 0.0)
+
+    return forces
+
+
+def turned(twist: Array) -> Array:
+    """What a body's velocity changes by, in its own frame, because it turns [m/s^2]."""
+    return np.array([-twist[2] * twist[1], twist[2] * twist[0], 0.0])
+
+
+class Slippery:
+    """From two seconds on contacts hand on no more than a share of their load."""
+
+    def __init__(self) -> None:
+        self._twist: Array | None = None
+
+    def __call__(self, time: float, of_rolling: Array, rims: Array) -> Array:
+        if time < 2.0:
+            return of_rolling
+        if self._twist is None:
+            self._twist = BODY.to_twist @ rims
+        most, found = TRACTION * BODY.load, np.zeros(3)
+        for _ in range(50):  # 1 ms each
+            sliding = rims - BODY.rows @ self._twist
+            found = most * np.clip(sliding / 0.01, -1.0, 1.0)
+            change = np.linalg.solve(BODY.inertia, BODY.rows.T @ found) - turned(self._twist)
+            self._twist = self._twist + 0.001 * change
+        return found
+
+
+def power(force: Array, speed: Array, change: Array) -> Array:
+    """Of motors whose contacts hand on so much [N], at wheel speeds and their change [W]."""
+    none, one = (MOTORS.forces(np.full(3, amperes), speed, change) for amperes in (0.0, 1.0))
+    current = (force - none) / (one - none)
+    return MOTORS.resistance * current**2 + MOTORS.constant * speed * current + MOTORS.idle
+
+
+def frames(forces: Forces, seconds: float = 4.0, yaw: float = math.nan) -> list[ResidualFrame]:
+    """Ticks of 50 ms of rims that turn as commanded; powers are explained by rolling."""
+    found, last = [], BODY.rows @ ahead(0.0)
+    for tick in range(1, round(seconds / 0.05)):
+        time = 0.05 * tick
+        twist = ahead(time)
+        rims = BODY.rows @ twist
+        speed, change = rims / RADIUS, (rims - last) / RADIUS / 0.05
+        last = rims
+        turning = np.array([-twist[2] * twist[1], twist[2] * twist[0], 0.0])
+        of_rolling = BODY.to_twist.T @ (
+            BODY.inertia @ (BODY.to_twist @ (RADIUS * change) + turning)
+        )
+        explained = power(of_rolling, speed, change)
+        shown = power(forces(time, of_rolling, rims), speed, change) - explained
+        found.append(frame(tick, speed, shown, explained, yaw))
+    return found
+
+
+def frame(
+    tick: int, speed: Array, off: Array, explained: Array, yaw: float = math.nan
+) -> ResidualFrame:
+    total = Residual(float(off.sum()), 3.0 * BAND, 30.0)
+    motors = [Residual(o, BAND, m) for o, m in zip(off.tolist(), explained.tolist(), strict=True)]
+    speeds = [Residual(0.0, 0.2, want, "rad/s") for want in speed.tolist()]
+    gyro = Residual(yaw, 0.1, 0.3, "rad/s")
+    return ResidualFrame(BASE + 50 * tick * MS, (total, *motors, *speeds, *motors), yaw=gyro)
+
+
+def probabilities(items: list[ResidualFrame]) -> Array:
+    watch = SlideWatch(ROBOT)
+    return np.array([watch.take(item) for item in items])
+
+
+def test_contacts_that_hand_on_their_traction_slide() -> None:
+    found = probabilities(frames(Slippery()))
+    assert (found[:39] == 0.0).all()
+    assert (found[39 + 8 :] > 0.6).all()
+    assert found[-10:].min() > 0.9
+
+
+@pytest.mark.parametrize(
+    "forces",
+    [
+        pytest.param(pushed(BODY.mass * np.array([2.0, 1.0, 0.1]), 2.2, 2.35), id="a shove"),
+        pytest.param(pushed(BODY.mass * np.array([-0.6, 0.0, 0.0]), 2.2, 9.0), id="a load"),
+        pytest.param(pushed(BODY.mass * np.array([0.3, 0.3, 0.0]), 2.2, 9.0), id="a slope"),
+    ],
+)
+def test_what_contacts_withstand_is_no_slide(forces: Forces) -> None:
+    items = frames(forces)
+    off = [abs(motor.residual) for item in items for motor in item.residuals[1:4]]
+    assert max(off) > 2.0 * BAND
+    assert np.nanmax(probabilities(items)) < 0.5
+
+
+def test_while_nothing_lies_outside_its_band_particles_rest(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    watch, steps = SlideWatch(ROBOT), []
+    step = watch._particles.step
+    monkeypatch.setattr(
+        watch._particles, "step", lambda dt, rims: steps.append(dt) or step(dt, rims)
+    )
+    well = frames(rolling)
+    shoved = frames(pushed(np.array([30.0, 0.0, 0.0]), 2.175, 2.275), seconds=6.0)
+    assert [watch.take(item) for item in well] == [0.0] * len(well)
+    assert not steps
+    watch.clear()
+    for item in shoved:
+        watch.take(item)
+    # Hints at 2.2 and 2.25 s: from 1.15 s until 4.2 s, of which the first tick has none before.
+    assert len(steps) == 61
+    assert np.allclose(steps, 0.05)
+
+
+def test_it_hangs_neither_on_the_rate_of_decisions_nor_on_repeated_ticks() -> None:
+    items = frames(Slippery())
+    plain = probabilities(items)
+    doubled = [
+        evolve(item, stamp_ns=item.stamp_ns + later * MS) for item in items for later in (0, 10, 30)
+    ]
+    assert np.array_equal(probabilities(doubled)[::3], plain, equal_nan=True)
+    slow = probabilities(items[::4])
+    assert (np.isnan(slow) | (slow == 0.0)).all()  # 5 Hz show no acceleration
+
+
+def test_a_tick_without_a_power_says_nothing_and_particles_begin_anew() -> None:
+    items = frames(Slippery())
+    gone = Residual(math.nan, BAND, 3.0)
+    lost = items[60]
+    items[60] = evolve(lost, residuals=(lost.residuals[0], gone, *lost.residuals[2:]))
+    found = probabilities(items)
+    assert np.isnan(found[60:62]).all()
+    assert np.isfinite(found[62:]).all()
+
+
+def test_magnitudes_of_currents_show_no_slide() -> None:
+    measurement = evolve(ROBOT.measurement, quantity="motor_current", signed=False)
+    watch = SlideWatch(evolve(ROBOT, measurement=measurement))
+    assert all(math.isnan(watch.take(item)) for item in frames(Slippery()))
+
+
+def test_numbers_beyond_all_bounds_are_survived() -> None:
+    items = frames(Slippery())
+    wild = Residual(1e300, BAND, 3.0)
+    for tick in range(50, 55):
+        item = items[tick]
+        items[tick] = evolve(item, residuals=(item.residuals[0], wild, *item.residuals[2:]))
+    assert np.isfinite(probabilities(items)[70:]).all()
+
+
+def test_a_gyro_tells_a_slide_sooner() -> None:
+    """That the body turns otherwise than its wheels no load explains."""
+    alone = probabilities(frames(pushed(np.array([-4.0, 0.0, 0.0]), 2.2, 9.0)))
+    seen = probabilities(frames(pushed(np.array([-4.0, 0.0, 0.0]), 2.2, 9.0), yaw=-0.25))
+    assert np.nanmax(alone) < 0.5 < np.nanmax(seen[45:])
+
+
+def test_both_currents_leave_a_motor_its_power() -> None:
+    speed, drawn = np.array([6.0, -4.0, 0.0]), np.array([12.0, 5.0, 3.0])
+    both = MOTORS.both_currents(drawn, speed)
+    watts = MOTORS.resistance[:, None] * both**2 + (MOTORS.constant * speed)[:, None] * both
+    assert watts + MOTORS.idle[:, None] == pytest.approx(np.column_stack([drawn, drawn]))
+    assert (both[:, 0] < both[:, 1]).all()
+    measurement = evolve(ROBOT.measurement, quantity="motor_current")
+    measured = Motors(evolve(ROBOT, measurement=measurement)).both_currents(drawn, speed)
+    assert measured.tolist() == [[12.0, 12.0], [5.0, 5.0], [3.0, 3.0]]
+
+
+def test_noise_of_a_measurement() -> None:
+    sensors = evolve(ROBOT.sensors, current_noise=0.03, current_resolution=0.04)
+    robot = evolve(ROBOT, sensors=sensors)
+    assert Motors(robot).noise(robot) == pytest.approx(0.05 * robot.supply.nominal_voltage)
+    robot = evolve(robot, measurement=evolve(ROBOT.measurement, quantity="motor_current"))
+    assert Motors(robot).noise(robot) == pytest.approx(0.05)
+
+
+def newest(slides: float, off: float = 0.0) -> Array:
+    """What a second of frames without residuals says of the states, and a probability beside."""
+    judge = make_judge(ClassifierSettings())
+    assert isinstance(judge, WindowJudge)
+    still = np.zeros(3)
+    for tick in range(20):
+        item = frame(tick, np.array([3.0, -8.0, 5.0]), still, 4.0 + still)
+        if off:
+            residuals = list(item.residuals)
+            residuals[4] = evolve(residuals[4], residual=off)
+            item = evolve(item, residuals=tuple(residuals))
+        judge.judge(item, 50 * MS, Unseen(), slides)
+    return judge._recent[-1]
+
+
+def test_what_forces_say_by_hand() -> None:
+    plain = newest(math.nan)
+    # 10 nats at most, none at one half; a load or a push is told apart by them.
+    assert newest(0.9)[SLIP] - plain[SLIP] == pytest.approx(8.0)
+    assert newest(0.9)[EXTERNAL] == plain[EXTERNAL]
+    assert newest(0.5).tolist() == newest(0.1).tolist() == plain.tolist()
+    # Where an encoder shows what it should not, the motion is in doubt.
+    assert newest(0.9, off=1.0).tolist() == newest(math.nan, off=1.0).tolist()
+
+
+def test_a_robot_that_slides_is_named_though_it_looks_like_a_load() -> None:
+    classifier, states = FaultClassifier.of(ClassifierSettings(), ROBOT), set()
+    for item in frames(Slippery(), seconds=6.0):
+        diagnosis = classifier.classify(item)
+        if diagnosis is not None:
+            states.add(diagnosis.state.name)
+    assert "slip" in states

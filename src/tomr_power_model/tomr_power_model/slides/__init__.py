@@ -1,0 +1,1 @@
+"""Whether wheels slide, as the forces of their contacts show."""
