@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from attrs import evolve
+from numpy.typing import NDArray
 from odometry_drives import ROBOT, START, Recorded, drive, play
 
 from tomr_odometry.creep import Creep
@@ -16,7 +17,9 @@ from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.traction import Traction
 from tomr_odometry.unaided import Unaided
 from tomr_power_model.slides.body import body_of
+from tomr_power_model.slides.particles import Pair
 
+Array = NDArray[np.float64]
 SETTINGS = OdometrySettings(creep=Creep((0.5, 1.0, 1.5), 0.0, 0.05))
 
 
@@ -63,7 +66,7 @@ def test_forces_are_evidence_with_signs_and_an_imu(signed: bool, aided: bool, ro
     core = SlipOdometry(evolve(ROBOT, measurement=measurement))
     core._heard = {"encoders": START, "power 1": START}
     core._tractive, core._is_aided = (
-        [Traction(START, 1, 3.0, 2.0, 5.0, ((3.0, -9.0), (2.0, 2.0)))],
+        [Traction(START, 1, 3.0, 2.0, 5.0, ((3.0, -9.0), (2.0, 2.0)), 0.0)],
         aided,
     )
     found = core._evidence(0.01)
@@ -74,7 +77,7 @@ def test_forces_are_evidence_with_signs_and_an_imu(signed: bool, aided: bool, ro
 
 def test_without_an_imu_the_force_reported_is_the_one_that_the_slides_speak_for() -> None:
     core = SlipOdometry(ROBOT)
-    core._tractive = [Traction(START, 1, 3.0, 2.0, 5.0, ((3.0, -9.0), (2.0, 1.0)))]
+    core._tractive = [Traction(START, 1, 3.0, 2.0, 5.0, ((3.0, -9.0), (2.0, 1.0)), 0.0)]
     core._forces = np.array([1.0, 3.0, 1.0])
     core._tractions = SimpleNamespace(speeds=np.zeros(3))  # type: ignore[assignment]
     core._by_power = SimpleNamespace(  # type: ignore[assignment]
@@ -103,3 +106,45 @@ def test_slides_are_looked_for_from_the_motion_with_which_an_imu_leaves_off() ->
     by_power.rest()
     by_power.step(0.02, twist, body.rows @ twist, [])
     assert by_power.probability.max() < 0.05
+
+
+class Watched:
+    """Particles that keep what they are given."""
+
+    def __init__(self) -> None:
+        self.taken: list[tuple[int, Pair]] = []
+        self.steps: list[float] = []
+
+    def start(self, twist: Array) -> None:
+        self.taken.clear()
+
+    def take(self, wheel: int, either: Pair) -> None:
+        self.taken.append((wheel, either))
+
+    def step(self, dt: float, rims: Array) -> bool:
+        self.steps.append(dt)
+        return False
+
+
+def test_powers_count_as_what_they_say_beyond_rolling() -> None:
+    """Of two readings of wheel 2 the mean, on top of what these rims' acceleration takes."""
+    body, radius = body_of(ROBOT)
+    by_power, particles = Unaided(ROBOT, body, radius), Watched()
+    by_power._particles = particles  # type: ignore[assignment]
+    ahead = np.array([1.0, 0.0, 0.0])
+
+    def reading(force: float, rolling: float, speed: float = 5.0) -> Traction:
+        return Traction(START, 1, force, 0.2, speed, ((force, -90.0), (0.2, 0.4)), rolling)
+
+    by_power.step(0.0, np.zeros(3), np.zeros(3), [])
+    by_power.step(0.025, np.zeros(3), 0.01 * body.rows @ ahead, [reading(3.0, 1.0)])
+    assert not particles.steps
+    still = reading(50.0, 0.0, speed=0.1)  # dry friction hides what it hands on
+    by_power.step(0.025, np.zeros(3), 0.02 * body.rows @ ahead, [reading(6.0, 2.0), still])
+    assert particles.steps == [pytest.approx(0.05)]
+    ((wheel, (forces, stds)),) = particles.taken
+    # 0.4 m/s^2 of 15 kg, at two wheels of three and at 30 degrees.
+    rolls = 0.4 * 15.0 / (2.0 * np.cos(np.pi / 6.0)) * np.sign(body.rows[1, 0])
+    assert wheel == 1
+    assert forces == pytest.approx((rolls + (2.0 + 4.0) / 2.0, rolls - 90.0 - 1.5), rel=1e-3)
+    assert stds == pytest.approx((0.2, 0.4))

@@ -128,7 +128,9 @@ def _one_of_two(law: float, change: float = -20.0) -> tuple[list[float], float, 
     motor = ROBOT.motors[0]
     held = motor.resistance * current + motor.wheel_constant * 4.0
     motion[at.MOTION_HEADER + at.MOTION_VOLTAGE] = held
-    found, noise, _ = tractions._current(0, power[at.POWER_DRAWN], motion, both[:2])
+    found, noise, _ = tractions._current(
+        0, power[at.POWER_DRAWN], motion, both[:2], power[at.POWER_CURRENT]
+    )
     return both[:2], found, noise, power[at.POWER_CURRENT]
 
 

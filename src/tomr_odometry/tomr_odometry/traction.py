@@ -48,6 +48,7 @@ class Traction:
     std: float  # of noise and of what dry friction leaves open [N]
     speed: float  # of the wheel [rad/s]
     either: Pair  # forces of both currents that the power leaves, and their deviations [N]
+    rolling: float  # force that rolling takes by the encoders, at the same instant [N]
 
     def nearer(self, force: float) -> tuple[float, float]:
         """Of the two forces the one that is nearer to another [N], and its deviation."""
@@ -162,7 +163,8 @@ class Tractions:
         if stamp_ns - self._samples[-1][0] > _STALE_NS:
             return None
         found = self._currents(wheel, drawn, motion)
-        current, noise, is_sure = self._current(wheel, drawn, motion, found)
+        rolls = self._rolling_current(wheel, motion)
+        current, noise, is_sure = self._current(wheel, drawn, motion, found, rolls)
         own = _motion_of(motion, wheel)
         speed = own[at.MOTION_HEADER + at.MOTION_SPEED]
         if is_sure and abs(speed) > _MOVING:
@@ -172,7 +174,16 @@ class Tractions:
         newtons = self._constant[wheel] / self._radius
         std = math.hypot(newtons * noise, left, rough)
         either = self._either(wheel, drawn, own, found)
-        return Traction(stamp_ns, wheel, force, std, speed, either)
+        rolling = self._force(wheel, rolls, own)[0]
+        return Traction(stamp_ns, wheel, force, std, speed, either, rolling)
+
+    def _rolling_current(self, wheel: int, motion: list[float]) -> float:
+        """Of a motor whose wheel rolls [A]; magnitudes of currents have nothing to compare."""
+        if self._unsigned:
+            return math.nan
+        out = [0.0] * (WHEELS * at.POWER_WHEEL)
+        self._laws.drive_power(self._numbers, motion, out, WHEELS)
+        return out[wheel * at.POWER_WHEEL + at.POWER_CURRENT]
 
     def _force(self, wheel: int, current: float, own: list[float]) -> tuple[float, float]:
         """Force of a contact at a motor's current, and what dry friction leaves open of it [N]."""
@@ -207,9 +218,10 @@ class Tractions:
         return found
 
     def _current(
-        self, wheel: int, drawn: float, motion: list[float], found: list[float]
+        self, wheel: int, drawn: float, motion: list[float], found: list[float], rolls: float
     ) -> tuple[float, float, bool]:
-        """A motor's current [A], its noise, and whether the measurement's sign is beyond doubt."""
+        """A motor's current [A], its noise, and whether the measurement's sign is beyond doubt;
+        `rolls`: what rolling would take [A]."""
         place = at.MOTION_HEADER + wheel * at.MOTION_WHEEL
         constant, cold = self._constant[wheel], self._resistance[wheel]
         back = constant * motion[place + at.MOTION_SPEED]
@@ -220,11 +232,8 @@ class Tractions:
         if self._is_current:  # a magnitude: a motor that brakes is taken for one that drives
             way = math.tanh(motion[place + at.MOTION_SPEED] / _RESTING)
             return abs(drawn) * way, self._noise, False
-        rolling = [0.0] * (WHEELS * at.POWER_WHEEL)
-        self._laws.drive_power(self._numbers, motion, rolling, WHEELS)
-        expected = rolling[wheel * at.POWER_WHEEL + at.POWER_CURRENT]
         spread = _ROLLING_NEWTONS * self._radius / constant
-        cost = [((one - by_law) / law_std) ** 2 + ((one - expected) / spread) ** 2 for one in found]
+        cost = [((one - by_law) / law_std) ** 2 + ((one - rolls) / spread) ** 2 for one in found]
         side = int(cost[1] < cost[0])
         current, apart = found[side], found[1] - found[0]
         noise = self._spread(wheel, drawn, current, back / constant)

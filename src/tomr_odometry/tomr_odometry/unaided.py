@@ -6,10 +6,12 @@ from numpy.typing import NDArray
 from tomr_odometry.estimate import SLIDES
 from tomr_odometry.traction import Traction
 from tomr_power_model.robot import WHEELS, Robot
-from tomr_power_model.slides.body import ContactBody
+from tomr_power_model.slides.body import ContactBody, rolling_forces
 from tomr_power_model.slides.particles import Particles
 
 Array = NDArray[np.float64]
+_STEP = 0.05  # s, of the particles
+_MOVES = 0.5  # rad/s: dry friction hides what a slower wheel hands on
 FEWEST_POWERS = 2  # motors whose power has to be known
 
 
@@ -19,8 +21,8 @@ class Unaided:
     def __init__(self, robot: Robot, body: ContactBody, radius: Array) -> None:
         self._body = body
         friction = np.array(robot.everywhere("friction.coulomb", "torque")) / radius
-        drag = robot.everywhere("contact.roller_drag", "coefficient")[0]
-        self._particles = Particles(body, friction, drag)
+        self._drag = robot.everywhere("contact.roller_drag", "coefficient")[0]
+        self._particles = Particles(body, friction, self._drag)
         self.clear()
 
     def clear(self) -> None:
@@ -40,13 +42,40 @@ class Unaided:
         """Go on by dt [s]: twist of the body so far, speeds of the rims [m/s], new tractions."""
         if not self.is_at_work:
             self._particles.start(twist)
+            self._begin(rims)
             self.is_at_work = True
-        for reading in readings:
-            self._particles.take(reading.wheel, reading.either)
-        if self._particles.step(dt, rims):
+        self._elapsed += dt
+        self._readings += [one for one in readings if abs(one.speed) > _MOVES]
+        if self._elapsed >= _STEP:
+            self._weigh(rims)
+        self.slid = self.slid + dt * self._sliding
+
+    def _begin(self, rims: Array) -> None:
+        """A step of the particles begins with rims that turn so fast [m/s]."""
+        self._elapsed, self._rims = 0.0, rims
+        self._readings: list[Traction] = []
+
+    def _weigh(self, rims: Array) -> None:
+        """Particles go on to rims that turn so fast [m/s].
+
+        The force of a contact is that of rolling in this step, and what the powers say beyond
+        rolling at their own instants: so what the encoders do not show of the instant of an
+        acceleration cancels.
+        """
+        to_twist = self._body.to_twist
+        change = to_twist @ (rims - self._rims) / self._elapsed
+        rolling = rolling_forces(self._body, self._drag, to_twist @ rims, change)
+        for wheel in range(WHEELS):
+            own = [one for one in self._readings if one.wheel == wheel]
+            if own:
+                beyond = [np.array(one.either[0]) - one.rolling for one in own]
+                one, other = (rolling[wheel] + np.mean(beyond, axis=0)).tolist()
+                first, second = np.mean([one.either[1] for one in own], axis=0).tolist()
+                self._particles.take(wheel, ((one, other), (first, second)))
+        if self._particles.step(self._elapsed, rims):
             found = self._particles.slides(rims)
             slides = found.any_probability > SLIDES
             self.force, self.probability = found.force, found.probability
             self._sliding = rims - self._body.rows @ found.twist if slides else np.zeros(WHEELS)
             self.covariance = found.covariance if slides else np.zeros((3, 3))
-        self.slid = self.slid + dt * self._sliding
+        self._begin(rims)

@@ -23,7 +23,7 @@ from tomr_fault_diag.classifier.severity.tick import MOVES, Tick
 from tomr_fault_diag.residuals.frame import BAND_SIGMAS, ENCODERS, Residual, ResidualFrame
 from tomr_power_model.model.ticks import NANOSECONDS, to_ns
 from tomr_power_model.robot import Robot
-from tomr_power_model.slides.body import STICKING, body_of
+from tomr_power_model.slides.body import body_of, rolling_forces
 from tomr_power_model.slides.particles import Pair, Particles, ParticleSettings
 
 Array = NDArray[np.float64]
@@ -33,7 +33,6 @@ _SLOT = to_ns(0.05)  # of faster ticks the first in each is taken
 _LONGEST = to_ns(0.11)  # between two ticks that show an acceleration
 _BEFORE = to_ns(1.0)  # with which particles begin, before the first hint of a slide
 _CALM = to_ns(2.0)  # without one, and they rest
-_TRUST = 0.7  # share of the evidence that counts
 _SHOVED = 1.0  # 1/s, at which somebody may shove a robot that shows something
 _POWER_SHARE = 0.01  # of a measured power that is not known
 _LEAST_SLOPE = 2.0  # W/A
@@ -48,7 +47,7 @@ class SlideWatch:
         self._body, self._radius = body_of(robot)
         dry = np.array(robot.everywhere("friction.coulomb", "torque")) / self._radius
         self._drag = robot.everywhere("contact.roller_drag", "coefficient")[0]
-        settings = ParticleSettings(trust=_TRUST, shoved=_SHOVED)
+        settings = ParticleSettings(shoved=_SHOVED)
         self._particles = Particles(self._body, dry, self._drag, settings)
         self._noise = self._motors.noise(robot)
         # Magnitudes of currents do not show which way a contact pushes.
@@ -112,7 +111,9 @@ class SlideWatch:
 
     def _weigh(self, tick: Tick, rims: Array) -> None:
         """Hand on what the powers show of the contacts."""
-        motors, rolling = self._motors, self._rolling(tick, rims)
+        motors, body = self._motors, self._body
+        change = body.to_twist @ (self._radius * tick.change)
+        rolling = rolling_forces(body, self._drag, body.to_twist @ rims, change)
         measured, explained = (
             motors.both_currents(drawn, tick.speed) for drawn in (tick.power, tick.from_encoders)
         )
@@ -128,15 +129,6 @@ class SlideWatch:
                 first, second = (float(std[wheel]) for std in stds)
                 either: Pair = (one, other), (first, second)
                 self._particles.take(int(wheel), either)
-
-    def _rolling(self, tick: Tick, rims: Array) -> Array:
-        """Forces of contacts that roll on a level floor, from the ticks' own speeds [N]."""
-        body = self._body
-        twist, change = body.to_twist @ rims, body.to_twist @ (self._radius * tick.change)
-        turning = np.array([-twist[2] * twist[1], twist[2] * twist[0], 0.0])
-        along = np.tanh(body.along @ twist / STICKING) * body.load
-        needed = body.inertia @ (change + turning) + self._drag * (along @ body.along)
-        return np.asarray(body.to_twist.T @ needed)
 
     def _spread(self, tick: Tick, current: Array) -> Array:
         """Standard deviations of contact forces that follow from powers or currents [N]."""

@@ -42,3 +42,15 @@ def body_of(robot: Robot) -> tuple[ContactBody, Array]:
         center=p[[at.CENTER_X, at.CENTER_Y]],
     )
     return body, wheel[:, at.RADIUS].copy()
+
+
+def rolling_forces(body: ContactBody, drag: float, twist: Array, change: Array) -> Array:
+    """Forces of contacts that grip on a level floor [N], (3,).
+
+    twist: of the body in its own frame [m/s, m/s, rad/s]; change: of its components, per second;
+    drag: of the rollers, share of the load.
+    """
+    turning = np.array([-twist[2] * twist[1], twist[2] * twist[0], 0.0])
+    along = np.tanh(body.along @ twist / STICKING) * body.load
+    needed = body.inertia @ (change + turning) + drag * (along @ body.along)
+    return np.asarray(body.to_twist.T @ needed)

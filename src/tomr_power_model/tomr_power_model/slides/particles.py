@@ -64,7 +64,7 @@ class ParticleSettings(NamedTuple):
     farthest: float = 6.0  # standard deviations
     time: float = 0.12  # s, over which what is off is averaged
     tails: float = 4.0  # degrees of freedom of its distribution
-    trust: float = 0.35  # share of the evidence that counts: what a model is off by stays off
+    trust: float = 0.7  # share of the evidence that counts: what a model is off by stays off
 
 
 @frozen
