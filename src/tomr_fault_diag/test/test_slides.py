@@ -8,8 +8,8 @@ import pytest
 from attrs import evolve
 from numpy.typing import NDArray
 
-from tomr_fault_diag.classifier.belief import EXTERNAL
-from tomr_fault_diag.classifier.judges import WindowJudge, make_judge
+from tomr_fault_diag.classifier.belief import ENCODERS, EXTERNAL
+from tomr_fault_diag.classifier.judges import WindowJudge, _said_by_forces, make_judge
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
@@ -241,8 +241,12 @@ def newest(slides: float, off: float = 0.0) -> Array:
 
 def test_what_forces_say_by_hand() -> None:
     plain = newest(math.nan)
-    # 10 nats at most, none at one half; a load or a push is told apart by them.
+    # 10 nats at most, none at one half; 7 for an encoder, and these alone accuse none.
     assert newest(0.9)[SLIP] - plain[SLIP] == pytest.approx(8.0)
+    assert newest(0.9)[ENCODERS].tolist() == plain[ENCODERS].tolist()
+    said = _said_by_forces(frame(0, np.full(3, 5.0), np.zeros(3), np.full(3, 4.0)), 0.9)
+    assert said[ENCODERS] == pytest.approx(0.7 * 8.0)
+    assert said.sum() == pytest.approx(8.0 + 3 * 5.6)
     assert newest(0.9)[EXTERNAL] == plain[EXTERNAL]
     assert newest(0.5).tolist() == newest(0.1).tolist() == plain.tolist()
     # Where an encoder shows what it should not, the motion is in doubt.

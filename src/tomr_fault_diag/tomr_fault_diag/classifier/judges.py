@@ -79,6 +79,7 @@ _SLIGHT = 1.0
 # What a gyro says for slip in a tick: so much for each band beyond the first, so much at most, as
 # forces do.
 _PER_BAND, _MOST_SAID = 8.0, 10.0
+_MISCOUNTS = 0.7  # of what forces say for slip: for an encoder that loses counts
 _HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
 _OF_A_WHEEL = (*_HIDDEN, METERS)
 
@@ -164,12 +165,12 @@ class WindowJudge:
         count = 1 if self._slot is None else slot - self._slot
         self._slot = slot
         for _ in range(count):
-            self._opinion = self._step(frame, unseen, _said_by_gyro(frame), slides)
+            said = _said_by_gyro(frame) + _said_by_forces(frame, slides)
+            self._opinion = self._step(frame, unseen, said)
         return self._opinion
 
-    def _step(self, frame: ResidualFrame, unseen: Unseen, gyro: Array, slides: float) -> Opinion:
-        """Opinion after one more tick of the network; `gyro`: what one says of the network's
-        hypotheses besides."""
+    def _step(self, frame: ResidualFrame, unseen: Unseen, said: Array) -> Opinion:
+        """Opinion after one more tick of the network; `said`: of its hypotheses besides."""
         self._window[:-1] = self._window[1:]
         self._window[-1] = channels_of(frame)
         self._lacking = max(self._lacking - 1, 0)
@@ -185,8 +186,7 @@ class WindowJudge:
             likelihoods[faults] = np.maximum(likelihoods[faults], likelihoods[NORMAL])
         for moved in unseen.moved:  # no fault turns a wheel that stands: somebody pushes
             likelihoods[[kind.start + moved for kind in _HIDDEN]] = likelihoods[NORMAL]
-        astray = _astray(frame)  # wheels that turn otherwise
-        meters = [METERS.start + number for number in astray]
+        meters = [METERS.start + number for number in _astray(frame)]
         # No power sensor makes a wheel turn otherwise.
         likelihoods[meters] = np.minimum(likelihoods[meters], likelihoods[NORMAL])
         if unseen.everything:  # a robot that stands says the same again and again
@@ -196,13 +196,10 @@ class WindowJudge:
             over = likelihoods[kind] - likelihoods[NORMAL]
             plain = np.sign(over) * np.maximum(np.abs(over) - _SLIGHT, 0.0)
             likelihoods[kind] = likelihoods[NORMAL] + plain
-        likelihoods += gyro
-        if slides > 0.5 and not astray:
-            likelihoods[SLIP] += _MOST_SAID * (2.0 * slides - 1.0)
-        likelihoods = of_states(likelihoods)
+        likelihoods = of_states(likelihoods + said)
         shares = self._belief.update(likelihoods)
         striking = _ratios(likelihoods)
-        striking[ENCODERS] -= gyro[ENCODERS]  # a gyro alone accuses no encoder
+        striking[ENCODERS] -= said[ENCODERS]  # which alone accuses no encoder
         self._recent.append(striking)
         group = max(_GROUPS, key=lambda group: float(shares[group].sum()))
         best = self._kept(shares, group)
@@ -288,6 +285,19 @@ def _said_by_gyro(frame: ResidualFrame) -> Array:
         # A wheel that turns forwards turns the body clockwise (ros2_controllers' omni wheels).
         if frame.residuals[index].modelled * yaw.residual < 0.0:
             said[ENCODERS.start + wheel] = said[SLIP]
+    return said
+
+
+def _said_by_forces(frame: ResidualFrame, slides: float) -> Array:
+    """Log-likelihoods (19,) of what the contacts hand on over those if all wheels roll as they
+    show: 0 up to even odds of a slide. An encoder that shows too little looks much like one.
+
+    0 where an encoder shows what it should not: then the motion is in doubt.
+    """
+    said = np.zeros(HYPOTHESES)
+    if slides > 0.5 and not _astray(frame):  # nor where it is NaN
+        said[SLIP] = _MOST_SAID * (2.0 * slides - 1.0)
+        said[ENCODERS] = _MISCOUNTS * said[SLIP]
     return said
 
 
