@@ -115,6 +115,11 @@ def test_a_measured_current_leaves_one_force() -> None:
     found = _started(evolve(ROBOT, measurement=measurement), 100).power(1_000_000_000, 0, 2.0)
     assert found is not None
     assert found.either[0] == (found.force, found.force)
+    assert math.isfinite(found.rolling)
+    unsigned = evolve(measurement, signed=False)
+    blunt = _started(evolve(ROBOT, measurement=unsigned), 100).power(1_000_000_000, 0, 2.0)
+    assert blunt is not None
+    assert math.isnan(blunt.rolling)  # magnitudes have nothing to compare
 
 
 def _one_of_two(law: float, change: float = -20.0) -> tuple[list[float], float, float, float]:

@@ -225,12 +225,24 @@ def test_a_gyro_decides_which_particles_live_on() -> None:
 
 
 def test_a_rate_of_the_gyro_counts_for_one_step() -> None:
-    particles = Particles(BODY, FRICTION, 0.0)
-    particles.turns(1.0, 0.02)
+    particles = _alike(0.0, np.zeros(3))
+    particles._twist[:, 2] = np.linspace(0.0, 0.5, len(particles._twist))
+    particles.turns(0.2, 0.5)
     particles.step(STEP, np.zeros(3))
     before = particles._weight.copy()
+    assert before.std() > 0.0
     particles.step(STEP, np.zeros(3))
     assert particles._weight == pytest.approx(before)
+
+
+def test_particles_that_are_drawn_again_keep_their_shoves() -> None:
+    particles = Particles(BODY, FRICTION, 0.0)
+    number = np.arange(len(particles._twist))
+    particles._twist[:, 0], particles._shove[:, 0] = number, number
+    particles._weight = number / number.sum()
+    particles._draw()
+    assert particles._shove[:, 0].tolist() == particles._twist[:, 0].tolist()
+    assert particles._shove[:, 0].mean() > 1.2 * number.mean()
 
 
 def test_shoves_come_and_go() -> None:
