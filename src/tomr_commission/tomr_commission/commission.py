@@ -258,8 +258,7 @@ class _Work:
         plan: Rehearsal,
     ) -> Tuned:
         """The narrowest bands with which false alarms can be as rare as wanted."""
-        choice, share = self.request.bands, 0.55
-        robot = robot_of(str(self.source(described)))
+        robot, choice, share = robot_of(str(self.source(described))), self.request.bands, 0.55
         first = evolve(plan, shoves=plan.first)
         while True:
             self.progress("simulating healthy hours", share)
