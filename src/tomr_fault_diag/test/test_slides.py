@@ -260,3 +260,16 @@ def test_a_robot_that_slides_is_named_though_it_looks_like_a_load() -> None:
         if diagnosis is not None:
             states.add(diagnosis.state.name)
     assert "slip" in states
+
+
+def test_after_a_clock_goes_back_nothing_is_left_of_the_particles() -> None:
+    classifier = FaultClassifier.of(ClassifierSettings(), ROBOT)
+    items = frames(Slippery(), seconds=5.0)
+    for item in items:
+        classifier.classify(item)
+    watch = classifier._slides
+    assert watch is not None
+    assert watch._awake_until
+    classifier.classify(evolve(items[0], stamp_ns=BASE - 3_600_000 * MS))
+    assert not watch._awake_until
+    assert len(watch._recent) == 1
