@@ -5,13 +5,13 @@ decades of `caution` a tick would have overcome. It is read off the classifier i
 most caution there is, so that it follows whatever the classifier becomes.
 """
 
-import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
+from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
@@ -39,9 +39,9 @@ class _Witness(WindowJudge):
         self.newest = 0.0
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = math.nan
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
     ) -> Opinion:
-        opinion = super().judge(frame, elapsed_ns, unseen, slides)
+        opinion = super().judge(frame, elapsed_ns, unseen, contacts)
         self.newest = self.evidence()
         return opinion
 

@@ -10,6 +10,7 @@ from attrs import evolve
 from tomr_fault_diag.classifier import states
 from tomr_fault_diag.classifier.advice import check_first
 from tomr_fault_diag.classifier.belief import CONTROLS, HYPOTHESES
+from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message, six_state
 from tomr_fault_diag.classifier.observability import Unseen
@@ -284,7 +285,7 @@ class Fixed:
     def interrupt(self) -> None: ...
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = 0.0
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
     ) -> Opinion:
         return Opinion(np.eye(6)[MOTOR + self.wheel], sure=True, wheel=self.wheel)
 
@@ -330,7 +331,7 @@ class Leading(Fixed):
         self.state, self.sure = state, sure
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = 0.0
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
     ) -> Opinion:
         return Opinion(np.eye(6)[NORMAL], self.sure, state=self.state)
 
@@ -406,7 +407,7 @@ class OfWheel(Leading):
     wheel = 0
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = 0.0
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
     ) -> Opinion:
         return evolve(super().judge(frame, elapsed_ns, unseen), wheel=self.wheel)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.judges import Opinion
 from tomr_fault_diag.classifier.misfit import MisfitWatch
 from tomr_fault_diag.classifier.observability import Unseen
@@ -53,7 +54,7 @@ class Sure:
         pass
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = 0.0
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
     ) -> Opinion:
         return Opinion(np.eye(6)[self.state], sure=True)
 
@@ -246,7 +247,11 @@ def test_other_faults_are_named_beside_a_low_supply_and_leave_it_behind() -> Non
 def test_a_fault_that_is_not_sure_is_not_named_beside_a_low_supply() -> None:
     class Unsure(Sure):
         def judge(
-            self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = 0.0
+            self,
+            frame: ResidualFrame,
+            elapsed_ns: int,
+            unseen: Unseen,
+            contacts: Contacts = NOTHING,
         ) -> Opinion:
             return evolve(super().judge(frame, elapsed_ns, unseen), sure=False)
 

@@ -33,7 +33,7 @@ def seen(*ticks: Sequence[Wheel]) -> Unseen:
         ((5.0, -5.0), (), ()),
         ((-5.0, -5.0), (), ()),
         ((UNKNOWN, UNKNOWN), (), ()),  # it may be commanded to turn
-        ((0.0, UNKNOWN), (), (0,)),  # it may turn
+        ((0.0, UNKNOWN), (), ()),  # it may turn, or not
     ],
 )
 def test_a_wheel_is_idle_that_need_not_turn_and_does_not(

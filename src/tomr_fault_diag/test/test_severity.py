@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.judges import Opinion
 from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.motors import Motors
@@ -433,6 +434,6 @@ class Dragging:
         pass
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = 0.0
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
     ) -> Opinion:
         return Opinion(np.eye(6)[MOTOR + 1], sure=True, wheel=1, state=DRAGGING[1])

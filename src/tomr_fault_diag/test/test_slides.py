@@ -9,6 +9,7 @@ from attrs import evolve
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.belief import ENCODERS, EXTERNAL
+from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.judges import WindowJudge, _said_by_forces, make_judge
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import Unseen
@@ -117,7 +118,7 @@ def frame(
 
 def probabilities(items: list[ResidualFrame]) -> Array:
     watch = SlideWatch(ROBOT)
-    return np.array([watch.take(item) for item in items])
+    return np.array([watch.take(item).slides for item in items])
 
 
 def test_contacts_that_hand_on_their_traction_slide() -> None:
@@ -152,7 +153,7 @@ def test_while_nothing_lies_outside_its_band_particles_rest(
     )
     well = frames(rolling)
     shoved = frames(pushed(np.array([30.0, 0.0, 0.0]), 2.175, 2.275), seconds=6.0)
-    assert [watch.take(item) for item in well] == [0.0] * len(well)
+    assert [watch.take(item) for item in well] == [Contacts(0.0)] * len(well)
     assert not steps
     watch.clear()
     for item in shoved:
@@ -186,7 +187,7 @@ def test_a_tick_without_a_power_says_nothing_and_particles_begin_anew() -> None:
 def test_magnitudes_of_currents_show_no_slide() -> None:
     measurement = evolve(ROBOT.measurement, quantity="motor_current", signed=False)
     watch = SlideWatch(evolve(ROBOT, measurement=measurement))
-    assert all(math.isnan(watch.take(item)) for item in frames(Slippery()))
+    assert all(watch.take(item) is NOTHING for item in frames(Slippery()))
 
 
 def test_numbers_beyond_all_bounds_are_survived() -> None:
@@ -224,8 +225,8 @@ def test_noise_of_a_measurement() -> None:
     assert Motors(robot).noise(robot) == pytest.approx(0.05)
 
 
-def newest(slides: float, off: float = 0.0) -> Array:
-    """What a second of frames without residuals says of the states, and a probability beside."""
+def newest(contacts: Contacts, off: float = 0.0) -> Array:
+    """What a second of frames without residuals says of the states, and their contacts beside."""
     judge = make_judge(ClassifierSettings())
     assert isinstance(judge, WindowJudge)
     still = np.zeros(3)
@@ -235,22 +236,83 @@ def newest(slides: float, off: float = 0.0) -> Array:
             residuals = list(item.residuals)
             residuals[4] = evolve(residuals[4], residual=off)
             item = evolve(item, residuals=tuple(residuals))
-        judge.judge(item, 50 * MS, Unseen(), slides)
+        judge.judge(item, 50 * MS, Unseen(), contacts)
     return judge._recent[-1]
 
 
 def test_what_forces_say_by_hand() -> None:
-    plain = newest(math.nan)
+    plain = newest(NOTHING)
     # 10 nats at most, none at one half; 7 for an encoder, and these alone accuse none.
-    assert newest(0.9)[SLIP] - plain[SLIP] == pytest.approx(8.0)
-    assert newest(0.9)[ENCODERS].tolist() == plain[ENCODERS].tolist()
-    said = _said_by_forces(frame(0, np.full(3, 5.0), np.zeros(3), np.full(3, 4.0)), 0.9)
+    assert newest(Contacts(0.9))[SLIP] - plain[SLIP] == pytest.approx(8.0)
+    assert newest(Contacts(0.9))[ENCODERS].tolist() == plain[ENCODERS].tolist()
+    said = _said_by_forces(frame(0, np.full(3, 5.0), np.zeros(3), np.full(3, 4.0)), Contacts(0.9))
     assert said[ENCODERS] == pytest.approx(0.7 * 8.0)
     assert said.sum() == pytest.approx(8.0 + 3 * 5.6)
-    assert newest(0.9)[EXTERNAL] == plain[EXTERNAL]
-    assert newest(0.5).tolist() == newest(0.1).tolist() == plain.tolist()
+    assert newest(Contacts(0.9))[EXTERNAL] == plain[EXTERNAL]
+    assert newest(Contacts(0.5)).tolist() == newest(Contacts(0.1)).tolist() == plain.tolist()
     # Where an encoder shows what it should not, the motion is in doubt.
-    assert newest(0.9, off=1.0).tolist() == newest(math.nan, off=1.0).tolist()
+    assert newest(Contacts(0.9), off=1.0).tolist() == newest(NOTHING, off=1.0).tolist()
+
+
+def borne(wheel: int, share: float, begin: float, end: float) -> Forces:
+    """One wheel pushes beyond rolling, by a share of the robot's mass [N/kg]."""
+
+    def forces(time: float, of_rolling: Array, _: Array) -> Array:
+        more = share * BODY.mass if begin <= time < end else 0.0
+        return of_rolling + more * np.eye(3)[wheel]
+
+    return forces
+
+
+def lone(items: list[ResidualFrame]) -> list[int | None]:
+    watch = SlideWatch(ROBOT)
+    return [watch.take(item).lone for item in items]
+
+
+@pytest.mark.parametrize("wheel", range(3))
+def test_a_wheel_that_bears_a_force_alone_is_known_after_a_fifth_of_a_second(wheel: int) -> None:
+    found = lone(frames(borne(wheel, 1.5, 2.175, 3.175)))
+    # The first tick in it is that of 2.2 s, number 43; four more make 0.2 s.
+    assert found == [None] * 47 + [wheel] * 16 + [None] * 16
+
+
+@pytest.mark.parametrize(
+    "forces",
+    [
+        pytest.param(borne(1, 0.8, 2.175, 3.175), id="a lean on one wheel"),
+        pytest.param(borne(1, 3.0, 2.175, 2.375), id="a shove on one wheel"),
+        pytest.param(pushed(BODY.mass * np.array([3.0, 0.0, 0.0]), 2.2, 3.2), id="ahead"),
+        pytest.param(pushed(BODY.mass * np.array([0.0, 3.0, 0.0]), 2.2, 3.2), id="sideways"),
+        pytest.param(pushed(BODY.mass * np.array([0.0, 0.0, 0.5]), 2.2, 3.2), id="turned"),
+    ],
+)
+def test_what_may_come_from_outside_no_wheel_bears_alone(forces: Forces) -> None:
+    assert set(lone(frames(forces))) == {None}
+
+
+def test_wheels_that_take_turns_bear_nothing_for_long() -> None:
+    def forces(time: float, of_rolling: Array, _: Array) -> Array:
+        return of_rolling + 2.0 * BODY.mass * np.eye(3)[int(time / 0.2) % 3]
+
+    assert set(lone(frames(forces))) == {None}
+
+
+def test_what_was_borne_before_a_gap_does_not_count() -> None:
+    items = frames(borne(0, 1.5, 2.175, 4.0))
+    gone = Residual(math.nan, BAND, 3.0)
+    items[46] = evolve(
+        items[46], residuals=(items[46].residuals[0], gone, *items[46].residuals[2:])
+    )
+    found = lone(items)
+    assert found[46:52] == [None] * 6
+    assert found[53:] == [0] * (len(items) - 53)
+
+
+def test_what_a_wheel_bears_alone_is_no_push() -> None:
+    plain, alone = newest(NOTHING), newest(Contacts(math.nan, 2))
+    assert alone[EXTERNAL] - plain[EXTERNAL] == pytest.approx(-10.0)
+    others = np.delete(np.arange(SLIP, EXTERNAL), 0)
+    assert alone[others].tolist() == plain[others].tolist()
 
 
 def test_a_robot_that_slides_is_named_though_it_looks_like_a_load() -> None:

@@ -30,6 +30,7 @@ from tomr_fault_diag.classifier.belief import (
     named_of,
     of_states,
 )
+from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.features import CHANNELS, WINDOW, channels_of, turning
 from tomr_fault_diag.classifier.misfit import is_far
 from tomr_fault_diag.classifier.network import Network
@@ -117,10 +118,10 @@ class Judge(Protocol):
         ...
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = math.nan
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
     ) -> Opinion:
-        """Look at the newest frame, so long after the one before, what it cannot show, and how
-        likely a wheel slides as the forces of contacts have it (NaN: not known)."""
+        """Look at the newest frame, so long after the one before, what it cannot show, and
+        what the forces of the contacts do."""
         ...
 
 
@@ -156,7 +157,7 @@ class WindowJudge:
         self._slot, self._lacking = None, WINDOW
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = math.nan
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
     ) -> Opinion:
         """Look at the newest frame."""
         if elapsed_ns > _TOO_LONG:
@@ -165,7 +166,7 @@ class WindowJudge:
         count = 1 if self._slot is None else slot - self._slot
         self._slot = slot
         for _ in range(count):
-            said = _said_by_gyro(frame) + _said_by_forces(frame, slides)
+            said = _said_by_gyro(frame) + _said_by_forces(frame, contacts)
             self._opinion = self._step(frame, unseen, said)
         return self._opinion
 
@@ -288,16 +289,19 @@ def _said_by_gyro(frame: ResidualFrame) -> Array:
     return said
 
 
-def _said_by_forces(frame: ResidualFrame, slides: float) -> Array:
+def _said_by_forces(frame: ResidualFrame, contacts: Contacts) -> Array:
     """Log-likelihoods (19,) of what the contacts hand on over those if all wheels roll as they
-    show: 0 up to even odds of a slide. An encoder that shows too little looks much like one.
+    show, and none is pushed: 0 up to even odds of a slide. An encoder that shows too little looks
+    much like one. What one wheel bears alone is no force on the body.
 
-    0 where an encoder shows what it should not: then the motion is in doubt.
+    Of a slide nothing where an encoder shows what it should not: then the motion is in doubt.
     """
-    said = np.zeros(HYPOTHESES)
+    said, slides = np.zeros(HYPOTHESES), contacts.slides
     if slides > 0.5 and not _astray(frame):  # nor where it is NaN
         said[SLIP] = _MOST_SAID * (2.0 * slides - 1.0)
         said[ENCODERS] = _MISCOUNTS * said[SLIP]
+    if contacts.lone is not None:
+        said[EXTERNAL] = -_MOST_SAID
     return said
 
 
@@ -333,7 +337,7 @@ class CodeJudge:
         self._smoothed, self._led = None, 0
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, slides: float = math.nan
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
     ) -> Opinion:
         """Look at the newest frame."""
         now = self._answer(frame.codes)

@@ -42,8 +42,9 @@ class Unseen:
         return (*motors, "slip") if self.slip else motors
 
 
-# Stamp [ns], speeds expected [rad/s], which wheels are commanded to turn, which turn.
-_Tick = tuple[int, tuple[float, ...], tuple[bool, ...], tuple[bool, ...]]
+# Stamp [ns], speeds expected [rad/s], which wheels are commanded to turn, which may turn, which do.
+_Flags = tuple[bool, ...]
+_Tick = tuple[int, tuple[float, ...], _Flags, _Flags, _Flags]
 
 
 class MotionWatch:
@@ -63,23 +64,25 @@ class MotionWatch:
         speeds = [frame.residuals[index] for index in SPEEDS]
         expected = tuple([speed.modelled for speed in speeds])
         now, asked = frame.stamp_ns, tuple([_is_asked_to_turn(speed) for speed in speeds])
-        self._ticks.append((now, expected, asked, tuple([_turns(speed) for speed in speeds])))
+        may_turn = tuple([_may_turn(speed) for speed in speeds])
+        turns = tuple([_turns(speed) for speed in speeds])
+        self._ticks.append((now, expected, asked, may_turn, turns))
         while self._ticks[0][0] <= now - _LATELY:
             self._ticks.popleft()
         if self._since is None:
             self._since = now
         if now - self._since < _LEAST:
             return Unseen()
-        _, every_expected, every_asked, every_turning = zip(*self._ticks, strict=True)
-        asked, turning = _ever(every_asked), _ever(every_turning)
+        _, every_expected, *flags = zip(*self._ticks, strict=True)
+        asked, may_turn, turns = map(_ever, flags)
         steady = all(
             max(wheel) - min(wheel) < _SPEEDING for wheel in zip(*every_expected, strict=True)
         )
         idle = [wheel for wheel in range(_WHEELS) if not asked[wheel]]
         return Unseen(
-            wheels=tuple([wheel for wheel in idle if not turning[wheel]]),
+            wheels=tuple([wheel for wheel in idle if not may_turn[wheel]]),
             slip=steady,
-            moved=tuple([wheel for wheel in idle if turning[wheel]]),
+            moved=tuple([wheel for wheel in idle if turns[wheel]]),
         )
 
 
@@ -93,6 +96,11 @@ def _is_asked_to_turn(speed: Residual) -> bool:
     return not abs(speed.modelled) < _TURNING
 
 
-def _turns(speed: Residual) -> bool:
+def _may_turn(speed: Residual) -> bool:
     """One that is not known may."""
     return not abs(measured_speed(speed)) < _TURNING
+
+
+def _turns(speed: Residual) -> bool:
+    """Of one that is not known, nobody can say so."""
+    return abs(measured_speed(speed)) >= _TURNING

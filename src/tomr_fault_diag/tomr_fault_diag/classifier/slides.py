@@ -18,6 +18,7 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_fault_diag.classifier.contacts import NOTHING, Contacts, LoneWheelWatch
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.severity.tick import MOVES, Tick
 from tomr_fault_diag.residuals.frame import BAND_SIGMAS, ENCODERS, Residual, ResidualFrame
@@ -28,7 +29,6 @@ from tomr_power_model.slides.particles import Pair, Particles, ParticleSettings
 
 Array = NDArray[np.float64]
 
-UNKNOWN = float("nan")
 _SLOT = to_ns(0.05)  # of faster ticks the first in each is taken
 _LONGEST = to_ns(0.11)  # between two ticks that show an acceleration
 _BEFORE = to_ns(1.0)  # with which particles begin, before the first hint of a slide
@@ -49,6 +49,7 @@ class SlideWatch:
         self._drag = robot.everywhere("contact.roller_drag", "coefficient")[0]
         settings = ParticleSettings(shoved=_SHOVED)
         self._particles = Particles(self._body, dry, self._drag, settings)
+        self._lone = LoneWheelWatch()
         self._noise = self._motors.noise(robot)
         # Magnitudes of currents do not show which way a contact pushes.
         self._is_able = robot.measurement.signed
@@ -63,15 +64,16 @@ class SlideWatch:
     def _rest(self) -> None:
         self._awake_until = 0  # ns
         self._last: Tick | None = None
-        self._probability = 0.0
+        self._found = Contacts(0.0)
+        self._lone.clear()
 
-    def take(self, frame: ResidualFrame) -> float:
-        """Take a tick; the probability that a wheel slides, 0 where nothing hints at it, NaN where
-        the measurements cannot show it."""
+    def take(self, frame: ResidualFrame) -> Contacts:
+        """Take a tick; no wheel slides where nothing hints at it, and nothing is known where the
+        measurements cannot show it."""
         if not self._is_able:
-            return UNKNOWN
+            return NOTHING
         if frame.stamp_ns // _SLOT == self._newest // _SLOT:
-            return self._probability
+            return self._found
         if frame.stamp_ns - self._newest > _LONGEST:
             self.clear()
         self._newest = frame.stamp_ns
@@ -81,33 +83,35 @@ class SlideWatch:
                     self._follow(before)
             self._awake_until = frame.stamp_ns + _CALM
         if frame.stamp_ns < self._awake_until:
-            self._probability = self._follow(frame)
+            self._found = self._follow(frame)
         else:
             self._rest()
         self._recent.append(frame)
         while self._recent[0].stamp_ns < frame.stamp_ns - _BEFORE:
             self._recent.popleft()
-        return self._probability
+        return self._found
 
-    def _follow(self, frame: ResidualFrame) -> float:
+    def _follow(self, frame: ResidualFrame) -> Contacts:
         """Go on to a tick; where something is missing in it, begin anew with the next."""
         last = self._last
         with np.errstate(over="ignore", invalid="ignore"):
             tick = self._last = Tick.of(self._motors, frame, last)
             if tick is None or not np.isfinite([tick.speed, tick.power]).all():
                 self._last = None
-                return UNKNOWN
+                self._lone.clear()
+                return NOTHING
             rims = self._radius * tick.speed
             if last is None:
                 self._particles.start(self._body.to_twist @ rims)
-                return UNKNOWN
+                return NOTHING
             self._weigh(tick, rims)
             yaw = frame.yaw
             if not yaw.stale:
                 std = max(yaw.band / BAND_SIGMAS, _LEAST_YAW)
                 self._particles.turns(yaw.modelled + yaw.residual, std)
             self._particles.step((tick.stamp_ns - last.stamp_ns) / NANOSECONDS, rims)
-            return self._particles.slides(rims).any_probability
+            slides = self._particles.slides(rims).any_probability
+            return Contacts(slides, self._lone.take(tick))
 
     def _weigh(self, tick: Tick, rims: Array) -> None:
         """Hand on what the powers show of the contacts."""

@@ -4,12 +4,12 @@ from typing import Self
 
 from attrs import evolve, field, frozen
 
+from tomr_fault_diag.classifier.contacts import NOTHING
 from tomr_fault_diag.classifier.judges import Judge, Opinion, make_judge
 from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
 from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.severity import Severity, SeverityWatch
-from tomr_fault_diag.classifier.slides import UNKNOWN as SLIDES_UNKNOWN
 from tomr_fault_diag.classifier.slides import SlideWatch
 from tomr_fault_diag.classifier.states import (
     BURDENED,
@@ -173,7 +173,7 @@ class FaultClassifier:
         """Look at a frame, if there is something in it, and name a state."""
         data = self._data.take(frame)
         self._unseen = evolve(self._motion.take(frame), blind=data.blind)
-        slides = SLIDES_UNKNOWN if self._slides is None else self._slides.take(frame)
+        contacts = NOTHING if self._slides is None else self._slides.take(frame)
         misfit, self._usable = self._misfits.take(frame, self.settings.low_supply), data.usable
         if not data.usable:
             self._pause(frame, data)
@@ -188,7 +188,7 @@ class FaultClassifier:
             self._candidate = DISOBEYS
             self._enter(DISOBEYS, frame.stamp_ns, None)
             return
-        self._opinion = self._judge.judge(frame, elapsed, self._unseen, slides)
+        self._opinion = self._judge.judge(frame, elapsed, self._unseen, contacts)
         if data.enough or self._state not in _QUIET:
             self._weigh(self._opinion, misfit, frame.stamp_ns)
         else:
