@@ -124,21 +124,27 @@ def commissioned(number: int, folder: Path) -> dict[str, object]:
 
 
 @cache
-def _kind(source: str) -> tuple[Kind, Robot]:
+def commissioned_kind(folder: Path) -> tuple[Kind, Robot]:
+    """The classifier of the robot commissioned in a folder, and the robot as it is believed."""
+    source = str(folder / "commissioned" / "commissioned.yaml")
     settings = DiagnosisSettings.of(read_node_sections(source, _NODES), source)
     return Kind(settings.classifier, settings.residuals.bands), load_robot(source)
+
+
+def tour(number: int, folder: Path, seed: int, fault: str | None) -> Drive:
+    """A drive with bumps of robot `number`, commissioned in a folder; `fault` as another_drive."""
+    real, (_, believed) = made(number, folder).real, commissioned_kind(folder)
+    chosen = another_drive(Drive(seed, real, believed, load_mission("square")), seed, fault)
+    random = np.random.default_rng([seed, 5])
+    count = int(random.integers(0, 4))
+    return evolve(chosen, bumps=bumps(believed, random, count, chosen.length))
 
 
 def scored(task: tuple[int, int, str | None, Path]) -> Outcome:
     """One drive of a commissioned robot."""
     number, seed, fault, folder = task
-    kind, believed = _kind(str(folder / "commissioned" / "commissioned.yaml"))
-    robot = made(number, folder)
-    chosen = another_drive(Drive(seed, robot.real, believed, load_mission("square")), seed, fault)
-    random = np.random.default_rng([seed, 5])
-    chosen = evolve(
-        chosen, bumps=bumps(believed, random, int(random.integers(0, 4)), chosen.length)
-    )
+    kind, believed = commissioned_kind(folder)
+    chosen = tour(number, folder, seed, fault)
     labelled = simulated_drive(chosen)
     named = named_by(kind, rebanded(labelled.frames, kind.bands), believed)
     if fault is None:

@@ -1,11 +1,13 @@
 """Faults beyond the paper's in MuJoCo, kinds that nobody knows, and pushes, scored with intervals.
 
     .venv/bin/python bench/extended.py [--drives 20] [--healthy-hours 0.5] [--json report.json]
+        [--commissioned DIR]
 
 So many drives of each kind of fault in docs/faults.md: robots, deviations of 5 % from their
 description, payloads, floors, bumps, missions and sensor noise as in bench/diagnosis.py, wheels,
 sizes and onsets at random, from seeds that nothing else uses. Healthy drives are shoved (up to
-3 N/kg for 0.2 s) and leaned on (up to 1 N/kg for seconds) as well.
+3 N/kg for 0.2 s) and leaned on (up to 1 N/kg for seconds) as well. With --commissioned the robots
+are those that bench/commissioned.py --out DIR has commissioned, with their commissioned.yaml.
 
 A fault counts while it shows: power or speeds differ measurably from those of a twin of the same
 robot in the same drive without the fault (`tomr_training/labels.py`); one of a power sensor, while
@@ -22,9 +24,13 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from itertools import pairwise
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from attrs import evolve, frozen
+from commissioned import commissioned_kind, tour
+from diagnosis import Kind as Diagnosed
+from diagnosis import rebanded
 from diagnosis_report import publish
 from tqdm import tqdm
 
@@ -41,7 +47,9 @@ from tomr_fault_diag.diagnosis.score import (
     with_interval,
 )
 from tomr_fault_diag.diagnosis.track import Track, Tracker
+from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.cli import run_main
+from tomr_power_model.errors import InputError
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_sim_bridge.faults import check_settings
 from tomr_sim_bridge.missions.schema import PlannedFault
@@ -137,10 +145,46 @@ KINDS: Mapping[str, Kind] = {
 }
 
 
-def faulty_drive(seed: int, name: str) -> tuple[Drive, float]:
-    """A drive with a fault of a kind, and the size of the fault."""
-    kind = KINDS[name]
-    drive = random_drive(shipped_robot("reference"), seed, None)
+@frozen
+class Fleet:
+    """Whose drives are scored: robots at random, or those commissioned in the folders of DIR."""
+
+    robots: tuple[Path, ...] = ()
+
+    @classmethod
+    def of(cls, commissioned: Path | None) -> Self:
+        """Raises InputError for a folder that holds no commissioned robot."""
+        if commissioned is None:
+            return cls()
+        found = sorted(commissioned.glob("robot_*"), key=_number)
+        if not found:
+            raise InputError(f"{commissioned}: no robot_*; run bench/commissioned.py --out there")
+        return cls(tuple(found))
+
+    def drive(self, seed: int) -> Drive:
+        """A healthy drive that depends on nothing but the seed and the robots."""
+        if not self.robots:
+            return random_drive(shipped_robot("reference"), seed, None)
+        folder = self._folder(seed)
+        return tour(_number(folder), folder, seed, None)
+
+    def kind(self, seed: int) -> Diagnosed:
+        """The classifier of the robot of that drive."""
+        if not self.robots:
+            return Diagnosed(ClassifierSettings(), BandSettings())
+        return commissioned_kind(self._folder(seed))[0]
+
+    def _folder(self, seed: int) -> Path:
+        return self.robots[seed % len(self.robots)]
+
+
+def _number(folder: Path) -> int:
+    return int(folder.name.removeprefix("robot_"))
+
+
+def faulty_drive(drive: Drive, name: str) -> tuple[Drive, float]:
+    """A drive with a fault of a kind in it, and the size of the fault."""
+    kind, seed = KINDS[name], drive.seed
     random = np.random.default_rng([seed, 1])
     settings, size = kind.draw(random, drive.plant)
     start = float(random.uniform(0.2, 0.5) * drive.length)
@@ -161,10 +205,9 @@ def _planned(
     return PlannedFault(fault_id, start, end, check_settings(fault_id, settings, fault_id))
 
 
-def pushed_drive(seed: int) -> Drive:
+def pushed_drive(drive: Drive) -> Drive:
     """A healthy drive with two shoves and a lean, beside the bumps that all drives have."""
-    drive = random_drive(shipped_robot("reference"), seed, None)
-    random = np.random.default_rng([seed, 2])
+    random = np.random.default_rng([drive.seed, 2])
     begins = np.sort(random.uniform(1.0, drive.length - 1.0, 3))
     pushes = []
     for begin, until in pairwise([*begins, drive.length]):
@@ -182,10 +225,10 @@ def pushed_drive(seed: int) -> Drive:
     return evolve(drive, mission=evolve(drive.mission, faults=tuple(pushes)))
 
 
-def said_of(drive: Drive, labelled: LabelledDrive) -> Track:
-    """What the classifier as shipped says of each tick."""
-    classifier, tracker = FaultClassifier.of(ClassifierSettings(), drive.believed), Tracker(False)
-    for frame in labelled.frames:
+def said_of(kind: Diagnosed, drive: Drive, labelled: LabelledDrive) -> Track:
+    """What a classifier says of each tick."""
+    classifier, tracker = FaultClassifier.of(kind.settings, drive.believed), Tracker(False)
+    for frame in rebanded(labelled.frames, kind.bands):
         diagnosis = classifier.classify(frame)
         if diagnosis is not None:
             tracker.diagnosis(diagnosis, math.nan)
@@ -217,9 +260,9 @@ def spans(flags: Flags, first: int) -> tuple[tuple[float, float], ...]:
     )
 
 
-def score_fault(seed: int, name: str) -> Seen | None:
+def score_fault(fleet: Fleet, seed: int, name: str) -> Seen | None:
     """A faulty drive against its label; None where the fault never shows."""
-    drive, size = faulty_drive(seed, name)
+    drive, size = faulty_drive(fleet.drive(seed), name)
     labelled = simulated_drive(drive)
     twin = healthy_twin(drive).of_ticks(labelled.first - 1 + np.arange(len(labelled.frames)))
     observable = spans(shows(drive, labelled, twin), labelled.first)
@@ -228,7 +271,7 @@ def score_fault(seed: int, name: str) -> Seen | None:
     label = _label(drive, name, size)
     # The onset is when it first shows: what comes before, nobody could detect.
     label = evolve(label, onset=observable[0][0] - 4 * _PERIOD, observable=observable)
-    return seen(said_of(drive, labelled), START_NS, [label], (0, 1))
+    return seen(said_of(fleet.kind(seed), drive, labelled), START_NS, [label], (0, 1))
 
 
 def _label(drive: Drive, name: str, size: float) -> Label:
@@ -241,15 +284,15 @@ def _label(drive: Drive, name: str, size: float) -> Label:
     return evolve(label, accept=(*label.accept, *others, *(["unknown"] if more else [])))
 
 
-def score_healthy(seed: int) -> Seen:
+def score_healthy(fleet: Fleet, seed: int) -> Seen:
     """A healthy drive with pushes: whatever is named is an alarm."""
-    drive = pushed_drive(seed)
-    return seen(said_of(drive, simulated_drive(drive)), START_NS, [], (0, 1))
+    drive = pushed_drive(fleet.drive(seed))
+    return seen(said_of(fleet.kind(seed), drive, simulated_drive(drive)), START_NS, [], (0, 1))
 
 
-def _work(task: tuple[int, str]) -> Seen | None:
-    seed, name = task
-    return score_fault(seed, name) if name else score_healthy(seed)
+def _work(task: tuple[Fleet, int, str]) -> Seen | None:
+    fleet, seed, name = task
+    return score_fault(fleet, seed, name) if name else score_healthy(fleet, seed)
 
 
 def targets(found: Sequence[Seen]) -> dict[str, object]:
@@ -281,17 +324,19 @@ def _main(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--healthy-hours", type=float, default=0.5, help="(default 0.5)")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="of the test set")
     parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
+    parser.add_argument("--commissioned", type=Path, help="DIR of bench/commissioned.py --out")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--json", type=Path, help="write the report to this file as well")
     options = parser.parse_args(arguments)
+    fleet = Fleet.of(options.commissioned)
     places = {name: number for number, name in enumerate(KINDS)}
     tasks = [
-        (options.first_seed + 1000 * places[name] + drive, name)
+        (fleet, options.first_seed + 1000 * places[name] + drive, name)
         for name in options.kinds
         for drive in range(options.drives)
     ]
     healthy = round(options.healthy_hours * 3600.0 / _DRIVE_SECONDS)
-    tasks += [(options.first_seed + _HEALTHY + drive, "") for drive in range(healthy)]
+    tasks += [(fleet, options.first_seed + _HEALTHY + drive, "") for drive in range(healthy)]
     with ProcessPoolExecutor(options.jobs) as pool:
         played = pool.map(_work, tasks)
         found = list(tqdm(played, total=len(tasks), unit="drive", disable=None))

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 from attrs import frozen
-from extended import faulty_drive
+from extended import Fleet, faulty_drive
 from faults.recordings import Recordings
 from stages import pipeline_of, steps_of
 from tqdm import tqdm
@@ -91,7 +91,7 @@ def _true_size(name: str, settings: Mapping[str, object]) -> float:
 
 def _simulated(task: tuple[int, str]) -> Case:
     seed, name = task
-    drive, _ = faulty_drive(seed, name)
+    drive, _ = faulty_drive(Fleet().drive(seed), name)
     classifier = FaultClassifier.of(ClassifierSettings(), drive.believed)
     found = (classifier.classify(frame) for frame in simulated_drive(drive).frames)
     said = _last((item for item in found if item is not None), _STATES[name])

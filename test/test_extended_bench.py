@@ -9,9 +9,10 @@ import pytest
 
 sys.path.append(str(Path(__file__).resolve().parent.parent / "bench"))
 
-from extended import KINDS, faulty_drive, pushed_drive, spans, targets
+from extended import KINDS, Fleet, faulty_drive, pushed_drive, spans, targets
 
 from tomr_fault_diag.diagnosis.score import Case, Seen
+from tomr_power_model.errors import InputError
 from tomr_sim_bridge.faults import natures
 
 
@@ -25,8 +26,8 @@ def test_every_fault_beyond_the_papers_is_drawn() -> None:
 
 @pytest.mark.parametrize("name", KINDS)
 def test_a_seed_makes_a_drive(name: str) -> None:
-    drive, size = faulty_drive(4_000_000, name)
-    again, _ = faulty_drive(4_000_000, name)
+    drive, size = faulty_drive(Fleet().drive(4_000_000), name)
+    again, _ = faulty_drive(Fleet().drive(4_000_000), name)
     fault = drive.mission.faults[0]
     assert again.mission == drive.mission
     assert size > 0.0
@@ -34,9 +35,21 @@ def test_a_seed_makes_a_drive(name: str) -> None:
     assert fault.settings["severity"] == 1.0
 
 
+def test_a_fleet_is_the_robots_of_a_folder(tmp_path: Path) -> None:
+    for number in (0, 2, 10):
+        (tmp_path / f"robot_{number}").mkdir()
+    assert [folder.name for folder in Fleet.of(tmp_path).robots] == [
+        "robot_0",
+        "robot_2",
+        "robot_10",
+    ]
+    with pytest.raises(InputError, match="no robot_"):
+        Fleet.of(tmp_path / "robot_0")
+
+
 def test_pushes_follow_one_another_within_what_is_no_fault() -> None:
     for seed in range(4_000_000, 4_000_020):
-        faults = pushed_drive(seed).mission.faults
+        faults = pushed_drive(Fleet().drive(seed)).mission.faults
         for fault in faults:
             assert fault.fault_id == "pushed"
             assert float(str(fault.settings["force"])) <= 3.0
