@@ -8,7 +8,8 @@ import pytest
 from attrs import evolve
 
 from tomr_fault_diag.classifier.belief import ENCODERS, OTHER
-from tomr_fault_diag.classifier.judges import WindowJudge, _said_by_gyro, make_judge
+from tomr_fault_diag.classifier.evidence import said_by_gyro
+from tomr_fault_diag.classifier.judges import WindowJudge, make_judge
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
@@ -177,18 +178,21 @@ def healthy_frame(yaw: float, off: float = 0.0) -> ResidualFrame:
 
 
 def test_what_a_gyro_says_by_hand() -> None:
-    said = _said_by_gyro(healthy_frame(-0.25))
+    said = said_by_gyro(healthy_frame(-0.25))
     # A quarter of a band beyond it, 8 nats a band. Wheels that turn forwards turn the body
     # clockwise: more of that may be encoders that show too little.
     accused = [SLIP, *range(ENCODERS.start, ENCODERS.stop), OTHER]
     assert said[accused] == pytest.approx(2.0)
     assert said.sum() == pytest.approx(2.0 * len(accused))
-    less = _said_by_gyro(healthy_frame(0.25))
+    less = said_by_gyro(healthy_frame(0.25))
     assert less[[SLIP, OTHER]] == pytest.approx(2.0)
     assert less.sum() == pytest.approx(4.0)
-    assert _said_by_gyro(healthy_frame(-5.0)).max() == pytest.approx(10.0)
-    # Where an encoder shows what it should not, it is in doubt itself.
-    assert not _said_by_gyro(healthy_frame(-5.0, off=0.7)).any()
+    assert said_by_gyro(healthy_frame(-5.0)).max() == pytest.approx(10.0)
+    # Where an encoder shows what it should not, it alone is in doubt, and of it what turns the body
+    # as its wheel does.
+    doubted = said_by_gyro(healthy_frame(-5.0, off=0.7))
+    assert doubted[ENCODERS.start] == doubted.sum() == pytest.approx(10.0)
+    assert not said_by_gyro(healthy_frame(5.0, off=0.7)).any()
 
 
 def test_a_gyro_alone_accuses_no_encoder() -> None:

@@ -51,6 +51,23 @@ def test_what_was_a_moment_ago_counts() -> None:
     assert seen(standing, [(0.0, 2.0)] * 3, standing).moved == (0, 1, 2)
 
 
+def test_a_wheel_that_coasts_is_moved_by_nobody() -> None:
+    """One without its signal turns on as it was asked to, for as long as it likes."""
+    coasting = [(0.0, 6.0), (0.0, 0.0), (8.0, 0.0)]
+    asked = [(6.0, 0.0), (0.0, 0.0), (8.0, 0.0)]
+    assert seen(asked, *[coasting] * 30).moved == ()
+    stood = [*[coasting] * 30, [(0.0, 0.0)] * 3]
+    assert seen(asked, *stood).moved == ()
+    assert seen(asked, *stood, coasting).moved == (0,)  # but who stood and turns is
+    assert seen(asked, *stood, asked, *[coasting] * 30).moved == ()
+
+
+def test_a_robot_is_driven_that_was_asked_to_turn_some_wheel() -> None:
+    assert seen([(0.0, 2.0), STILL, (8.0, 0.0)]).driven
+    assert not seen([(0.0, 2.0), STILL, STILL]).driven
+    assert seen([(8.0, 0.0)] * 3, [STILL] * 3).driven
+
+
 def test_slip_is_not_seen_where_nothing_asks_for_traction() -> None:
     assert seen([(5.0, 0.0)] * 3).slip
     assert not seen([(5.0, 0.0)] * 3, [(5.4, 0.0)] * 3).slip

@@ -8,9 +8,10 @@ import pytest
 from attrs import evolve
 from numpy.typing import NDArray
 
-from tomr_fault_diag.classifier.belief import ENCODERS, EXTERNAL
+from tomr_fault_diag.classifier.belief import DRAGS, ENCODERS, EXTERNAL, OTHER
 from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
-from tomr_fault_diag.classifier.judges import WindowJudge, _said_by_forces, make_judge
+from tomr_fault_diag.classifier.evidence import said_by_forces
+from tomr_fault_diag.classifier.judges import WindowJudge, make_judge
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
@@ -242,12 +243,15 @@ def newest(contacts: Contacts, off: float = 0.0) -> Array:
 
 def test_what_forces_say_by_hand() -> None:
     plain = newest(NOTHING)
-    # 10 nats at most, none at one half; 7 for an encoder, and these alone accuse none.
-    assert newest(Contacts(0.9))[SLIP] - plain[SLIP] == pytest.approx(8.0)
+    # Three times the log odds, 10 nats at most; 0.7 of it for an encoder, and these alone accuse
+    # none.
+    most = 3.0 * math.log(9.0)
+    assert newest(Contacts(0.9))[SLIP] - plain[SLIP] == pytest.approx(most)
+    assert newest(Contacts(1.0))[SLIP] - plain[SLIP] == pytest.approx(10.0)
     assert newest(Contacts(0.9))[ENCODERS].tolist() == plain[ENCODERS].tolist()
-    said = _said_by_forces(frame(0, np.full(3, 5.0), np.zeros(3), np.full(3, 4.0)), Contacts(0.9))
-    assert said[ENCODERS] == pytest.approx(0.7 * 8.0)
-    assert said.sum() == pytest.approx(8.0 + 3 * 5.6)
+    said = said_by_forces(frame(0, np.full(3, 5.0), np.zeros(3), np.full(3, 4.0)), Contacts(0.9))
+    assert said[ENCODERS] == pytest.approx(0.7 * most)
+    assert said.sum() == pytest.approx(3.1 * most)
     assert newest(Contacts(0.9))[EXTERNAL] == plain[EXTERNAL]
     assert newest(Contacts(0.5)).tolist() == newest(Contacts(0.1)).tolist() == plain.tolist()
     # Where an encoder shows what it should not, the motion is in doubt.
@@ -313,6 +317,41 @@ def test_what_a_wheel_bears_alone_is_no_push() -> None:
     assert alone[EXTERNAL] - plain[EXTERNAL] == pytest.approx(-10.0)
     others = np.delete(np.arange(SLIP, EXTERNAL), 0)
     assert alone[others].tolist() == plain[others].tolist()
+
+
+def unmoved(
+    *, spun: float = 8.0, expected: float = 8.0, quantum: float = 1e-4, ticks: int = 20
+) -> list[int | None]:
+    """Of a robot whose second wheel shows from tick 5 on that it turns at `spun` [rad/s] where it
+    should at `expected`, and draws what a heavy load asks of it; of a sensor's quantum [rad]."""
+    robot = evolve(ROBOT, sensors=evolve(ROBOT.sensors, encoder_resolution=quantum))
+    watch, found = SlideWatch(robot), list[int | None]()
+    wanted = np.array([3.0, -expected, 5.0])
+    for tick in range(ticks):
+        item = frame(tick, wanted, np.array([0.0, 60.0 * (tick >= 5), 0.0]), np.full(3, 4.0))
+        if tick >= 5:
+            residuals = list(item.residuals)
+            residuals[5] = evolve(residuals[5], residual=spun - expected)
+            item = evolve(item, residuals=tuple(residuals))
+        found.append(watch.take(item).unmoved)
+    return found
+
+
+def test_a_wheel_that_works_hard_and_shows_no_motion_is_known_in_two_ticks() -> None:
+    assert unmoved(spun=0.0) == [None] * 6 + [1] * 14
+    assert set(unmoved(spun=0.5)) == {None}  # it turns
+    assert set(unmoved(spun=0.0, expected=0.9)) == {None}  # it need hardly turn
+    # It may turn by what is not seen: 0.02 rad in a tick of 50 ms are 0.4 rad/s.
+    assert set(unmoved(spun=0.0, quantum=0.02)) == {None}
+    assert 1 in unmoved(spun=0.0, quantum=0.019)
+
+
+def test_of_a_wheel_that_shows_no_motion_the_encoder_or_a_stuck_axle_is_left() -> None:
+    item = frame(0, np.full(3, 5.0), np.zeros(3), np.full(3, 4.0))
+    said = said_by_forces(item, Contacts(0.9, 1, 1))
+    left = [ENCODERS.start + 1, DRAGS.start + 1, OTHER]
+    assert not said[left].any()
+    assert np.delete(said, left) == pytest.approx(-24.0)
 
 
 def test_a_robot_that_slides_is_named_though_it_looks_like_a_load() -> None:

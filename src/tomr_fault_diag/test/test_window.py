@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attrs import evolve
+from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.belief import (
     CONTROLS,
@@ -27,6 +28,7 @@ from tomr_fault_diag.classifier.belief import (
     named_of,
     of_states,
 )
+from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.features import (
     BLIND,
     CHANNELS,
@@ -664,6 +666,29 @@ def test_who_turns_a_wheel_that_should_stand_is_no_fault_of_its_motor(kind: slic
 
     assert leading(Unseen()).wheel == 1
     assert leading(Unseen(moved=(1,))).wheel == 2
+    # Others that drive pull along a wheel without its signal, and no other.
+    pulled = leading(Unseen(moved=(1,), driven=True)).wheel
+    assert pulled == (1 if kind is CONTROLS else 2)
+
+
+def test_what_a_push_leaves_is_slip_only_where_forces_show_one() -> None:
+    network = Saying()
+    network.likelihoods[:] = -30.0
+    judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]
+
+    def said(ticks: int, first: int, contacts: Contacts = NOTHING) -> NDArray[np.float64]:
+        for tick in range(first, first + ticks):
+            judge.judge(frame(tick), 50 * MS, Unseen(), contacts)
+        newest = judge._recent[-1]
+        return newest - newest[NORMAL]
+
+    network.likelihoods[[NORMAL, EXTERNAL]] = -20.0, 0.0
+    said(20, 0)
+    network.likelihoods[[NORMAL, EXTERNAL, SLIP]] = 0.0, -20.0, 5.0
+    # It is over by belief after some ticks, and shows for 12 more.
+    assert said(5, 20)[SLIP] == pytest.approx(5.0 + 4.0 - 2.0)
+    assert said(1, 25, Contacts(0.9))[SLIP] == pytest.approx(9.0 + 3.0 * math.log(9.0))
+    assert said(30, 26)[SLIP] == pytest.approx(9.0)
 
 
 def test_a_robot_that_stands_says_the_same_again_and_again() -> None:

@@ -20,15 +20,19 @@ Array = NDArray[np.float64]
 _MORE = 1.0  # N/kg: as much as somebody who leans on the robot
 _ALONE = 0.4  # of the largest force that another wheel may bear
 _LONGER = to_ns(0.2)  # than a shove takes
+_ASKED = 1.0  # rad/s, of a wheel that should turn
+_STILL = 0.05  # of that speed: what turns slower stands
+_STOPPED = to_ns(0.05)  # a wheel that a push turns back stands for no two ticks
 
 
 @frozen
 class Contacts:
-    """How likely a wheel slides (NaN: not known), and the wheel 0..2 that alone bears more, and for
-    longer, than any push from outside."""
+    """How likely a wheel slides (NaN: not known), the wheel 0..2 that alone bears more, and for
+    longer, than any push from outside, and the one that does so and shows no motion at all."""
 
     slides: float = math.nan
     lone: int | None = None
+    unmoved: int | None = None
 
 
 NOTHING = Contacts()  # is known
@@ -37,20 +41,34 @@ NOTHING = Contacts()  # is known
 class LoneWheelWatch:
     """Follows what each wheel bears beyond what its encoder explains, tick by tick."""
 
-    def __init__(self) -> None:
+    def __init__(self, quantum: float = 0.0) -> None:
+        """`quantum` of the speeds [rad/s]: less than it is not seen to turn."""
+        self._quantum = quantum
         self.clear()
 
     def clear(self) -> None:
         """Forget all."""
         self._wheel: int | None = None
-        self._since = 0  # ns
+        self._since = 0  # ns, when it began to bear a force alone ...
+        self._unmoved_since: int | None = None  # ... and to stand, in all ticks since
 
-    def take(self, tick: Tick) -> int | None:
-        """The wheel that has long borne a force alone."""
-        wheel = _alone(tick)
+    def take(self, tick: Tick, slides: float = math.nan) -> Contacts:
+        """The wheel that has long borne a force alone, beside how likely one slides."""
+        wheel, now = _alone(tick), tick.stamp_ns
         if wheel is None or wheel != self._wheel:
-            self._wheel, self._since = wheel, tick.stamp_ns
-        return wheel if tick.stamp_ns - self._since >= _LONGER else None
+            self._wheel, self._since, self._unmoved_since = wheel, now, None
+        if wheel is None or not self._stands(tick, wheel):
+            self._unmoved_since = None
+        elif self._unmoved_since is None:
+            self._unmoved_since = now
+        stopped = self._unmoved_since is not None and now - self._unmoved_since >= _STOPPED
+        is_lone = stopped or now - self._since >= _LONGER
+        return Contacts(slides, wheel if is_lone else None, wheel if stopped else None)
+
+    def _stands(self, tick: Tick, wheel: int) -> bool:
+        """Whether a wheel shows no motion where it should turn plainly."""
+        expected, speed = abs(float(tick.expected[wheel])), abs(float(tick.speed[wheel]))
+        return expected > _ASKED and speed + self._quantum < _STILL * expected
 
 
 def _alone(tick: Tick) -> int | None:

@@ -20,7 +20,6 @@ from tomr_fault_diag.classifier.belief import (
     ENCODERS,
     ENDED,
     EXTERNAL,
-    HYPOTHESES,
     LOADED,
     METERS,
     OTHER,
@@ -31,8 +30,8 @@ from tomr_fault_diag.classifier.belief import (
     of_states,
 )
 from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
+from tomr_fault_diag.classifier.evidence import astray, said_by_forces, said_by_gyro
 from tomr_fault_diag.classifier.features import CHANNELS, WINDOW, channels_of, turning
-from tomr_fault_diag.classifier.misfit import is_far
 from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
@@ -48,7 +47,7 @@ from tomr_fault_diag.classifier.states import (
     State,
 )
 from tomr_fault_diag.classifier.window_network import WindowNetwork
-from tomr_fault_diag.residuals.frame import INPUT_ORDERS, SPEEDS, ResidualFrame
+from tomr_fault_diag.residuals.frame import INPUT_ORDERS, ResidualFrame
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import WHEELS
 
@@ -77,11 +76,10 @@ _SLIP_MARGIN = 4.0  # that slip need be less striking: a short one shows in few 
 # it would say it again and again.
 _CREEPING = (DRAGS, WEAKS, METERS)
 _SLIGHT = 1.0
-# What a gyro says for slip in a tick: so much for each band beyond the first, so much at most, as
-# forces do.
-_PER_BAND, _MOST_SAID = 8.0, 10.0
-_MISCOUNTS = 0.7  # of what forces say for slip: for an encoder that loses counts
+_SHAKEN = 12  # ticks after a push in which what it leaves looks like slip to the network, ...
+_SHAKES = 2.0  # which then says so much less where neither forces nor a gyro show one
 _HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
+_FIRM = _HIDDEN[1:]  # faults that hold a wheel: one without its signal goes where others pull it
 _OF_A_WHEEL = (*_HIDDEN, METERS)
 
 
@@ -150,6 +148,7 @@ class WindowJudge:
         self._best = NORMAL
         self._accused, self._led = _GROUPS[0], 0  # what was last, and for how many ticks
         self._calm = 0  # ticks since
+        self._shaken = 0  # ticks in which a push still shows
         self._belief.clear()
 
     def interrupt(self) -> None:
@@ -166,7 +165,7 @@ class WindowJudge:
         count = 1 if self._slot is None else slot - self._slot
         self._slot = slot
         for _ in range(count):
-            said = _said_by_gyro(frame) + _said_by_forces(frame, contacts)
+            said = said_by_gyro(frame) + said_by_forces(frame, contacts)
             self._opinion = self._step(frame, unseen, said)
         return self._opinion
 
@@ -186,8 +185,9 @@ class WindowJudge:
             faults = [kind.start + idle for kind in _HIDDEN]
             likelihoods[faults] = np.maximum(likelihoods[faults], likelihoods[NORMAL])
         for moved in unseen.moved:  # no fault turns a wheel that stands: somebody pushes
-            likelihoods[[kind.start + moved for kind in _HIDDEN]] = likelihoods[NORMAL]
-        meters = [METERS.start + number for number in _astray(frame)]
+            kinds = _FIRM if unseen.driven else _HIDDEN
+            likelihoods[[kind.start + moved for kind in kinds]] = likelihoods[NORMAL]
+        meters = [METERS.start + number for number in astray(frame)]
         # No power sensor makes a wheel turn otherwise.
         likelihoods[meters] = np.minimum(likelihoods[meters], likelihoods[NORMAL])
         if unseen.everything:  # a robot that stands says the same again and again
@@ -197,8 +197,11 @@ class WindowJudge:
             over = likelihoods[kind] - likelihoods[NORMAL]
             plain = np.sign(over) * np.maximum(np.abs(over) - _SLIGHT, 0.0)
             likelihoods[kind] = likelihoods[NORMAL] + plain
+        if self._shaken and said[SLIP] <= 0.0:
+            likelihoods[SLIP] -= _SHAKES
         likelihoods = of_states(likelihoods + said)
         shares = self._belief.update(likelihoods)
+        self._shaken = _SHAKEN if shares[EXTERNAL] > 0.5 else max(self._shaken - 1, 0)
         striking = _ratios(likelihoods)
         striking[ENCODERS] -= said[ENCODERS]  # which alone accuses no encoder
         self._recent.append(striking)
@@ -263,46 +266,6 @@ def _ratios(likelihoods: Array) -> Array:
         ratios[kind] -= max(likelihoods[EXTERNAL] - likelihoods[NORMAL], 0.0)
     ratios[SLIP] += _SLIP_MARGIN
     return np.asarray(ratios)
-
-
-def _astray(frame: ResidualFrame) -> list[int]:
-    """Wheels whose speeds are far out of their bands."""
-    return [wheel for wheel, index in enumerate(SPEEDS) if is_far(frame.residuals[index])]
-
-
-def _said_by_gyro(frame: ResidualFrame) -> Array:
-    """Log-likelihoods (19,) of the body's yaw rate over those if all wheels roll as they show.
-
-    Slip makes it another one, and need not; so does an encoder that shows too little, by turning
-    the body on as its wheel does. 0 within the band, without a gyro, and where an encoder shows
-    what it should not: then it is the encoders that are in doubt.
-    """
-    said, yaw = np.zeros(HYPOTHESES), frame.yaw
-    beyond = abs(yaw.residual) / yaw.band - 1.0
-    if not beyond > 0.0 or _astray(frame):  # nor where it is NaN
-        return said
-    said[[SLIP, OTHER]] = min(_PER_BAND * beyond, _MOST_SAID)
-    for wheel, index in enumerate(SPEEDS):
-        # A wheel that turns forwards turns the body clockwise (ros2_controllers' omni wheels).
-        if frame.residuals[index].modelled * yaw.residual < 0.0:
-            said[ENCODERS.start + wheel] = said[SLIP]
-    return said
-
-
-def _said_by_forces(frame: ResidualFrame, contacts: Contacts) -> Array:
-    """Log-likelihoods (19,) of what the contacts hand on over those if all wheels roll as they
-    show, and none is pushed: 0 up to even odds of a slide. An encoder that shows too little looks
-    much like one. What one wheel bears alone is no force on the body.
-
-    Of a slide nothing where an encoder shows what it should not: then the motion is in doubt.
-    """
-    said, slides = np.zeros(HYPOTHESES), contacts.slides
-    if slides > 0.5 and not _astray(frame):  # nor where it is NaN
-        said[SLIP] = _MOST_SAID * (2.0 * slides - 1.0)
-        said[ENCODERS] = _MISCOUNTS * said[SLIP]
-    if contacts.lone is not None:
-        said[EXTERNAL] = -_MOST_SAID
-    return said
 
 
 def _stands(window: Array, wheel: int) -> bool:

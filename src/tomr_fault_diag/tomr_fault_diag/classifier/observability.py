@@ -25,7 +25,8 @@ class Unseen:
 
     wheels: tuple[int, ...] = ()
     slip: bool = False
-    moved: tuple[int, ...] = ()  # wheels that turned lately though nothing asked them to
+    moved: tuple[int, ...] = ()  # wheels that stood, and turned lately though nothing asked them to
+    driven: bool = False  # some wheel was asked to turn lately
     blind: tuple[tuple[int, str], ...] = ()  # wheels without power of their own, and why
 
     @property
@@ -42,7 +43,8 @@ class Unseen:
         return (*motors, "slip") if self.slip else motors
 
 
-# Stamp [ns], speeds expected [rad/s], which wheels are commanded to turn, which may turn, which do.
+# Stamp [ns], speeds expected [rad/s], which wheels are commanded to turn, which may turn, and which
+# turn that have stood since.
 _Flags = tuple[bool, ...]
 _Tick = tuple[int, tuple[float, ...], _Flags, _Flags, _Flags]
 
@@ -58,6 +60,7 @@ class MotionWatch:
         """Forget the motion."""
         self._ticks.clear()
         self._since: int | None = None  # ns
+        self._stood = [True] * _WHEELS  # since they were last asked to turn, or ever
 
     def take(self, frame: ResidualFrame) -> Unseen:
         """Take the newest tick; returns what the last ticks could not show."""
@@ -65,8 +68,15 @@ class MotionWatch:
         expected = tuple([speed.modelled for speed in speeds])
         now, asked = frame.stamp_ns, tuple([_is_asked_to_turn(speed) for speed in speeds])
         may_turn = tuple([_may_turn(speed) for speed in speeds])
-        turns = tuple([_turns(speed) for speed in speeds])
-        self._ticks.append((now, expected, asked, may_turn, turns))
+        # One that goes on as it was asked to, as without its signal, is moved by nobody.
+        moves = tuple(
+            [stood and _turns(speed) for stood, speed in zip(self._stood, speeds, strict=True)]
+        )
+        self._stood = [
+            not on and (stood or not may)
+            for on, stood, may in zip(asked, self._stood, may_turn, strict=True)
+        ]
+        self._ticks.append((now, expected, asked, may_turn, moves))
         while self._ticks[0][0] <= now - _LATELY:
             self._ticks.popleft()
         if self._since is None:
@@ -74,7 +84,7 @@ class MotionWatch:
         if now - self._since < _LEAST:
             return Unseen()
         _, every_expected, *flags = zip(*self._ticks, strict=True)
-        asked, may_turn, turns = map(_ever, flags)
+        asked, may_turn, moves = map(_ever, flags)
         steady = all(
             max(wheel) - min(wheel) < _SPEEDING for wheel in zip(*every_expected, strict=True)
         )
@@ -82,7 +92,8 @@ class MotionWatch:
         return Unseen(
             wheels=tuple([wheel for wheel in idle if not may_turn[wheel]]),
             slip=steady,
-            moved=tuple([wheel for wheel in idle if turns[wheel]]),
+            moved=tuple([wheel for wheel in idle if moves[wheel]]),
+            driven=len(idle) < _WHEELS,
         )
 
 

@@ -49,7 +49,9 @@ class SlideWatch:
         self._drag = robot.everywhere("contact.roller_drag", "coefficient")[0]
         settings = ParticleSettings(shoved=_SHOVED)
         self._particles = Particles(self._body, dry, self._drag, settings)
-        self._lone = LoneWheelWatch()
+        sensors = robot.sensors
+        quantum = sensors.encoder_resolution * NANOSECONDS / _SLOT
+        self._lone = LoneWheelWatch(max(quantum, sensors.velocity_resolution))
         self._noise = self._motors.noise(robot)
         # Magnitudes of currents do not show which way a contact pushes.
         self._is_able = robot.measurement.signed
@@ -110,8 +112,7 @@ class SlideWatch:
                 std = max(yaw.band / BAND_SIGMAS, _LEAST_YAW)
                 self._particles.turns(yaw.modelled + yaw.residual, std)
             self._particles.step((tick.stamp_ns - last.stamp_ns) / NANOSECONDS, rims)
-            slides = self._particles.slides(rims).any_probability
-            return Contacts(slides, self._lone.take(tick))
+            return self._lone.take(tick, self._particles.slides(rims).any_probability)
 
     def _weigh(self, tick: Tick, rims: Array) -> None:
         """Hand on what the powers show of the contacts."""

@@ -1,0 +1,72 @@
+"""What a gyro and the forces of the contacts say of a tick, beside what the network makes of it.
+
+Log-likelihoods (19,) of its hypotheses over those if all wheels roll as they show, and nobody
+pushes.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomr_fault_diag.classifier.belief import DRAGS, ENCODERS, EXTERNAL, HYPOTHESES, OTHER
+from tomr_fault_diag.classifier.contacts import Contacts
+from tomr_fault_diag.classifier.misfit import is_far
+from tomr_fault_diag.classifier.states import SLIP
+from tomr_fault_diag.residuals.frame import SPEEDS, ResidualFrame
+
+Array = NDArray[np.float64]
+
+_PER_BAND = 8.0  # that a gyro says for slip, for each band beyond the first
+_PER_ODDS = 3.0  # times the log odds of a slide, that forces say for it
+_MOST = 10.0  # that either says in a tick
+_LEAST_DOUBT = 1e-6  # of a slide
+_MISCOUNTS = 0.7  # of what forces say for slip: for an encoder that loses counts
+_CERTAIN = 24.0  # against all that leaves a wheel turning
+
+
+def astray(frame: ResidualFrame) -> list[int]:
+    """Wheels whose speeds are far out of their bands."""
+    return [wheel for wheel, index in enumerate(SPEEDS) if is_far(frame.residuals[index])]
+
+
+def said_by_gyro(frame: ResidualFrame) -> Array:
+    """Of the body's yaw rate; 0 within the band, and without a gyro.
+
+    Slip makes it another one, and need not; so does an encoder that shows too little, by turning
+    the body on as its wheel does. Where an encoder shows what it should not the others are not in
+    doubt: a wheel that is slow in truth turns the body as it shows.
+    """
+    said, yaw = np.zeros(HYPOTHESES), frame.yaw
+    beyond = abs(yaw.residual) / yaw.band - 1.0
+    if not beyond > 0.0:  # nor where it is NaN
+        return said
+    most, doubted = min(_PER_BAND * beyond, _MOST), astray(frame)
+    if not doubted:
+        said[[SLIP, OTHER]] = most
+    for wheel in doubted or range(len(SPEEDS)):
+        # A wheel that turns forwards turns the body clockwise (ros2_controllers' omni wheels).
+        if frame.residuals[SPEEDS[wheel]].modelled * yaw.residual < 0.0:
+            said[ENCODERS.start + wheel] = most
+    return said
+
+
+def said_by_forces(frame: ResidualFrame, contacts: Contacts) -> Array:
+    """Of what the contacts hand on: 0 up to even odds of a slide.
+
+    An encoder that shows too little looks much like one. What one wheel bears alone is no force on
+    the body, and what also shows no motion has lost its encoder, or is stuck. Of a slide nothing
+    where an encoder shows what it should not: then the motion is in doubt.
+    """
+    said, slides = np.zeros(HYPOTHESES), contacts.slides
+    if slides > 0.5 and not astray(frame):  # nor where it is NaN
+        odds = slides / max(1.0 - slides, _LEAST_DOUBT)
+        said[SLIP] = min(_PER_ODDS * math.log(odds), _MOST)
+        said[ENCODERS] = _MISCOUNTS * said[SLIP]
+    if contacts.lone is not None:
+        said[EXTERNAL] = -_MOST
+    if contacts.unmoved is not None:
+        said[:] = -_CERTAIN
+        said[[kind.start + contacts.unmoved for kind in (ENCODERS, DRAGS)]] = 0.0
+        said[OTHER] = 0.0
+    return said
