@@ -90,10 +90,10 @@ def test_fewer_peaks_make_it_more_careful() -> None:
     assert 1.0 < spread[0] < spread[1]
 
 
-def test_without_evidence_the_level_is_the_shipped_one_less_the_bound() -> None:
+def test_without_evidence_the_level_is_the_shipped_one() -> None:
     tail = Tail.of("driving", [0.0] * 50, 360.0, CHOICE)
     level = alarm_level([tail], 0.05, 11.0, CHOICE)
-    assert level.caution == 11.0 - CHOICE.below_shipped
+    assert level.caution == 11.0
     assert level.expected == 0.0
 
 

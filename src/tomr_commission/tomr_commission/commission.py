@@ -57,6 +57,7 @@ _CURRENTS = (
     "shipped one at least, and how many false alarms shoves raise is not known"
 )
 _MORE = 1.1  # of the least that is held out: ends of recordings are not compared
+_TO_BE = "to be"  # commissioned: it is judged as it will be
 _HOPELESS = 1.5  # times the caution that may be needed: more shoves will not bring it down
 
 
@@ -248,7 +249,8 @@ class _Work:
         """Settings of the classifier as the description has them."""
         given = read_node_sections(self.source(described), (CLASSIFIER,))
         settings = DiagnosisSettings.of(given, self.request.robot).classifier
-        return evolve(settings, classifier="window", caution=ClassifierSettings().caution)
+        caution = ClassifierSettings().caution
+        return evolve(settings, classifier="window", caution=caution, commissioned=_TO_BE)
 
     def tuned(
         self,
@@ -363,9 +365,7 @@ def _level(request: CommissionRequest, real: _Real, shoved: Shoved, plan: Rehear
         Tail.of("simulated shoves", shoved.peaks, plan.shoves_per_hour, request.alarm),
     )
     shipped = ClassifierSettings().caution
-    # Some minutes of driving alone are no reason to be less careful.
-    alarm = request.alarm if shoved.peaks else evolve(request.alarm, below_shipped=0.0)
-    return alarm_level(tails, request.false_alarms_per_hour, shipped, alarm)
+    return alarm_level(tails, request.false_alarms_per_hour, shipped, request.alarm)
 
 
 def _text(

@@ -31,7 +31,6 @@ class AlarmChoice:
     kept: float = 0.25  # share of the blocks, those with the highest peaks, that make the tail
     least_peaks: int = 8  # in the tail
     confidence: float = 0.8  # that the rate is as low as wanted
-    below_shipped: float = 3.0  # decades that the level may lie under the shipped one, at most
 
 
 @frozen

@@ -691,6 +691,22 @@ def test_what_a_push_leaves_is_slip_only_where_forces_show_one() -> None:
     assert said(30, 26)[SLIP] == pytest.approx(9.0)
 
 
+def test_within_bands_of_its_own_a_robot_hardly_slips() -> None:
+    network = Saying()
+    network.likelihoods[SLIP] = 5.0
+
+    def said(commissioned: str, contacts: Contacts) -> float:
+        settings = ClassifierSettings(commissioned=commissioned)
+        judge = WindowJudge(network, settings)  # type: ignore[arg-type]
+        for tick in range(20):
+            judge.judge(frame(tick), 50 * MS, Unseen(), contacts)
+        return float(judge._recent[-1][SLIP] - judge._recent[-1][NORMAL])
+
+    calm = Contacts(0.0, calm=True)
+    assert said("2026-01-01", NOTHING) == pytest.approx(said("2026-01-01", calm) + 2.0)
+    assert said("2026-01-01", Contacts(0.0)) == said("", calm) == said("", NOTHING)
+
+
 def test_a_robot_that_stands_says_the_same_again_and_again() -> None:
     """Only what strikes counts there; slight evidence for a fault, or against it, does not."""
     settings = ClassifierSettings()

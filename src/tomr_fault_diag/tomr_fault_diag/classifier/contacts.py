@@ -27,12 +27,17 @@ _STOPPED = to_ns(0.05)  # a wheel that a push turns back stands for no two ticks
 
 @frozen
 class Contacts:
-    """How likely a wheel slides (NaN: not known), the wheel 0..2 that alone bears more, and for
-    longer, than any push from outside, and the one that does so and shows no motion at all."""
+    """What is known of the contacts.
+
+    `slides`: how likely a wheel does, NaN where that is not known; `lone`: the wheel 0..2 that
+    alone bears more, and for longer, than any push from outside; `unmoved`: the one that does so
+    and shows no motion at all; `calm`: for long nothing has left its band that a slide would move.
+    """
 
     slides: float = math.nan
     lone: int | None = None
     unmoved: int | None = None
+    calm: bool = False
 
 
 NOTHING = Contacts()  # is known

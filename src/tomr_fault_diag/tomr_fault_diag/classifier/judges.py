@@ -76,8 +76,10 @@ _SLIP_MARGIN = 4.0  # that slip need be less striking: a short one shows in few 
 # it would say it again and again.
 _CREEPING = (DRAGS, WEAKS, METERS)
 _SLIGHT = 1.0
-_SHAKEN = 12  # ticks after a push in which what it leaves looks like slip to the network, ...
-_SHAKES = 2.0  # which then says so much less where neither forces nor a gyro show one
+# What a push leaves for so many ticks looks like slip to the network, and so do small residuals
+# within bands that are the robot's own: it says so much less where neither forces nor a gyro show
+# one.
+_SHAKEN, _DOUBTED = 12, 2.0
 _HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
 _FIRM = _HIDDEN[1:]  # faults that hold a wheel: one without its signal goes where others pull it
 _OF_A_WHEEL = (*_HIDDEN, METERS)
@@ -164,13 +166,15 @@ class WindowJudge:
         slot = frame.stamp_ns // _TICK
         count = 1 if self._slot is None else slot - self._slot
         self._slot = slot
+        said = said_by_gyro(frame) + said_by_forces(frame, contacts)
+        is_calm = contacts.calm and bool(self.settings.commissioned)
         for _ in range(count):
-            said = said_by_gyro(frame) + said_by_forces(frame, contacts)
-            self._opinion = self._step(frame, unseen, said)
+            self._opinion = self._step(frame, unseen, said, is_calm)
         return self._opinion
 
-    def _step(self, frame: ResidualFrame, unseen: Unseen, said: Array) -> Opinion:
-        """Opinion after one more tick of the network; `said`: of its hypotheses besides."""
+    def _step(self, frame: ResidualFrame, unseen: Unseen, said: Array, is_calm: bool) -> Opinion:
+        """Opinion after one more tick of the network; `said`: of its hypotheses besides;
+        `is_calm`: all lies within bands that are the robot's own."""
         self._window[:-1] = self._window[1:]
         self._window[-1] = channels_of(frame)
         self._lacking = max(self._lacking - 1, 0)
@@ -197,8 +201,8 @@ class WindowJudge:
             over = likelihoods[kind] - likelihoods[NORMAL]
             plain = np.sign(over) * np.maximum(np.abs(over) - _SLIGHT, 0.0)
             likelihoods[kind] = likelihoods[NORMAL] + plain
-        if self._shaken and said[SLIP] <= 0.0:
-            likelihoods[SLIP] -= _SHAKES
+        if (self._shaken or is_calm) and said[SLIP] <= 0.0:
+            likelihoods[SLIP] -= _DOUBTED
         likelihoods = of_states(likelihoods + said)
         shares = self._belief.update(likelihoods)
         self._shaken = _SHAKEN if shares[EXTERNAL] > 0.5 else max(self._shaken - 1, 0)

@@ -66,7 +66,7 @@ class SlideWatch:
     def _rest(self) -> None:
         self._awake_until = 0  # ns
         self._last: Tick | None = None
-        self._found = Contacts(0.0)
+        self._found = Contacts(0.0, calm=True)
         self._lone.clear()
 
     def take(self, frame: ResidualFrame) -> Contacts:
