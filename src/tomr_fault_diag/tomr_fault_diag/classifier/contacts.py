@@ -67,7 +67,7 @@ class LoneWheelWatch:
         elif self._unmoved_since is None:
             self._unmoved_since = now
         stopped = self._unmoved_since is not None and now - self._unmoved_since >= _STOPPED
-        is_lone = stopped or now - self._since >= _LONGER
+        is_lone = now - self._since >= _LONGER
         return Contacts(slides, wheel if is_lone else None, wheel if stopped else None)
 
     def _stands(self, tick: Tick, wheel: int) -> bool:
