@@ -3,17 +3,25 @@
 import sys
 from collections import Counter
 from pathlib import Path
+from unittest.mock import Mock, patch
 
 import numpy as np
 import pytest
 
 sys.path.append(str(Path(__file__).resolve().parent.parent / "bench"))
 
-from extended import KINDS, Fleet, faulty_drive, pushed_drive, spans, targets
+from commissioned import made
+from diagnosis import Kind as Diagnosed
+from extended import KINDS, Fleet, faulty_drive, pushed_drive, said_of, spans, targets
 
+from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.diagnosis.score import Case, Seen
+from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
+from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.errors import InputError
+from tomr_power_model.robot import load_robot
 from tomr_sim_bridge.faults import natures
+from tomr_training.simulated_drive import START_NS
 
 
 def test_every_fault_beyond_the_papers_is_drawn() -> None:
@@ -45,6 +53,34 @@ def test_a_fleet_is_the_robots_of_a_folder(tmp_path: Path) -> None:
     ]
     with pytest.raises(InputError, match="no robot_"):
         Fleet.of(tmp_path / "robot_0")
+
+
+def test_a_commissioned_robot_drives_as_it_is_and_is_judged_as_commissioned(tmp_path: Path) -> None:
+    described = {}
+    for number, caution in ((4, 12.5), (5, 13.5)):
+        folder = tmp_path / f"robot_{number}"
+        text = made(number, folder).described.read_text()
+        described[number] = load_robot(folder / "robot.yaml")
+        (folder / "commissioned").mkdir()
+        section = f"fault_classifier:\n  ros__parameters: {{caution: {caution}}}\n"
+        (folder / "commissioned" / "commissioned.yaml").write_text(text + section)
+    fleet = Fleet.of(tmp_path)
+    for seed, number, caution in ((6, 4, 12.5), (7, 5, 13.5)):
+        assert fleet.kind(seed).settings.caution == caution
+        drive = fleet.drive(seed)
+        assert drive.believed == described[number]
+        assert drive.plant == made(number, tmp_path / f"robot_{number}").real
+
+
+def test_residuals_are_judged_in_the_bands_of_the_robot() -> None:
+    power, speed = Residual(0.0, 2.0, 4.0), Residual(0.0, 0.2, 5.0, "rad/s")
+    frame = ResidualFrame(START_NS, (*[power] * 4, *[speed] * 3, *[power] * 3))
+    seen = Mock(side_effect=lambda frame: None)
+    labelled = Mock(frames=(frame,))
+    with patch("extended.FaultClassifier.of", return_value=Mock(classify=seen)):
+        said_of(Diagnosed(ClassifierSettings(), BandSettings(power=9.0)), Mock(), labelled)
+    ((judged,),) = (call.args for call in seen.call_args_list)
+    assert [item.band for item in judged.residuals[:4]] == [9.0] * 4
 
 
 def test_pushes_follow_one_another_within_what_is_no_fault() -> None:

@@ -5,7 +5,6 @@ from pathlib import Path
 from unittest.mock import Mock, patch
 
 import numpy as np
-from attrs import evolve
 
 from tomr_commission.commission import _Work
 from tomr_commission.observed import Observed
@@ -15,11 +14,19 @@ from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.settings import BandSettings
 
 
+def work_on(request: CommissionRequest) -> _Work:
+    return _Work(request, lambda stage, part: None, Mock(), "", Mock(), (), ())
+
+
+def test_healthy_driving_is_judged_as_once_commissioned() -> None:
+    settings = work_on(CommissionRequest("reference", (), Path())).classifier(None)
+    assert settings.commissioned
+    assert settings.caution == ClassifierSettings().caution
+
+
 def test_bands_widen_until_shoves_pass(steady: Callable[..., Observed]) -> None:
     request = CommissionRequest("reference", (), Path())
-    work = evolve(
-        _Work(request, lambda stage, part: None, Mock(), "", Mock(), (), ()), request=request
-    )
+    work = work_on(request)
     narrow = np.random.default_rng(1).exponential(9.0, 300)  # decades
 
     def rehearsed(

@@ -163,7 +163,7 @@ def alarm_level(
     needed = 0.0
     if excess(0.0) > 0.0:
         needed = highest if excess(highest) > 0.0 else float(brentq(excess, 0.0, highest))
-    # Simulated robots equal their description, and no real one does: its peaks are higher.
+    # Simulated robots hardly differ from their description; peaks of real ones are higher.
     caution = min(max(needed, shipped), MOST_CAUTION)
     caution = math.ceil(10.0 * caution) / 10.0
     low, high = np.quantile(drawn(caution), (0.025, 0.975))

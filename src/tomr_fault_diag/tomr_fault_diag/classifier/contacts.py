@@ -30,8 +30,9 @@ class Contacts:
     """What is known of the contacts.
 
     `slides`: how likely a wheel does, NaN where that is not known; `lone`: the wheel 0..2 that
-    alone bears more, and for longer, than any push from outside; `unmoved`: the one that does so
-    and shows no motion at all; `calm`: for long nothing has left its band that a slide would move.
+    alone bears more, and for longer, than any push from outside; `unmoved`: the one that alone
+    bears more and shows no motion in two ticks; `calm`: for long nothing has left its band that a
+    slide would move.
     """
 
     slides: float = math.nan
@@ -46,7 +47,7 @@ NOTHING = Contacts()  # is known
 class LoneWheelWatch:
     """Follows what each wheel bears beyond what its encoder explains, tick by tick."""
 
-    def __init__(self, quantum: float = 0.0) -> None:
+    def __init__(self, quantum: float) -> None:
         """`quantum` of the speeds [rad/s]: less than it is not seen to turn."""
         self._quantum = quantum
         self.clear()
@@ -57,8 +58,8 @@ class LoneWheelWatch:
         self._since = 0  # ns, when it began to bear a force alone ...
         self._unmoved_since: int | None = None  # ... and to stand, in all ticks since
 
-    def take(self, tick: Tick, slides: float = math.nan) -> Contacts:
-        """The wheel that has long borne a force alone, beside how likely one slides."""
+    def take(self, tick: Tick, slides: float) -> Contacts:
+        """Which wheels bear a force alone, beside how likely one slides."""
         wheel, now = _alone(tick), tick.stamp_ns
         if wheel is None or wheel != self._wheel:
             self._wheel, self._since, self._unmoved_since = wheel, now, None
