@@ -15,7 +15,6 @@ from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
-from tomr_fault_diag.classifier.slides import SlideWatch
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import FAULTLESS
 from tomr_fault_diag.classifier.window_network import WindowNetwork
@@ -39,9 +38,14 @@ class _Witness(WindowJudge):
         self.newest = 0.0
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
+        self,
+        frame: ResidualFrame,
+        elapsed_ns: int,
+        unseen: Unseen,
+        contacts: Contacts = NOTHING,
+        lasting: Array | None = None,
     ) -> Opinion:
-        opinion = super().judge(frame, elapsed_ns, unseen, contacts)
+        opinion = super().judge(frame, elapsed_ns, unseen, contacts, lasting)
         self.newest = self.evidence()
         return opinion
 
@@ -51,7 +55,7 @@ def evidence_in(
 ) -> Array:
     """Decades of evidence for a fault at each tick, 0 where nothing could be decided, (n,)."""
     witness = _Witness(settings)
-    classifier = FaultClassifier(witness, slides=SlideWatch(robot))
+    classifier = FaultClassifier.around(witness, robot)
     found = []
     for frame in frames:
         witness.newest = 0.0
@@ -90,7 +94,7 @@ def together(said: Sequence[Decided]) -> Decided:
 
 def decisions(frames: list[ResidualFrame], settings: ClassifierSettings, robot: Robot) -> Decided:
     """Diagnose frames of a described robot with a classifier of given settings."""
-    classifier = FaultClassifier(make_judge(settings), slides=SlideWatch(robot))
+    classifier = FaultClassifier.around(make_judge(settings), robot)
     alarms: list[Episode] = []
     current: Diagnosis | None = None
     undecided = 0

@@ -6,6 +6,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from attrs import evolve
+from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier import states
 from tomr_fault_diag.classifier.advice import check_first
@@ -47,6 +48,8 @@ from tomr_fault_diag.residuals.frame import (
 from tomr_power_model.messages.plain import Level
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import shipped_robot
+
+Array = NDArray[np.float64]
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
@@ -285,7 +288,12 @@ class Fixed:
     def interrupt(self) -> None: ...
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
+        self,
+        frame: ResidualFrame,
+        elapsed_ns: int,
+        unseen: Unseen,
+        contacts: Contacts = NOTHING,
+        lasting: Array | None = None,
     ) -> Opinion:
         return Opinion(np.eye(6)[MOTOR + self.wheel], sure=True, wheel=self.wheel)
 
@@ -331,7 +339,12 @@ class Leading(Fixed):
         self.state, self.sure = state, sure
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
+        self,
+        frame: ResidualFrame,
+        elapsed_ns: int,
+        unseen: Unseen,
+        contacts: Contacts = NOTHING,
+        lasting: Array | None = None,
     ) -> Opinion:
         return Opinion(np.eye(6)[NORMAL], self.sure, state=self.state)
 
@@ -407,7 +420,12 @@ class OfWheel(Leading):
     wheel = 0
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
+        self,
+        frame: ResidualFrame,
+        elapsed_ns: int,
+        unseen: Unseen,
+        contacts: Contacts = NOTHING,
+        lasting: Array | None = None,
     ) -> Opinion:
         return evolve(super().judge(frame, elapsed_ns, unseen), wheel=self.wheel)
 

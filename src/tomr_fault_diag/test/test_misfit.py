@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from attrs import evolve
+from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.judges import Opinion
@@ -20,6 +21,8 @@ from tomr_fault_diag.classifier.states import (
 )
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_power_model.messages.plain import Level
+
+Array = NDArray[np.float64]
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
@@ -54,7 +57,12 @@ class Sure:
         pass
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
+        self,
+        frame: ResidualFrame,
+        elapsed_ns: int,
+        unseen: Unseen,
+        contacts: Contacts = NOTHING,
+        lasting: Array | None = None,
     ) -> Opinion:
         return Opinion(np.eye(6)[self.state], sure=True)
 
@@ -252,6 +260,7 @@ def test_a_fault_that_is_not_sure_is_not_named_beside_a_low_supply() -> None:
             elapsed_ns: int,
             unseen: Unseen,
             contacts: Contacts = NOTHING,
+            lasting: Array | None = None,
         ) -> Opinion:
             return evolve(super().judge(frame, elapsed_ns, unseen), sure=False)
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from attrs import evolve
+from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.judges import Opinion
@@ -37,6 +38,8 @@ from tomr_fault_diag.classifier.states import (
 )
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame, Unit
 from tomr_power_model.robot import shipped_robot
+
+Array = NDArray[np.float64]
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
@@ -434,6 +437,11 @@ class Dragging:
         pass
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
+        self,
+        frame: ResidualFrame,
+        elapsed_ns: int,
+        unseen: Unseen,
+        contacts: Contacts = NOTHING,
+        lasting: Array | None = None,
     ) -> Opinion:
         return Opinion(np.eye(6)[MOTOR + 1], sure=True, wheel=1, state=DRAGGING[1])

@@ -20,6 +20,7 @@ from tomr_fault_diag.classifier.belief import (
     ENCODERS,
     ENDED,
     EXTERNAL,
+    HYPOTHESES,
     LOADED,
     METERS,
     OTHER,
@@ -80,6 +81,7 @@ _SLIGHT = 1.0
 # within bands that are the robot's own: it says so much less where neither forces nor a gyro show
 # one.
 _SHAKEN, _DOUBTED = 12, 2.0
+_GATHERED = 12.0  # that small faults which last have shown, in place of a striking window
 _HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
 _FIRM = _HIDDEN[1:]  # faults that hold a wheel: one without its signal goes where others pull it
 _OF_A_WHEEL = (*_HIDDEN, METERS)
@@ -104,6 +106,15 @@ class Opinion:
         return self.state or NAMED[int(np.argmax(self.probabilities))]
 
 
+@frozen
+class _Beside:
+    """What is known of a tick beside what the network makes of it: log-likelihoods (19,)."""
+
+    said: Array  # by the gyro and the forces
+    is_calm: bool  # all lies within bands that are the robot's own
+    lasting: Array  # by small faults that last
+
+
 class Judge(Protocol):
     """One way to name states from residuals."""
 
@@ -118,10 +129,15 @@ class Judge(Protocol):
         ...
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
+        self,
+        frame: ResidualFrame,
+        elapsed_ns: int,
+        unseen: Unseen,
+        contacts: Contacts = NOTHING,
+        lasting: Array | None = None,
     ) -> Opinion:
-        """Look at the newest frame, so long after the one before, what it cannot show, and
-        what the forces of the contacts do."""
+        """Look at the newest frame, so long after the one before, what it cannot show, what the
+        forces of the contacts do, and what small faults that last."""
         ...
 
 
@@ -151,6 +167,7 @@ class WindowJudge:
         self._accused, self._led = _GROUPS[0], 0  # what was last, and for how many ticks
         self._calm = 0  # ticks since
         self._shaken = 0  # ticks in which a push still shows
+        self._gathered = np.zeros(HYPOTHESES)  # what small faults that last have shown
         self._belief.clear()
 
     def interrupt(self) -> None:
@@ -158,7 +175,12 @@ class WindowJudge:
         self._slot, self._lacking = None, WINDOW
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
+        self,
+        frame: ResidualFrame,
+        elapsed_ns: int,
+        unseen: Unseen,
+        contacts: Contacts = NOTHING,
+        lasting: Array | None = None,
     ) -> Opinion:
         """Look at the newest frame."""
         if elapsed_ns > _TOO_LONG:
@@ -168,18 +190,44 @@ class WindowJudge:
         self._slot = slot
         said = said_by_gyro(frame) + said_by_forces(frame, contacts)
         is_calm = contacts.calm and bool(self.settings.commissioned)
+        beside = _Beside(said, is_calm, np.zeros(HYPOTHESES) if lasting is None else lasting)
         for _ in range(count):
-            self._opinion = self._step(frame, unseen, said, is_calm)
+            self._opinion = self._step(frame, unseen, beside)
         return self._opinion
 
-    def _step(self, frame: ResidualFrame, unseen: Unseen, said: Array, is_calm: bool) -> Opinion:
-        """Opinion after one more tick of the network; `said`: of its hypotheses besides;
-        `is_calm`: all lies within bands that are the robot's own."""
+    def _step(self, frame: ResidualFrame, unseen: Unseen, beside: _Beside) -> Opinion:
+        """Opinion after one more tick of the network."""
+        said = beside.said
         self._window[:-1] = self._window[1:]
         self._window[-1] = channels_of(frame)
         self._lacking = max(self._lacking - 1, 0)
         if self._lacking:
             return self._opinion
+        likelihoods = self._seen(frame, unseen)
+        if (self._shaken or beside.is_calm) and said[SLIP] <= 0.0:
+            likelihoods[SLIP] -= _DOUBTED
+        if not self._shaken:
+            likelihoods = self._with_lasting(likelihoods, beside.lasting)
+        likelihoods = of_states(likelihoods + said)
+        shares = self._belief.update(likelihoods)
+        self._shaken = _SHAKEN if shares[EXTERNAL] > 0.5 else max(self._shaken - 1, 0)
+        striking = _ratios(likelihoods)
+        striking[ENCODERS] -= said[ENCODERS]  # which alone accuses no encoder
+        self._recent.append(striking)
+        group = max(_GROUPS, key=lambda group: float(shares[group].sum()))
+        best = self._kept(shares, group)
+        self._accuse(group)
+        state = STATE_OF[best]
+        wheel = best - CONTROLS.start if state is STATES[CONTROL] else state.wheel
+        if state in DRAGGING and _stands(self._window, best - DRAGS.start):
+            state = STUCK[best - DRAGS.start]
+        if state in _CAUSES and self._led < WINDOW and state.paper is not None:
+            state = STATES[state.paper]  # its cause shows when the window holds nothing older
+        sure = bool(shares[group].sum() > _SURE) and self._is_striking(best)
+        return Opinion(named_of(shares), sure, wheel, state)
+
+    def _seen(self, frame: ResidualFrame, unseen: Unseen) -> Array:
+        """Log-likelihoods (19,) of the window, as far as the motion shows anything."""
         likelihoods = self._network.log_likelihoods(self._window)
         blind = [kind.start + wheel for wheel, _ in unseen.blind for kind in _OF_A_WHEEL]
         if int(np.argmax(likelihoods)) in blind:
@@ -201,25 +249,14 @@ class WindowJudge:
             over = likelihoods[kind] - likelihoods[NORMAL]
             plain = np.sign(over) * np.maximum(np.abs(over) - _SLIGHT, 0.0)
             likelihoods[kind] = likelihoods[NORMAL] + plain
-        if (self._shaken or is_calm) and said[SLIP] <= 0.0:
-            likelihoods[SLIP] -= _DOUBTED
-        likelihoods = of_states(likelihoods + said)
-        shares = self._belief.update(likelihoods)
-        self._shaken = _SHAKEN if shares[EXTERNAL] > 0.5 else max(self._shaken - 1, 0)
-        striking = _ratios(likelihoods)
-        striking[ENCODERS] -= said[ENCODERS]  # which alone accuses no encoder
-        self._recent.append(striking)
-        group = max(_GROUPS, key=lambda group: float(shares[group].sum()))
-        best = self._kept(shares, group)
-        self._accuse(group)
-        state = STATE_OF[best]
-        wheel = best - CONTROLS.start if state is STATES[CONTROL] else state.wheel
-        if state in DRAGGING and _stands(self._window, best - DRAGS.start):
-            state = STUCK[best - DRAGS.start]
-        if state in _CAUSES and self._led < WINDOW and state.paper is not None:
-            state = STATES[state.paper]  # its cause shows when the window holds nothing older
-        sure = bool(shares[group].sum() > _SURE) and self._is_striking(best)
-        return Opinion(named_of(shares), sure, wheel, state)
+        return likelihoods
+
+    def _with_lasting(self, likelihoods: Array, lasting: Array) -> Array:
+        """With small faults that last: a window that does not show them says nothing against."""
+        weighed = self.settings.evidence_weight * lasting
+        self._gathered = np.maximum(self._gathered + weighed, 0.0)
+        unseen = (lasting > 0.0) & (likelihoods < likelihoods[NORMAL])
+        return np.where(unseen, likelihoods[NORMAL], likelihoods) + lasting
 
     def _accuse(self, group: list[int]) -> None:
         """Note what leads; a moment of normal in between does not make a fault a new one."""
@@ -248,7 +285,9 @@ class WindowJudge:
         return max(self.settings.caution + math.log10(odds), 0.0)
 
     def _is_striking(self, state: int) -> bool:
-        """Whether a window of the last half second spoke for a state by itself."""
+        """Whether a window of the last half second spoke for a state by itself, or many little."""
+        if state < HYPOTHESES and self._gathered[state] > _GATHERED:
+            return True
         return any(window[state] > self.settings.striking for window in self._recent)
 
     def _kept(self, shares: Array, group: list[int]) -> int:
@@ -304,7 +343,12 @@ class CodeJudge:
         self._smoothed, self._led = None, 0
 
     def judge(
-        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, contacts: Contacts = NOTHING
+        self,
+        frame: ResidualFrame,
+        elapsed_ns: int,
+        unseen: Unseen,
+        contacts: Contacts = NOTHING,
+        lasting: Array | None = None,
     ) -> Opinion:
         """Look at the newest frame."""
         now = self._answer(frame.codes)

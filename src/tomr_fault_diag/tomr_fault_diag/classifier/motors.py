@@ -32,7 +32,8 @@ class Motors:
         self.reports_signs = robot.measurement.signed
         body = Body.of(robot)
         self.to_twist = body.to_twist
-        self.to_force = np.linalg.pinv(body.from_force)  # wheel torques to the body's force
+        self.from_force = body.from_force  # the body's force to wheel torques
+        self.to_force = np.linalg.pinv(body.from_force)
         self._numbers = numbers.tolist()
         self._laws = plain(tuple(robot.physics))
         self.mass = body.mass  # kg

@@ -6,6 +6,7 @@ from attrs import evolve, field, frozen
 
 from tomr_fault_diag.classifier.contacts import NOTHING
 from tomr_fault_diag.classifier.judges import Judge, Opinion, make_judge
+from tomr_fault_diag.classifier.lasting import LastingWatch
 from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
 from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
@@ -71,10 +72,13 @@ class FaultClassifier:
         judge: Judge,
         severity: SeverityWatch | None = None,
         slides: SlideWatch | None = None,
+        lasting: LastingWatch | None = None,
     ) -> None:
         """Without `severity` it is not stated how bad a fault is, nor what has changed slowly;
-        without `slides` residuals alone show a slip."""
+        without `slides` residuals alone show a slip, without `lasting` small faults are not
+        looked for."""
         self._judge = judge
+        self._lasting = lasting
         self._severity = severity
         self._slides = slides
         self._motion = MotionWatch()
@@ -85,7 +89,13 @@ class FaultClassifier:
     @classmethod
     def of(cls, settings: ClassifierSettings, robot: Robot) -> Self:
         """With all that a described robot allows; raises InputError for weights that do not fit."""
-        return cls(make_judge(settings), SeverityWatch(robot), SlideWatch(robot))
+        return cls.around(make_judge(settings), robot, SeverityWatch(robot))
+
+    @classmethod
+    def around(cls, judge: Judge, robot: Robot, severity: SeverityWatch | None = None) -> Self:
+        """A judge, and what contacts and, of a commissioned robot, small faults show beside it."""
+        lasting = LastingWatch(robot) if judge.settings.commissioned else None
+        return cls(judge, severity, SlideWatch(robot), lasting)
 
     @property
     def settings(self) -> ClassifierSettings:
@@ -106,6 +116,8 @@ class FaultClassifier:
             self._severity.clear()
         if self._slides is not None:
             self._slides.clear()
+        if self._lasting is not None:
+            self._lasting.clear()
         self._stamp = 0
         self._opinion: Opinion | None = None
         self._unseen = Unseen()
@@ -188,7 +200,9 @@ class FaultClassifier:
             self._candidate = DISOBEYS
             self._enter(DISOBEYS, frame.stamp_ns, None)
             return
-        self._opinion = self._judge.judge(frame, elapsed, self._unseen, contacts)
+        is_well = self._state is STATES[NORMAL]
+        lasting = None if self._lasting is None else self._lasting.take(frame, is_well)
+        self._opinion = self._judge.judge(frame, elapsed, self._unseen, contacts, lasting)
         if data.enough or self._state not in _QUIET:
             self._weigh(self._opinion, misfit, frame.stamp_ns)
         else:

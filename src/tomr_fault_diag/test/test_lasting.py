@@ -1,0 +1,290 @@
+"""Small faults that last, from ticks: hand-made motions of the reference robot and their powers."""
+
+import math
+
+import numpy as np
+import pytest
+from attrs import evolve
+from numpy.typing import NDArray
+
+from tomr_fault_diag.classifier.belief import DRAGS, HYPOTHESES, METERS, WEAKS
+from tomr_fault_diag.classifier.judges import WindowJudge, make_judge
+from tomr_fault_diag.classifier.lasting import LastingWatch
+from tomr_fault_diag.classifier.motors import Motors
+from tomr_fault_diag.classifier.observability import Unseen
+from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.classifier.stage import FaultClassifier
+from tomr_fault_diag.residuals.frame import (
+    ENCODERS,
+    SPEEDS,
+    Residual,
+    ResidualFrame,
+)
+from tomr_power_model.robot import Robot, shipped_robot
+
+Array = NDArray[np.float64]
+
+ROBOT = shipped_robot("reference")
+WHEELS = Motors(ROBOT)
+BASE = 1_700_000_000_000_000_000
+TICK = 50_000_000
+BAND = 0.7  # W
+WIDE = 6.0  # W: a band that hides a fifth of a motor's power
+SECOND = 20  # ticks
+
+
+def speeds(tick: int) -> Array:
+    """Every wheel turns, now faster, now slower, and each the other way after two seconds."""
+    phase = 2.0 * math.pi * tick / (2.0 * SECOND)
+    return (8.0 + 3.0 * math.sin(phase)) * np.array([1.0, -0.8, 0.6]) * (-1.0) ** (tick // 40)
+
+
+def explained(tick: int) -> Array:
+    """Power that its motion takes: two amperes the way that a wheel turns [W]."""
+    speed = speeds(tick)
+    current = 2.0 * np.sign(speed)
+    return WHEELS.resistance * current**2 + WHEELS.constant * speed * current + WHEELS.idle
+
+
+def noise(tick: int) -> Array:
+    return 0.15 * BAND * np.random.default_rng([7, tick]).standard_normal(3)
+
+
+def frame(tick: int, off: Array, in_total: bool = True, band: float = BAND) -> ResidualFrame:
+    """A tick at which motors show so much beyond what is explained [W]."""
+    power, speed = explained(tick), speeds(tick)
+    shown = off + noise(tick)
+    total = Residual(float(off.sum()) if in_total else 0.0, 3.0 * BAND, 30.0)
+    motors = [Residual(o, band, m) for o, m in zip(shown.tolist(), power.tolist(), strict=True)]
+    turning = [Residual(0.0, 0.5, want, "rad/s") for want in speed.tolist()]
+    return ResidualFrame(BASE + TICK * tick, (total, *motors, *turning, *motors))
+
+
+def of_friction(tick: int, wheel: int, share: float) -> Array:
+    """What an axle shows that takes more, of its own friction [W]."""
+    current = 2.0 * np.sign(speeds(tick))
+    gain = speeds(tick) + 2.0 * WHEELS.resistance * current / WHEELS.constant
+    off = share * WHEELS.friction(5.0) * np.abs(gain)
+    return np.asarray(np.where(np.arange(3) == wheel, off, 0.0))
+
+
+def gathered(frames: list[ResidualFrame], robot: Robot = ROBOT, is_well: bool = True) -> Array:
+    """Evidence of all ticks together, (19,)."""
+    watch, found = LastingWatch(robot), np.zeros(HYPOTHESES)
+    for item in frames:
+        found = np.maximum(found + watch.take(item, is_well), 0.0)
+    return found
+
+
+NOTHING = np.zeros(3)
+
+
+def drag(share: float, seconds: int = 4, band: float = BAND) -> list[ResidualFrame]:
+    return [frame(t, of_friction(t, 1, share), band=band) for t in range(seconds * SECOND)]
+
+
+def test_an_axle_that_drags_a_little_is_found_at_its_wheel() -> None:
+    assert of_friction(10, 1, 0.5)[1] < 0.8 * BAND  # all the time within its band
+    found = gathered(drag(0.5))
+    assert np.argmax(found) == DRAGS.start + 1
+    assert found[DRAGS.start + 1] > 24.0
+
+
+def test_a_healthy_robot_shows_nothing() -> None:
+    assert gathered([frame(tick, NOTHING) for tick in range(60 * SECOND)]).max() < 6.0
+
+
+def test_less_than_a_fifth_of_an_axle_s_own_friction_is_no_fault() -> None:
+    narrow = 0.15 * of_friction(20, 1, 1.0)[1] / 0.4  # bands in which that would show
+    ticks = [frame(t, of_friction(t, 1, 0.15), band=narrow) for t in range(4 * SECOND)]
+    quiet = [frame(t, NOTHING, band=narrow) for t in range(4 * SECOND)]
+    assert gathered(ticks)[DRAGS].max() <= gathered(quiet)[DRAGS].max() + 6.0
+
+
+@pytest.mark.parametrize("in_total", [True, False])
+def test_the_total_power_tells_a_sensor_from_a_motor(in_total: bool) -> None:
+    ticks = [
+        frame(t, 0.2 * explained(t) * [0.0, 0.0, 1.0], in_total, WIDE) for t in range(4 * SECOND)
+    ]
+    found = gathered(ticks)
+    if in_total:
+        assert found[METERS].max() < found.max()
+        assert found[[DRAGS.start + 2, WEAKS.start + 2]].max() > 24.0
+    else:
+        assert np.argmax(found) == METERS.start + 2
+        assert found[DRAGS].max() == found[WEAKS].max() == 0.0
+
+
+def test_without_a_total_power_either_may_be() -> None:
+    ticks = drag(4.0, band=WIDE)
+    unknown = Residual(math.nan, math.nan, math.nan, "W", "not measured")
+    ticks = [evolve(t, residuals=(unknown, *t.residuals[1:])) for t in ticks]
+    found = gathered(ticks)
+    assert found[DRAGS.start + 1] > 24.0
+    assert found[METERS.start + 1] > 24.0
+
+
+def test_a_sensor_that_shows_too_little_is_none_that_drags() -> None:
+    ticks = [
+        frame(t, -0.2 * explained(t) * [0.0, 1.0, 0.0], False, WIDE) for t in range(4 * SECOND)
+    ]
+    found = gathered(ticks)
+    assert np.argmax(found) == METERS.start + 1
+    assert found[DRAGS].max() == found[WEAKS].max() == 0.0
+
+
+def test_what_all_wheels_show_is_no_fault_of_one() -> None:
+    carpet = [
+        frame(t, sum((of_friction(t, w, 1.5) for w in range(3)), NOTHING))
+        for t in range(4 * SECOND)
+    ]
+    assert gathered(carpet).max() < 6.0
+
+
+def test_a_force_on_the_body_is_no_fault_of_a_wheel() -> None:
+    """Ahead, 0.3 N/kg, for as long as the robot drives."""
+    torque = WHEELS.from_force @ np.array([0.3 * WHEELS.mass, 0.0, 0.0])
+
+    def off(tick: int) -> Array:
+        current = 2.0 * np.sign(speeds(tick))
+        return (speeds(tick) + 2.0 * WHEELS.resistance * current / WHEELS.constant) * torque
+
+    ticks = [frame(tick, off(tick)) for tick in range(4 * SECOND)]
+    assert np.abs(off(20)).max() > 0.3 * BAND  # it shows
+    assert gathered(ticks).max() < 6.0
+
+
+def test_what_comes_within_minutes_is_no_fault() -> None:
+    """To where it would be one in seconds."""
+    off = 0.3 * BAND / of_friction(20, 1, 1.0)[1]
+    length = 300 * SECOND
+    slow = [frame(t, of_friction(t, 1, off * t / length)) for t in range(length)]
+    assert gathered(slow).max() < 12.0
+    at_once = [frame(length + t, of_friction(t, 1, 3.0 * off)) for t in range(4 * SECOND)]
+    assert gathered([*slow, *at_once])[DRAGS.start + 1] > 24.0
+
+
+def test_nothing_is_learnt_of_a_robot_that_is_not_well() -> None:
+    off = 0.3 * BAND / of_friction(20, 1, 1.0)[1]
+    length = 60 * SECOND
+    later = [frame(t, of_friction(t, 1, off)) for t in range(length)]
+    last = later[-4 * SECOND :]
+    watches = [LastingWatch(ROBOT), LastingWatch(ROBOT)]
+    for item in later[: -4 * SECOND]:
+        for watch, is_well in zip(watches, (True, False), strict=True):
+            watch.take(item, is_well)
+    used_to, remembered = (
+        sum(float(watch.take(item, False)[DRAGS.start + 1]) for item in last) for watch in watches
+    )
+    assert used_to < 0.5 * remembered
+
+
+def test_wheels_that_turn_otherwise_than_they_should_say_nothing_for_a_while() -> None:
+    ticks = drag(2.0)
+    astray = evolve(
+        ticks[60],
+        residuals=tuple(
+            evolve(item, residual=0.6) if index == SPEEDS[0] else item
+            for index, item in enumerate(ticks[60].residuals)
+        ),
+    )
+    watch = LastingWatch(ROBOT)
+    said = [watch.take(item, True) for item in [*ticks[:60], astray, *ticks[61:]]]
+    assert said[59].any()
+    assert not any(one.any() for one in said[60:70])
+    assert any(one.any() for one in said[70:])
+
+
+def test_ticks_of_one_slot_count_once() -> None:
+    ticks = drag(2.0)
+    twice = [
+        item for tick in ticks for item in (tick, evolve(tick, stamp_ns=tick.stamp_ns + TICK // 2))
+    ]
+    one, other = LastingWatch(ROBOT), LastingWatch(ROBOT)
+    alone = [one.take(item, True) for item in ticks]
+    doubled = [other.take(item, True) for item in twice]
+    assert np.array_equal(alone, doubled[::2])
+    assert np.array_equal(doubled[::2], doubled[1::2])
+
+
+def test_a_tick_that_lacks_something_says_nothing() -> None:
+    ticks = drag(2.0)
+    gone = evolve(
+        ticks[-1],
+        residuals=tuple(
+            Residual(math.nan, math.nan, math.nan, item.unit, "stale")
+            if index == ENCODERS[1]
+            else item
+            for index, item in enumerate(ticks[-1].residuals)
+        ),
+    )
+    watch = LastingWatch(ROBOT)
+    for item in ticks[:-1]:
+        watch.take(item, True)
+    assert not watch.take(gone, True).any()
+
+
+def test_absurd_numbers_are_survived() -> None:
+    ticks = drag(2.0)
+    wild = evolve(
+        ticks[40],
+        residuals=tuple(
+            evolve(item, residual=1e300, modelled=1e300) for item in ticks[40].residuals
+        ),
+    )
+    watch = LastingWatch(ROBOT)
+    said = [watch.take(item, True) for item in [*ticks[:40], wild, *ticks[41:]]]
+    assert np.isfinite(said).all()
+
+
+def test_currents_show_what_drags() -> None:
+    document = evolve(
+        ROBOT, measurement=evolve(ROBOT.measurement, quantity="motor_current", signed=True)
+    )
+    motors = Motors(document)
+    drawn = motors.friction(5.0) / motors.constant
+    band = float(drawn[1]) / 0.6
+
+    def tick(number: int) -> ResidualFrame:
+        way = np.sign(speeds(number))
+        current = 2.0 * way
+        off = np.where(np.arange(3) == 1, drawn, 0.0) * way
+        items = [
+            Residual(o, band, m, "A") for o, m in zip(off.tolist(), current.tolist(), strict=True)
+        ]
+        turning = [Residual(0.0, 0.5, want, "rad/s") for want in speeds(number).tolist()]
+        unknown = Residual(math.nan, math.nan, math.nan, "A", "not measured")
+        return ResidualFrame(BASE + TICK * number, (unknown, *items, *turning, *items))
+
+    found = gathered([tick(number) for number in range(4 * SECOND)], document)
+    assert found[DRAGS.start + 1] > 24.0
+    assert found[WEAKS].max() == 0.0
+
+
+def test_it_is_looked_for_on_commissioned_robots_alone() -> None:
+    """There the network sees nothing in it, and the belief gathers it."""
+    off = 0.35 * BAND / of_friction(20, 1, 1.0)[1]
+    healthy = [frame(t, NOTHING) for t in range(3 * SECOND)]
+    ticks = [*healthy, *(frame(3 * SECOND + t, of_friction(t, 1, off)) for t in range(8 * SECOND))]
+    named = []
+    for commissioned in ("", "2026-11-25"):
+        classifier = FaultClassifier.of(ClassifierSettings(commissioned=commissioned), ROBOT)
+        said = [classifier.classify(item) for item in ticks]
+        named.append({one.state.name for one in said if one is not None})
+    assert not any("drag" in name for name in named[0])
+    assert "dragging wheel 2" in named[1]
+
+
+def test_after_a_push_it_does_not_count() -> None:
+    settings = ClassifierSettings(commissioned="2026-11-25")
+    judge = make_judge(settings)
+    assert isinstance(judge, WindowJudge)
+    lasting = np.zeros(HYPOTHESES)
+    lasting[DRAGS.start] = 8.0
+    item = frame(0, NOTHING)
+    for tick in range(2 * SECOND):
+        judge._shaken = 5
+        said = judge.judge(
+            evolve(item, stamp_ns=BASE + TICK * tick), TICK, Unseen(), lasting=lasting
+        )
+    assert int(np.argmax(said.probabilities)) == 0

@@ -1,0 +1,217 @@
+"""Small faults that last: what a robot's own bands hide, and one wheel shows again and again.
+
+Residuals of a commissioned robot scatter by a fifth of their bands, around nothing. A bearing that
+drags a little, windings that lose more, or a power sensor whose scale is off moves those of one
+wheel by no more than that, too little for a window of 0.4 s, but for as long as the wheel turns. Of
+each such fault the size theta is fitted to the last seconds,
+
+    r = theta phi + noise,  phi: (omega + 2 R i / k) tau,  R i^2,  P
+
+of the axle's friction tau, a winding's loss and the power shown (tau / k and i where currents are
+measured), and how much better than nothing it predicts the next tick is evidence, which the belief
+gathers. No more counts than is left
+
+- by a force on the body, which is shared out among the wheels,
+- by the total power, which tells a motor that draws more from a sensor that shows more,
+- of what the other wheels show as well, as on a carpet, and of what came within minutes, as heat.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomr_fault_diag.classifier.belief import DRAGS, HYPOTHESES, METERS, WEAKS
+from tomr_fault_diag.classifier.motors import Motors
+from tomr_fault_diag.classifier.severity.tick import MOVES
+from tomr_fault_diag.residuals.frame import (
+    ENCODERS,
+    MOTORS,
+    SPEEDS,
+    TOTAL,
+    Residual,
+    ResidualFrame,
+    measured_speed,
+)
+from tomr_power_model.model.ticks import NANOSECONDS, to_ns
+from tomr_power_model.robot import WHEELS, Robot
+
+Array = NDArray[np.float64]
+
+_KINDS = (DRAGS, WEAKS, METERS)
+# Of each, what is typical and what is no fault: shares of the axle's friction, of a winding's
+# losses, and of the power.
+_TYPICAL = np.array([1.0, 1.0, 0.3])[:, None]
+_NEGLIGIBLE = np.array([0.2, 0.2, 0.08])[:, None]
+_BOTH_WAYS = np.array([False, False, True])[:, None]
+_SPEED = 5.0  # rad/s, at which an axle's friction is taken
+_SLOT = to_ns(0.05)  # of faster ticks the first in each is taken
+_MEMORY = to_ns(1.5)  # over which a size is fitted
+_LONG = to_ns(10.0)  # and over which sizes of all kinds are, that are no fault where they came ...
+_SLOWLY = to_ns(60.0)  # ... within so long
+_MOST_SLOW = 0.5  # bands, in which they are believed
+_SCATTER = 0.2  # bands: 3.3 standard deviations of noise, and half as much again
+_TOTAL_SCATTER = 0.25  # bands of the total power
+_LITTLE = 0.08  # bands by which a healthy robot's residuals may lie off nothing
+_CLIP = 2.0  # bands: what is larger is the network's
+_FORCES = (0.1, 0.3, 1.0)  # N/kg, standard deviations of a force on the body
+_LEVER = 0.3  # of the robot's radius, at which it acts
+_WORTH = 6.0  # that a tick counts: most robots scatter less
+_MOST, _LEAST = 2.0, -0.2  # that it says; a fault may be none of these, and large
+_AGAINST = -3.0  # that its total power says
+_PAUSE = to_ns(0.5)  # after a wheel did not turn as it should
+
+
+class LastingWatch:
+    """Follows a commissioned robot tick by tick; driven by stamps."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._motors = motors = Motors(robot)
+        self._friction = motors.friction(_SPEED)
+        lever = _LEVER * robot.robot_radius
+        self._shares = motors.mass * motors.from_force * np.array([1.0, 1.0, lever])
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._newest = 0  # ns
+        self._resumes = 0  # ns
+        self._said = np.zeros(HYPOTHESES)
+        # Sums of phi^2 and phi r, (3, 3): kinds and wheels, and for each wheel those of all kinds.
+        self._squares = np.zeros((len(_KINDS), WHEELS))
+        self._products = np.zeros((len(_KINDS), WHEELS))
+        self._normal = np.zeros((WHEELS, len(_KINDS), len(_KINDS)))
+        self._right = np.zeros((WHEELS, len(_KINDS)))
+        self._slow = np.zeros((WHEELS, len(_KINDS)))  # sizes that came slowly
+
+    def take(self, frame: ResidualFrame, is_well: bool) -> Array:
+        """Log-likelihoods (19,) of faults over a healthy robot's, from the newest tick.
+
+        `is_well`: nothing is named, and what comes slowly is learnt.
+        """
+        if frame.stamp_ns // _SLOT == self._newest // _SLOT:
+            return self._said
+        elapsed, self._newest = frame.stamp_ns - self._newest, frame.stamp_ns
+        self._said = np.zeros(HYPOTHESES)
+        if any(abs(item.residual) > item.band for item in _of(frame, SPEEDS)):
+            self._resumes = frame.stamp_ns + _PAUSE
+        if frame.stamp_ns < self._resumes or _is_unknown(frame):
+            return self._said
+        with np.errstate(over="ignore", invalid="ignore"):
+            effects, shared = self._effects(frame)
+        if not np.isfinite(effects).all() or not np.isfinite(shared).all():
+            return self._said  # of a robot or a sensor beyond all numbers
+        shown = _shown(frame)
+        sudden = shown - self._came_slowly(effects)
+        if is_well:
+            self._learn_slowly(shown, effects, elapsed)
+        found = self._predicted(sudden, effects, shared, frame)
+        self._learn(sudden, effects, elapsed)
+        for kind, row in zip(_KINDS, found, strict=True):
+            self._said[kind] = _WORTH * row
+        return self._said
+
+    def _effects(self, frame: ResidualFrame) -> tuple[Array, Array]:
+        """What each fault of its typical size adds to each wheel's residual [bands], (3, 3), and
+        what forces along and across of 1 N/kg and their moment do, (3, 3); 0 where it stands."""
+        motors, derived = self._motors, _of(frame, ENCODERS)
+        speed = np.array([measured_speed(item) for item in _of(frame, SPEEDS)])
+        power = np.array([item.modelled for item in derived])
+        way = np.where(speed < 0.0, -1.0, 1.0)
+        per_torque, loss = way / motors.constant, np.zeros(WHEELS)
+        if not motors.reports_currents:
+            current = motors.currents(power, speed, way)
+            per_torque = speed + 2.0 * motors.resistance * current / motors.constant
+            loss = motors.resistance * current**2
+        moves = (np.abs(speed) > MOVES) / np.array([item.band for item in derived])
+        effects = np.array([way * per_torque * self._friction, loss, np.abs(power)])
+        return _TYPICAL * effects * moves, (per_torque * moves)[:, None] * self._shares
+
+    def _predicted(
+        self, sudden: Array, effects: Array, shared: Array, frame: ResidualFrame
+    ) -> Array:
+        """How much better each fault predicts a tick than nothing does, or a force on the body,
+        and what the total power leaves of it, (3, 3)."""
+        size = self._products / (self._squares + _SCATTER**2)
+        size = _beyond_others(np.where(_BOTH_WAYS, size, np.maximum(size, 0.0)))
+        mean = size * effects
+        little = np.maximum(_NEGLIGIBLE / _TYPICAL * np.abs(effects), _LITTLE)
+        found = _better(sudden, np.clip(mean, -little, little), mean, _SCATTER)
+        found = np.minimum(found - _by_force(sudden, shared), _MOST)
+        return np.maximum(found + self._against(mean, frame), _LEAST)
+
+    def _against(self, mean: Array, frame: ResidualFrame) -> Array:
+        """What the total power says against a motor that draws so much more [bands], (2, 3), and
+        against a sensor that only shows it, (3,)."""
+        total = frame.residuals[TOTAL]
+        if total.stale:
+            return np.zeros_like(mean)
+        bands = np.array([item.band for item in _of(frame, ENCODERS)])
+        drawn = np.clip(np.full(WHEELS, total.residual / total.band), -_CLIP, _CLIP)
+        shows = _better(drawn, np.zeros(1), mean * bands / total.band, _TOTAL_SCATTER)
+        shows[-1] *= -1.0
+        return np.asarray(np.clip(shows, _AGAINST, 0.0))
+
+    def _learn(self, shown: Array, effects: Array, elapsed: int) -> None:
+        kept = np.exp(-elapsed / _MEMORY)
+        self._squares = kept * self._squares + effects**2
+        self._products = kept * self._products + effects * shown
+
+    def _came_slowly(self, effects: Array) -> Array:
+        """What that adds to each wheel's residual [bands], (3,)."""
+        added = (effects.T * self._slow).sum(axis=1)
+        return np.asarray(np.clip(added, -_MOST_SLOW, _MOST_SLOW))
+
+    def _learn_slowly(self, shown: Array, effects: Array, elapsed: int) -> None:
+        if not effects.any():
+            return
+        kept = np.exp(-elapsed / _LONG)
+        self._normal = kept * self._normal + effects.T[:, :, None] * effects.T[:, None, :]
+        self._right = kept * self._right + effects.T * shown[:, None]
+        prior = _SCATTER**2 * np.eye(len(_KINDS))
+        sizes = np.linalg.solve(self._normal + prior, self._right[:, :, None])[:, :, 0]
+        self._slow += min(elapsed, NANOSECONDS) / _SLOWLY * (sizes - self._slow)
+
+
+def _of(frame: ResidualFrame, channels: range) -> list[Residual]:
+    return [frame.residuals[index] for index in channels]
+
+
+def _is_unknown(frame: ResidualFrame) -> bool:
+    return any(item.stale for item in (*_of(frame, ENCODERS), *_of(frame, SPEEDS)))
+
+
+def _shown(frame: ResidualFrame) -> Array:
+    """Residual of each motor [bands]: of its two the smaller, for either is late at times."""
+    by_encoder, by_command = (
+        np.array([item.residual / item.band for item in _of(frame, channels)])
+        for channels in (ENCODERS, MOTORS)
+    )
+    is_smaller = np.abs(by_command) < np.abs(by_encoder)  # not where it is NaN
+    shown = np.where(is_smaller, by_command, by_encoder)
+    return np.asarray(np.clip(shown, -_CLIP, _CLIP))
+
+
+def _beyond_others(size: Array) -> Array:
+    """How far each wheel's sizes, (kinds, 3), go beyond what another wheel shows as well."""
+    others = np.stack([np.delete(size, wheel, axis=1) for wheel in range(WHEELS)], axis=1)
+    up = np.maximum(size - np.maximum(others.max(axis=2), 0.0), 0.0)
+    down = np.minimum(size - np.minimum(others.min(axis=2), 0.0), 0.0)
+    return np.asarray(np.where(size > 0.0, up, down))
+
+
+def _better(shown: Array, nothing: Array, mean: Array, scatter: float) -> Array:
+    """Log-likelihood of one mean over that of another."""
+    return np.asarray(((shown - nothing) ** 2 - (shown - mean) ** 2) / (2.0 * scatter**2))
+
+
+def _by_force(shown: Array, shared: Array) -> float:
+    """Log-likelihood of a force on the body over none, as strong as explains most; at least 0.
+
+    `shared`: what forces along and across and a moment do to the wheels, (3, 3).
+    """
+    variances, ways = np.linalg.eigh(shared @ shared.T)
+    seen = (ways.T @ shown) ** 2 / _SCATTER**2
+    most = 0.0
+    for force in _FORCES:
+        ratio = 1.0 + force**2 * np.maximum(variances, 0.0) / _SCATTER**2
+        most = max(most, 0.5 * float(np.sum(seen * (1.0 - 1.0 / ratio) - np.log(ratio))))
+    return most
