@@ -19,7 +19,7 @@ from tomr_fault_diag.classifier.states import (
     UNKNOWN,
     WAITING,
 )
-from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
+from tomr_fault_diag.residuals.frame import MOTORS, Residual, ResidualFrame
 from tomr_power_model.messages.plain import Level
 
 Array = NDArray[np.float64]
@@ -86,6 +86,77 @@ def test_a_robot_that_stands_when_commanded_to_drive_does_not_follow(period: int
     assert [state for _, state in changes] == ["normal", "does not follow its commands", "normal"]
     assert 300 <= changes[1][0] - 2000 <= 300 + period
     assert 500 <= changes[2][0] - 4000 <= 500 + period
+
+
+HALF: Three = (1.5, -4.0, 2.5)
+
+
+def watched(frames: list[ResidualFrame], idle: tuple[float, ...] = ()) -> list[int]:
+    """When [ms] it is said that a robot does not follow its commands."""
+    watch = MisfitWatch(idle)
+    return [(item.stamp_ns - BASE) // MS for item in frames if watch.take(item, 0.0).disobeys]
+
+
+@pytest.mark.parametrize(
+    ("slower", "first"),
+    [
+        (HALF, 1300),  # all alike: it has begun to stand
+        ((0.6, -4.0, 2.5), 1500),  # otherwise it begins when it stands
+        ((2.5, -6.7, 4.2), 1500),  # and where wheels are hardly slower
+    ],
+)
+def test_a_robot_that_brakes_to_a_stand_is_named_from_its_braking_on(
+    slower: Three, first: int
+) -> None:
+    driving = [frame(t, TURNING, TURNING) for t in range(0, 1000, 50)]
+    braking = [frame(t, TURNING, slower) for t in range(1000, 1200, 50)]
+    standing = [frame(t, TURNING, (0.0, 0.0, 0.0)) for t in range(1200, 2000, 50)]
+    assert watched(driving + braking + standing)[0] == first
+
+
+def test_a_robot_that_is_only_slower_follows_its_commands() -> None:
+    assert watched([frame(t, TURNING, HALF) for t in range(0, 3000, 50)]) == []
+
+
+def undriven(at_ms: int, measured: Three, drawn: float) -> ResidualFrame:
+    """All motors draw so much [W], of 20 W, 2 W and 2 W that they should."""
+    item = frame(at_ms, TURNING, measured)
+    motors = [
+        evolve(item.residuals[k], residual=drawn - item.residuals[k].modelled, band=1.0)
+        for k in MOTORS
+    ]
+    return evolve(item, residuals=(item.residuals[0], *motors, *item.residuals[4:]))
+
+
+COASTING: Three = (2.0, -6.0, 6.0)  # rad/s
+
+
+@pytest.mark.parametrize(
+    ("measured", "drawn", "first"),
+    [
+        (COASTING, 0.4, 300),
+        (COASTING, 0.9, None),  # more than a motor draws that is not driven
+        (TURNING, 0.4, None),  # it turns as it should: nothing need be driven
+        ((3.0, -8.0, 6.0), 0.4, None),  # one wheel may have a fault of its own
+        (COASTING, NAN, None),
+    ],
+)
+def test_a_robot_that_coasts_because_no_motor_is_driven_does_not_follow(
+    measured: Three, drawn: float, first: int | None
+) -> None:
+    said = watched([undriven(t, measured, drawn) for t in range(0, 1000, 50)], (0.3, 0.3, 0.3))
+    assert (said[0] if said else None) == first
+
+
+def test_drivers_that_lack_voltage_are_not_off() -> None:
+    watch = MisfitWatch((0.3, 0.3, 0.3))
+    low = [evolve(undriven(t, COASTING, 0.4), supply=0.6) for t in range(0, 900, 50)]
+    said = [watch.take(item, 0.88) for item in low]
+    assert not any(one.disobeys for one in said)
+
+
+def test_what_a_motor_draws_that_is_not_driven_may_be_unknown() -> None:
+    assert watched([undriven(t, COASTING, 0.0) for t in range(0, 1000, 50)]) == []
 
 
 def test_no_wheel_is_accused_meanwhile() -> None:

@@ -4,6 +4,8 @@ The classifier weighs known states against each other, so something else can loo
 These rules ask nothing but the residuals themselves.
 """
 
+from collections.abc import Sequence
+
 from attrs import frozen
 
 from tomr_fault_diag.residuals.frame import (
@@ -18,8 +20,11 @@ from tomr_power_model.model.ticks import to_ns
 
 _TURNING = 0.5  # rad/s: a wheel that is expected to turn
 _STANDING = 0.2  # of the expected speed: a slower wheel does not follow
+_HALTING = 0.6  # of the expected speed: slower wheels are about to stand, if all are so ...
+_ALIKE = 0.15  # ... but for so much
 _BACK = 1.0  # of the expected speed: one that turns back faster does something else
 _AT_LEAST = 2  # wheels that must be expected to turn: one alone may have a fault of its own
+_IDLE = 0.5  # bands by which the power of a motor that is not driven may be off
 _IGNORED_FOR = to_ns(0.3)
 _FAR = 3.0  # bands
 _FAR_FOR = to_ns(1.0)
@@ -33,7 +38,7 @@ class Misfit:
     """What a frame shows beside the classifier's states."""
 
     ignores_commands: bool = False  # for a moment already: wheels stand that should turn
-    disobeys: bool = False  # and for long enough to be named
+    disobeys: bool = False  # and for long enough to be named, or no motor has been driven for long
     unexplained: bool = False  # some residual has been far out of its band for long
     low_supply: bool = False  # its voltage has been too low for long
 
@@ -42,12 +47,15 @@ class MisfitWatch:
     """Remembers since when [ns] nothing follows, the supply is low, and each residual lies far out
     of its band."""
 
-    def __init__(self) -> None:
+    def __init__(self, idle: Sequence[float] = ()) -> None:
+        """`idle`: what each motor draws that is not driven, in the unit of its residual."""
+        self._idle = tuple(idle)
         self.clear()
 
     def clear(self) -> None:
         """Forget what was seen."""
-        self._ignored_since: int | None = None
+        self._halting_since: int | None = None
+        self._unpowered_since: int | None = None
         self._far_since: dict[int, int] = {}
         self._low_since: int | None = None
         self._last = 0  # ns
@@ -58,26 +66,48 @@ class MisfitWatch:
         if now - self._last > _GAP:
             self.clear()
         self._last = now
-        ignores = _ignores_commands([frame.residuals[index] for index in SPEEDS])
-        if not ignores:
-            self._ignored_since = None
-        elif self._ignored_since is None:
-            self._ignored_since = now
+        speeds = [frame.residuals[index] for index in SPEEDS]
+        ignores = _ignores_commands(speeds)
+        self._halting_since = _since(
+            self._halting_since, now, holds=ignores or _is_about_to_stand(speeds)
+        )
         # What no motor takes of the total is the computer's: it counts where they are not known.
         first = TOTAL if any(frame.residuals[index].stale for index in MOTORS) else TOTAL + 1
         far = [index for index in range(first, RESIDUALS) if is_far(frame.residuals[index])]
         self._far_since = {index: self._far_since.get(index, now) for index in far}
         is_low = frame.supply < low_supply + (_MORE if self._low_since is not None else 0.0)
-        if not is_low:  # nor where it is not known
-            self._low_since = None
-        elif self._low_since is None:
-            self._low_since = now
+        self._low_since = _since(self._low_since, now, holds=is_low)  # not where it is not known
+        # Drivers that lack voltage do not drive, either.
+        unpowered = not is_low and self._is_unpowered(frame, speeds)
+        self._unpowered_since = _since(self._unpowered_since, now, holds=unpowered)
+        stands = ignores and _lasts(self._halting_since, now, _IGNORED_FOR)
         return Misfit(
             ignores,
-            self._ignored_since is not None and now - self._ignored_since >= _IGNORED_FOR,
+            stands or _lasts(self._unpowered_since, now, _IGNORED_FOR),
             any(now - since >= _FAR_FOR for since in self._far_since.values()),
-            self._low_since is not None and now - self._low_since >= _LOW_FOR,
+            _lasts(self._low_since, now, _LOW_FOR),
         )
+
+    def _is_unpowered(self, frame: ResidualFrame, speeds: list[Residual]) -> bool:
+        """Whether no motor is driven, and wheels therefore turn otherwise than they should."""
+        motors = [frame.residuals[index] for index in MOTORS]
+        drawn = [item.modelled + item.residual for item in motors]
+        is_idle = len(self._idle) == len(motors) and all(
+            abs(power - idle) < _IDLE * item.band  # false where anything is NaN
+            for power, idle, item in zip(drawn, self._idle, motors, strict=True)
+        )
+        return is_idle and sum(is_far(item) for item in speeds) >= _AT_LEAST
+
+
+def _since(before: int | None, now: int, *, holds: bool) -> int | None:
+    """Since when something holds, if it does."""
+    if not holds:
+        return None
+    return now if before is None else before
+
+
+def _lasts(since: int | None, now: int, long: int) -> bool:
+    return since is not None and now - since >= long
 
 
 def _ignores_commands(speeds: list[Residual]) -> bool:
@@ -86,6 +116,15 @@ def _ignores_commands(speeds: list[Residual]) -> bool:
     return len(turning) >= _AT_LEAST and all(
         -_BACK < _followed(item) < _STANDING for item in turning
     )
+
+
+def _is_about_to_stand(speeds: list[Residual]) -> bool:
+    """Whether all wheels that are expected to turn are slower than that, and alike."""
+    turning = [item for item in speeds if abs(item.modelled) > _TURNING and not item.stale]
+    if len(turning) < _AT_LEAST or not all(is_far(item) for item in turning):
+        return False
+    followed = [_followed(item) for item in turning]
+    return max(followed) < _HALTING and max(followed) - min(followed) < _ALIKE
 
 
 def _followed(item: Residual) -> float:

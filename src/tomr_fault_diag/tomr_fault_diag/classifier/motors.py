@@ -37,7 +37,8 @@ class Motors:
         self._numbers = numbers.tolist()
         self._laws = plain(tuple(robot.physics))
         self.mass = body.mass  # kg
-        self.idle = self._idle()  # W
+        # What a motor shows that is not driven, W or A.
+        self.idle = np.zeros(WHEELS) if self.reports_currents else self._idle()
 
     def friction(self, speed: float) -> Array:
         """Of each axle at a speed [N m]."""

@@ -8,6 +8,7 @@ from tomr_fault_diag.classifier.contacts import NOTHING
 from tomr_fault_diag.classifier.judges import Judge, Opinion, make_judge
 from tomr_fault_diag.classifier.lasting import LastingWatch
 from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
+from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.severity import Severity, SeverityWatch
@@ -73,16 +74,17 @@ class FaultClassifier:
         severity: SeverityWatch | None = None,
         slides: SlideWatch | None = None,
         lasting: LastingWatch | None = None,
+        misfits: MisfitWatch | None = None,
     ) -> None:
         """Without `severity` it is not stated how bad a fault is, nor what has changed slowly;
         without `slides` residuals alone show a slip, without `lasting` small faults are not
-        looked for."""
+        looked for; without `misfits` it is not known what a motor draws that is not driven."""
         self._judge = judge
         self._lasting = lasting
         self._severity = severity
         self._slides = slides
         self._motion = MotionWatch()
-        self._misfits = MisfitWatch()
+        self._misfits = misfits or MisfitWatch()
         self._data = SufficiencyWatch()
         self.clear()
 
@@ -95,7 +97,8 @@ class FaultClassifier:
     def around(cls, judge: Judge, robot: Robot, severity: SeverityWatch | None = None) -> Self:
         """A judge, and what contacts and, of a commissioned robot, small faults show beside it."""
         lasting = LastingWatch(robot) if judge.settings.commissioned else None
-        return cls(judge, severity, SlideWatch(robot), lasting)
+        misfits = MisfitWatch(Motors(robot).idle.tolist())
+        return cls(judge, severity, SlideWatch(robot), lasting, misfits)
 
     @property
     def settings(self) -> ClassifierSettings:

@@ -76,8 +76,7 @@ def _scale(tick: Tick) -> Sums:
 
 def _drawn(tick: Tick) -> Sums:
     """Power beyond what the commanded motion takes, as a share of what drives the motor."""
-    idle = 0.0 if tick.motors.reports_currents else tick.motors.idle
-    expected = tick.commanded - idle
+    expected = tick.commanded - tick.motors.idle
     return expected**2, expected * (tick.power - tick.commanded)
 
 
