@@ -17,6 +17,7 @@ gathers. No more counts than is left
 """
 
 import numpy as np
+from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.belief import DRAGS, HYPOTHESES, METERS, WEAKS
@@ -36,16 +37,32 @@ from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
 
-_KINDS = (DRAGS, WEAKS, METERS)
-# Of each, what is typical and what is no fault: shares of the axle's friction, of a winding's
-# losses, and of the power.
-_TYPICAL = np.array([1.0, 1.0, 0.3])[:, None]
-_NEGLIGIBLE = np.array([0.2, 0.2, 0.08])[:, None]
-_BOTH_WAYS = np.array([False, False, True])[:, None]
+
+@frozen
+class SmallFault:
+    """A fault of a wheel, and the sizes theta of it: shares of what `_effects` has for it."""
+
+    hypotheses: slice
+    typical: float
+    negligible: float  # no fault: a description does not know it better
+    is_signed: bool = False  # it may be less, too
+    in_total: bool = True  # the total power shows it as well
+
+
+FAULTS = (
+    SmallFault(DRAGS, 1.0, 0.2),  # of the axle's friction
+    SmallFault(WEAKS, 1.0, 0.2),  # of the winding's losses
+    SmallFault(METERS, 0.3, 0.08, is_signed=True, in_total=False),  # of the power shown
+)
+_COUNT = len(FAULTS)
+_TYPICAL = np.array([fault.typical for fault in FAULTS])[:, None]
+_NEGLIGIBLE = np.array([fault.negligible for fault in FAULTS])[:, None]
+_SIGNED = np.array([fault.is_signed for fault in FAULTS])[:, None]
+_IN_TOTAL = np.array([1.0 if fault.in_total else -1.0 for fault in FAULTS])[:, None]
 _SPEED = 5.0  # rad/s, at which an axle's friction is taken
 _SLOT = to_ns(0.05)  # of faster ticks the first in each is taken
 _MEMORY = to_ns(1.5)  # over which a size is fitted
-_LONG = to_ns(10.0)  # and over which sizes of all kinds are, that are no fault where they came ...
+_LONG = to_ns(10.0)  # and over which sizes of all faults are, that are no fault where they came ...
 _SLOWLY = to_ns(60.0)  # ... within so long
 _MOST_SLOW = 0.5  # bands, in which they are believed
 _SCATTER = 0.2  # bands: 3.3 standard deviations of noise, and half as much again
@@ -75,12 +92,12 @@ class LastingWatch:
         self._newest = 0  # ns
         self._resumes = 0  # ns
         self._said = np.zeros(HYPOTHESES)
-        # Sums of phi^2 and phi r, (3, 3): kinds and wheels, and for each wheel those of all kinds.
-        self._squares = np.zeros((len(_KINDS), WHEELS))
-        self._products = np.zeros((len(_KINDS), WHEELS))
-        self._normal = np.zeros((WHEELS, len(_KINDS), len(_KINDS)))
-        self._right = np.zeros((WHEELS, len(_KINDS)))
-        self._slow = np.zeros((WHEELS, len(_KINDS)))  # sizes that came slowly
+        # Sums of phi^2 and phi r, (3, 3): faults and wheels; and of all faults at each wheel.
+        self._squares = np.zeros((_COUNT, WHEELS))
+        self._products = np.zeros((_COUNT, WHEELS))
+        self._normal = np.zeros((WHEELS, _COUNT, _COUNT))
+        self._right = np.zeros((WHEELS, _COUNT))
+        self._slow = np.zeros((WHEELS, _COUNT))  # sizes that came slowly
 
     def take(self, frame: ResidualFrame, is_well: bool) -> Array:
         """Log-likelihoods (19,) of faults over a healthy robot's, from the newest tick.
@@ -105,8 +122,8 @@ class LastingWatch:
             self._learn_slowly(shown, effects, elapsed)
         found = self._predicted(sudden, effects, shared, frame)
         self._learn(sudden, effects, elapsed)
-        for kind, row in zip(_KINDS, found, strict=True):
-            self._said[kind] = _WORTH * row
+        for fault, row in zip(FAULTS, found, strict=True):
+            self._said[fault.hypotheses] = _WORTH * row
         return self._said
 
     def _effects(self, frame: ResidualFrame) -> tuple[Array, Array]:
@@ -131,7 +148,7 @@ class LastingWatch:
         """How much better each fault predicts a tick than nothing does, or a force on the body,
         and what the total power leaves of it, (3, 3)."""
         size = self._products / (self._squares + _SCATTER**2)
-        size = _beyond_others(np.where(_BOTH_WAYS, size, np.maximum(size, 0.0)))
+        size = _beyond_others(np.where(_SIGNED, size, np.maximum(size, 0.0)))
         mean = size * effects
         little = np.maximum(_NEGLIGIBLE / _TYPICAL * np.abs(effects), _LITTLE)
         found = _better(sudden, np.clip(mean, -little, little), mean, _SCATTER)
@@ -147,8 +164,7 @@ class LastingWatch:
         bands = np.array([item.band for item in _of(frame, ENCODERS)])
         drawn = np.clip(np.full(WHEELS, total.residual / total.band), -_CLIP, _CLIP)
         shows = _better(drawn, np.zeros(1), mean * bands / total.band, _TOTAL_SCATTER)
-        shows[-1] *= -1.0
-        return np.asarray(np.clip(shows, _AGAINST, 0.0))
+        return np.asarray(np.clip(_IN_TOTAL * shows, _AGAINST, 0.0))
 
     def _learn(self, shown: Array, effects: Array, elapsed: int) -> None:
         kept = np.exp(-elapsed / _MEMORY)
@@ -166,7 +182,7 @@ class LastingWatch:
         kept = np.exp(-elapsed / _LONG)
         self._normal = kept * self._normal + effects.T[:, :, None] * effects.T[:, None, :]
         self._right = kept * self._right + effects.T * shown[:, None]
-        prior = _SCATTER**2 * np.eye(len(_KINDS))
+        prior = _SCATTER**2 * np.eye(_COUNT)
         sizes = np.linalg.solve(self._normal + prior, self._right[:, :, None])[:, :, 0]
         self._slow += min(elapsed, NANOSECONDS) / _SLOWLY * (sizes - self._slow)
 
@@ -191,7 +207,7 @@ def _shown(frame: ResidualFrame) -> Array:
 
 
 def _beyond_others(size: Array) -> Array:
-    """How far each wheel's sizes, (kinds, 3), go beyond what another wheel shows as well."""
+    """How far each wheel's sizes, (faults, 3), go beyond what another wheel shows as well."""
     others = np.stack([np.delete(size, wheel, axis=1) for wheel in range(WHEELS)], axis=1)
     up = np.maximum(size - np.maximum(others.max(axis=2), 0.0), 0.0)
     down = np.minimum(size - np.minimum(others.min(axis=2), 0.0), 0.0)
