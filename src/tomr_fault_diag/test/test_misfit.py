@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.judges import Opinion
 from tomr_fault_diag.classifier.misfit import MisfitWatch
+from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
@@ -21,6 +22,7 @@ from tomr_fault_diag.classifier.states import (
 )
 from tomr_fault_diag.residuals.frame import MOTORS, Residual, ResidualFrame
 from tomr_power_model.messages.plain import Level
+from tomr_power_model.robot import shipped_robot
 
 Array = NDArray[np.float64]
 
@@ -102,7 +104,7 @@ def watched(frames: list[ResidualFrame], idle: tuple[float, ...] = ()) -> list[i
     [
         (HALF, 1300),  # all alike: it has begun to stand
         ((0.6, -4.0, 2.5), 1500),  # otherwise it begins when it stands
-        ((2.5, -6.7, 4.2), 1500),  # and where wheels are hardly slower
+        ((2.25, -6.0, 3.75), 1500),  # and where wheels are hardly slower
     ],
 )
 def test_a_robot_that_brakes_to_a_stand_is_named_from_its_braking_on(
@@ -146,6 +148,18 @@ def test_a_robot_that_coasts_because_no_motor_is_driven_does_not_follow(
 ) -> None:
     said = watched([undriven(t, measured, drawn) for t in range(0, 1000, 50)], (0.3, 0.3, 0.3))
     assert (said[0] if said else None) == first
+
+
+def test_a_described_robot_says_what_a_motor_draws_that_is_not_driven() -> None:
+    robot = shipped_robot("reference")
+    idle = float(Motors(robot).idle[0])
+    classifier = FaultClassifier.of(ClassifierSettings(), robot)
+    driving = [undriven(t, TURNING, 20.0) for t in range(0, 1000, 50)]
+    coasting = [undriven(t, COASTING, idle) for t in range(1000, 1500, 50)]
+    said = [classifier.classify(item) for item in driving + coasting]
+    assert next(one.stamp_ns for one in said if one is not None and one.state is DISOBEYS) == (
+        BASE + 1300 * MS
+    )
 
 
 def test_drivers_that_lack_voltage_are_not_off() -> None:

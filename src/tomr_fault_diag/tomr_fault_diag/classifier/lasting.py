@@ -110,12 +110,12 @@ class LastingWatch:
         self._said = np.zeros(HYPOTHESES)
         if any(abs(item.residual) > item.band for item in _of(frame, SPEEDS)):
             self._resumes = frame.stamp_ns + _PAUSE
-        if frame.stamp_ns < self._resumes or _is_unknown(frame):
+        if frame.stamp_ns < self._resumes:
             return self._said
         with np.errstate(over="ignore", invalid="ignore"):
             effects, shared = self._effects(frame)
         if not np.isfinite(effects).all() or not np.isfinite(shared).all():
-            return self._said  # of a robot or a sensor beyond all numbers
+            return self._said  # something is not known, or beyond all numbers
         shown = _shown(frame)
         sudden = shown - self._came_slowly(effects)
         if is_well:
@@ -189,10 +189,6 @@ class LastingWatch:
 
 def _of(frame: ResidualFrame, channels: range) -> list[Residual]:
     return [frame.residuals[index] for index in channels]
-
-
-def _is_unknown(frame: ResidualFrame) -> bool:
-    return any(item.stale for item in (*_of(frame, ENCODERS), *_of(frame, SPEEDS)))
 
 
 def _shown(frame: ResidualFrame) -> Array:
