@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from attrs import asdict, evolve, frozen
 
-from tomr_commission.alarm import AlarmLevel, Tail, alarm_level, block_peaks
+from tomr_commission.alarm import AlarmLevel, Tail, alarm_level
 from tomr_commission.bands import RegimeLine, bands_of, regime_table
 from tomr_commission.commissioned import (
     CLASSIFIER,
@@ -18,8 +18,9 @@ from tomr_commission.commissioned import (
     base_sections,
     commissioned_text,
 )
-from tomr_commission.evidence import decisions, evidence_in
+from tomr_commission.evidence import decisions
 from tomr_commission.explained import EXPLAINED, FOLDER, Split, explain_drives
+from tomr_commission.healthy import Healthy, healthy
 from tomr_commission.injected import kinds_for, try_injected
 from tomr_commission.observed import Observed, frames_of, observe, reports_currents, unit_of_motors
 from tomr_commission.parallel import on_all_cores
@@ -41,7 +42,6 @@ from tomr_power_model.effects.user import named_files
 from tomr_power_model.errors import InputError
 from tomr_power_model.files.write import make_folder, write_together
 from tomr_power_model.robot import (
-    Robot,
     load_robot,
     read_description,
     read_node_sections,
@@ -55,6 +55,9 @@ STEPS = "steps"
 _CURRENTS = (
     "shoves were not simulated: the robot reports currents, not powers; so the alarm level is the "
     "shipped one at least, and how many false alarms shoves raise is not known"
+)
+_NO_SMALL_FAULTS = (
+    "small faults that last are not looked for: within its bands healthy driving looks like one"
 )
 _MORE = 1.1  # of the least that is held out: ends of recordings are not compared
 _TO_BE = "to be"  # commissioned: it is judged as it will be
@@ -100,6 +103,7 @@ class Tuned:
 
     margin: float
     bands: BandSettings
+    driven: Healthy
     shoved: Shoved
     level: AlarmLevel
 
@@ -116,7 +120,7 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     classifier, plan = work.classifier(described), Rehearsal(silent=tuple(sorted(silent)))
     tuned = work.tuned(described, fitted, classifier, plan)
     bands, level = tuned.bands, tuned.level
-    chosen = evolve(classifier, caution=level.caution)
+    chosen = evolve(tuned.driven.settings, caution=level.caution)
     robot = robot_of(str(work.source(described)))
     progress("validating", 0.85)
     held_said, fitted_said = (
@@ -125,6 +129,8 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     )
     trials = try_injected(longest, bands, chosen, kinds_for(longest), robot)
     notes = [note for drive in work.drives for note in drive.notes]
+    if not chosen.small_faults:
+        notes.append(_NO_SMALL_FAULTS)
     if reports_currents(longest):
         notes.append(_CURRENTS)
     simulated, note = work.simulated(described, bands, chosen, unit_of_motors(longest))
@@ -134,7 +140,7 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     outcome = Outcome(request, explained, fitted, held, bands, level, held_said, fitted_said)
     against = tuple(reasons(outcome))
     date = datetime.datetime.now(datetime.UTC).date().isoformat()
-    text = _text(work, described, outcome, (against, floors, date))
+    text = _text(work, described, outcome, (against, floors, date, chosen.small_faults))
     progress("done", 1.0)
     return Commissioned(
         request=request,
@@ -265,7 +271,7 @@ class _Work:
         while True:
             self.progress("simulating healthy hours", share)
             bands = bands_of(fitted, choice)
-            evidence = _real_peaks(fitted, bands, settings, robot, self.request.alarm.block)
+            driven = healthy(fitted, bands, settings, robot, self.request.alarm.block)
             wider = choice.wider * choice.margin
             # A few shoves show where many are not worth while.
             for asked, most in (
@@ -275,13 +281,13 @@ class _Work:
                 shoved = (
                     Shoved((), 0.0)
                     if reports_currents(fitted[0])
-                    else self.rehearsed(described, bands, settings, asked)
+                    else self.rehearsed(described, bands, driven.settings, asked)
                 )
-                level = _level(self.request, evidence, shoved, plan)
+                level = _level(self.request, driven, shoved, plan)
                 if level.needed > most and wider <= choice.widest:
                     break
             else:
-                return Tuned(choice.margin, bands, shoved, level)
+                return Tuned(choice.margin, bands, driven, shoved, level)
             choice, share = evolve(choice, margin=wider), min(share + 0.07, 0.8)
 
     def rehearsed(
@@ -336,29 +342,9 @@ def _observe(job: tuple[Path, str, str]) -> Observed:
     return observe(bag, name, load_robot(source), DiagnosisSettings.of(given, source))
 
 
-@frozen
-class _Real:
-    """Peaks of evidence in real driving, block by block."""
-
-    peaks: tuple[float, ...]
-    hours: float
-
-
-def _real_peaks(
-    fitted: Sequence[Observed],
-    bands: BandSettings,
-    settings: ClassifierSettings,
-    robot: Robot,
-    block: float,
-) -> _Real:
-    peaks: list[float] = []
-    for drive in fitted:
-        evidence = evidence_in(frames_of(drive, bands), settings, robot)
-        peaks += block_peaks(evidence, drive.seconds, block)
-    return _Real(tuple(peaks), sum(drive.hours for drive in fitted))
-
-
-def _level(request: CommissionRequest, real: _Real, shoved: Shoved, plan: Rehearsal) -> AlarmLevel:
+def _level(
+    request: CommissionRequest, real: Healthy, shoved: Shoved, plan: Rehearsal
+) -> AlarmLevel:
     """From real driving and from simulated shoves."""
     tails = (
         Tail.of("healthy driving", real.peaks, len(real.peaks) / real.hours, request.alarm),
@@ -372,9 +358,9 @@ def _text(
     work: _Work,
     described: Path | None,
     outcome: Outcome,
-    rest: tuple[Sequence[Reason], Sequence[Floor], str],
+    rest: tuple[Sequence[Reason], Sequence[Floor], str, bool],
 ) -> str:
-    against, floors, date = rest
+    against, floors, date, small_faults = rest
     request = work.request
     record = Record(
         date=date,
@@ -382,6 +368,7 @@ def _text(
         held_out=outcome.held_name,
         method="exponential tails of the classifier's evidence, real driving and simulated shoves",
         level=outcome.level,
+        small_faults=small_faults,
         floors={floor.kind: floor.words for floor in floors},
         verdict="no-go" if against else "go",
         stamp=""

@@ -32,6 +32,7 @@ class Record:
     held_out: str
     method: str
     level: AlarmLevel
+    small_faults: bool  # whether they are looked for
     floors: Mapping[str, str]  # smallest size found, by fault
     verdict: str
     stamp: str  # for the status of the classifier; empty: it is not commissioned
@@ -59,7 +60,12 @@ def commissioned_text(
     )
     # Evidence in decades is the window classifier's.
     classifier = merged.setdefault(CLASSIFIER, {})
-    classifier.update(classifier="window", caution=record.level.caution, commissioned=record.stamp)
+    classifier.update(
+        classifier="window",
+        caution=record.level.caution,
+        small_faults=record.small_faults,
+        commissioned=record.stamp,
+    )
     merged[COMMISSIONING] = {
         DATE: record.date,
         "version": suite_version(),

@@ -54,14 +54,22 @@ def evidence_in(
     frames: Iterable[ResidualFrame], settings: ClassifierSettings, robot: Robot
 ) -> Array:
     """Decades of evidence for a fault at each tick, 0 where nothing could be decided, (n,)."""
+    return witnessed(frames, settings, robot)[0]
+
+
+def witnessed(
+    frames: Iterable[ResidualFrame], settings: ClassifierSettings, robot: Robot
+) -> tuple[Array, float]:
+    """The same, and the most that small faults that last gathered [nats]."""
     witness = _Witness(settings)
     classifier = FaultClassifier.around(witness, robot)
-    found = []
+    found, most = [], 0.0
     for frame in frames:
         witness.newest = 0.0
         classifier.classify(frame)
         found.append(witness.newest)
-    return np.array(found)
+        most = max(most, witness.gathered)
+    return np.array(found), most
 
 
 @frozen

@@ -298,14 +298,14 @@ def test_currents_show_what_drags() -> None:
     assert found[WEAKS].max() == 0.0
 
 
-def test_it_is_looked_for_on_commissioned_robots_alone() -> None:
+def test_it_is_looked_for_where_that_is_asked_for_alone() -> None:
     """There the network sees nothing in it, and the belief gathers it."""
     off = 0.35 * BAND / of_friction(20, 1, 1.0)[1]
     healthy = [frame(t, NOTHING) for t in range(3 * SECOND)]
     ticks = [*healthy, *(frame(3 * SECOND + t, of_friction(t, 1, off)) for t in range(8 * SECOND))]
     named = []
-    for commissioned in ("", "2026-11-25"):
-        classifier = FaultClassifier.of(ClassifierSettings(commissioned=commissioned), ROBOT)
+    for small_faults in (False, True):
+        classifier = FaultClassifier.of(ClassifierSettings(small_faults=small_faults), ROBOT)
         said = [classifier.classify(item) for item in ticks]
         named.append({one.state.name for one in said if one is not None})
     assert not any("drag" in name for name in named[0])
@@ -323,7 +323,7 @@ class Contrary:
 
 @pytest.mark.parametrize(("shaken", "drags"), [(0, True), (5, False)])
 def test_the_belief_gathers_it_but_not_after_a_push(shaken: int, drags: bool) -> None:
-    judge = WindowJudge(cast(WindowNetwork, Contrary()), ClassifierSettings(commissioned="today"))
+    judge = WindowJudge(cast(WindowNetwork, Contrary()), ClassifierSettings(small_faults=True))
     lasting = np.zeros(HYPOTHESES)
     lasting[DRAGS.start] = 8.0
     item = frame(0, NOTHING)
@@ -337,7 +337,7 @@ def test_the_belief_gathers_it_but_not_after_a_push(shaken: int, drags: bool) ->
 
 
 def test_a_classifier_that_starts_afresh_forgets_it() -> None:
-    classifier = FaultClassifier.of(ClassifierSettings(commissioned="today"), ROBOT)
+    classifier = FaultClassifier.of(ClassifierSettings(small_faults=True), ROBOT)
     for item in drag(0.5):
         classifier.classify(item)
     watch = classifier._lasting

@@ -81,7 +81,7 @@ _SLIGHT = 1.0
 # within bands that are the robot's own: it says so much less where neither forces nor a gyro show
 # one.
 _SHAKEN, _DOUBTED = 12, 2.0
-_GATHERED = 12.0  # that small faults which last have shown, in place of a striking window
+GATHERED = 12.0  # nats, that small faults which last have shown, in place of a striking window
 _HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
 _FIRM = _HIDDEN[1:]  # faults that hold a wheel: one without its signal goes where others pull it
 _OF_A_WHEEL = (*_HIDDEN, METERS)
@@ -284,9 +284,14 @@ class WindowJudge:
         odds = most / float(shares[_GROUPS[0]].sum())
         return max(self.settings.caution + math.log10(odds), 0.0)
 
+    @property
+    def gathered(self) -> float:
+        """What the likeliest small fault that lasts has gathered so far [nats]."""
+        return float(self._gathered.max())
+
     def _is_striking(self, state: int) -> bool:
         """Whether a window of the last half second spoke for a state by itself, or many little."""
-        if state < HYPOTHESES and self._gathered[state] > _GATHERED:
+        if state < HYPOTHESES and self._gathered[state] > GATHERED:
             return True
         return any(window[state] > self.settings.striking for window in self._recent)
 

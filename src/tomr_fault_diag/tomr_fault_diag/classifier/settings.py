@@ -41,6 +41,13 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
         "str",
         "",
     ),
+    _S(
+        "small_faults",
+        "of window: look for small faults that last within the robot's own bands; tomr_commission "
+        "sets it where healthy driving looks like none",
+        "bool",
+        False,
+    ),
     HARDWARE_ID,
     _S("evidence_weight", "of window: what one window counts", "float", 0.5, "", 0.01, 1.0),
     _S(
@@ -114,6 +121,7 @@ class ClassifierSettings:
     hardware_id: str = NAMELESS
     input_order: str = "speeds_first"
     commissioned: str = ""
+    small_faults: bool = False
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:
@@ -144,4 +152,5 @@ class ClassifierSettings:
             hardware_id=str(values["hardware_id"]) or NAMELESS,
             input_order=str(values["input_order"]),
             commissioned=str(values["commissioned"]),
+            small_faults=bool(values["small_faults"]),
         )

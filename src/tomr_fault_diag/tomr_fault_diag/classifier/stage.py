@@ -95,8 +95,8 @@ class FaultClassifier:
 
     @classmethod
     def around(cls, judge: Judge, robot: Robot, severity: SeverityWatch | None = None) -> Self:
-        """A judge, and what contacts and, of a commissioned robot, small faults show beside it."""
-        lasting = LastingWatch(robot) if judge.settings.commissioned else None
+        """A judge, and what contacts and, where they are looked for, small faults show beside."""
+        lasting = LastingWatch(robot) if judge.settings.small_faults else None
         misfits = MisfitWatch(Motors(robot).idle.tolist())
         return cls(judge, severity, SlideWatch(robot), lasting, misfits)
 
