@@ -241,21 +241,29 @@ def test_ticks_of_one_slot_count_once() -> None:
     assert np.array_equal(doubled[::2], doubled[1::2])
 
 
-def test_a_tick_that_lacks_something_says_nothing() -> None:
+@pytest.mark.parametrize(
+    "lacking",
+    [
+        {ENCODERS[1]: (math.nan, math.nan, math.nan)},  # no encoder
+        {MOTORS[1]: (math.nan, BAND, 20.0), ENCODERS[1]: (math.nan, BAND, 20.0)},  # no power
+        {SPEEDS[0]: (math.nan, math.nan, math.nan)},
+    ],
+)
+def test_a_tick_that_lacks_something_says_nothing(
+    lacking: dict[int, tuple[float, float, float]],
+) -> None:
     ticks = drag(0.5)
     gone = evolve(
-        ticks[-1],
+        ticks[60],
         residuals=tuple(
-            Residual(math.nan, math.nan, math.nan, item.unit, "stale")
-            if index == ENCODERS[1]
-            else item
-            for index, item in enumerate(ticks[-1].residuals)
+            Residual(*lacking[index], item.unit, "stale") if index in lacking else item
+            for index, item in enumerate(ticks[60].residuals)
         ),
     )
     watch = LastingWatch(ROBOT)
-    for item in ticks[:-1]:
-        watch.take(item, True)
-    assert not watch.take(gone, True).any()
+    said = [watch.take(item, True) for item in [*ticks[:60], gone, *ticks[61:]]]
+    assert not said[60].any()
+    assert said[-1][DRAGS.start + 1] > 0.0  # it goes on
 
 
 @pytest.mark.parametrize("channels", [range(1, 10), ENCODERS])

@@ -114,9 +114,9 @@ class LastingWatch:
             return self._said
         with np.errstate(over="ignore", invalid="ignore"):
             effects, shared = self._effects(frame)
-        if not np.isfinite(effects).all() or not np.isfinite(shared).all():
-            return self._said  # something is not known, or beyond all numbers
         shown = _shown(frame)
+        if not all(np.isfinite(part).all() for part in (shown, effects, shared)):
+            return self._said  # something is not known, or beyond all numbers
         sudden = shown - self._came_slowly(effects)
         if is_well:
             self._learn_slowly(shown, effects, elapsed)
