@@ -344,6 +344,24 @@ def test_the_belief_gathers_it_but_not_after_a_push(shaken: int, drags: bool) ->
     assert (said.leading in DRAGGING) == drags
 
 
+def test_a_sensor_that_freezes_for_a_second_leaves_a_diagnosis() -> None:
+    """Its power is not known meanwhile, its band is."""
+    classifier = FaultClassifier.of(ClassifierSettings(small_faults=True), ROBOT)
+    said = classifier.classify(frame(0, NOTHING))
+    for tick in range(1, 7 * SECOND):
+        item = frame(tick, NOTHING if tick < 4 * SECOND else of_friction(tick, 1, 0.5))
+        if SECOND <= tick < 2 * SECOND:
+            residuals = list(item.residuals)
+            for index in (MOTORS[2], ENCODERS[2]):
+                residuals[index] = evolve(residuals[index], residual=math.nan, missing="frozen")
+            item = evolve(item, residuals=tuple(residuals))
+        said = classifier.classify(item) or said
+        assert said is not None
+        assert np.isfinite(said.probabilities).all()
+    assert said is not None
+    assert said.state is DRAGGING[1]
+
+
 def test_a_classifier_that_starts_afresh_forgets_it() -> None:
     classifier = FaultClassifier.of(ClassifierSettings(small_faults=True), ROBOT)
     for item in drag(0.5):
