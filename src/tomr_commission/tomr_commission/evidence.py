@@ -11,7 +11,7 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
+from tomr_fault_diag.classifier.evidence import ALONE, Beside
 from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
@@ -42,10 +42,9 @@ class _Witness(WindowJudge):
         frame: ResidualFrame,
         elapsed_ns: int,
         unseen: Unseen,
-        contacts: Contacts = NOTHING,
-        lasting: Array | None = None,
+        beside: Beside = ALONE,
     ) -> Opinion:
-        opinion = super().judge(frame, elapsed_ns, unseen, contacts, lasting)
+        opinion = super().judge(frame, elapsed_ns, unseen, beside)
         self.newest = self.evidence()
         return opinion
 

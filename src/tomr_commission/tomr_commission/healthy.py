@@ -42,24 +42,19 @@ def healthy(
 
     `block`: length of a block [s].
     """
-    looking = _judged(drives, bands, evolve(settings, small_faults=True), robot, block)
+    hours = sum(drive.hours for drive in drives)
+
+    def judged(small_faults: bool) -> Healthy:
+        chosen = evolve(settings, small_faults=small_faults)
+        peaks: list[float] = []
+        most = 0.0
+        for drive in drives:
+            evidence, gathered = witnessed(frames_of(drive, bands), chosen, robot)
+            peaks += block_peaks(evidence, drive.seconds, block)
+            most = max(most, gathered)
+        return Healthy(chosen, tuple(peaks), hours, most)
+
+    looking = judged(small_faults=True)
     if looking.gathered <= _MOST:
         return looking
-    without = _judged(drives, bands, evolve(settings, small_faults=False), robot, block)
-    return evolve(without, gathered=looking.gathered)
-
-
-def _judged(
-    drives: Sequence[Observed],
-    bands: BandSettings,
-    settings: ClassifierSettings,
-    robot: Robot,
-    block: float,
-) -> Healthy:
-    peaks: list[float] = []
-    most = 0.0
-    for drive in drives:
-        evidence, gathered = witnessed(frames_of(drive, bands), settings, robot)
-        peaks += block_peaks(evidence, drive.seconds, block)
-        most = max(most, gathered)
-    return Healthy(settings, tuple(peaks), sum(drive.hours for drive in drives), most)
+    return evolve(judged(small_faults=False), gathered=looking.gathered)

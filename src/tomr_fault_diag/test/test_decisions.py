@@ -6,12 +6,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from attrs import evolve
-from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier import states
 from tomr_fault_diag.classifier.advice import check_first
 from tomr_fault_diag.classifier.belief import CONTROLS, HYPOTHESES
-from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
+from tomr_fault_diag.classifier.evidence import ALONE, Beside
 from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message, six_state
 from tomr_fault_diag.classifier.observability import Unseen
@@ -48,8 +47,6 @@ from tomr_fault_diag.residuals.frame import (
 from tomr_power_model.messages.plain import Level
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import shipped_robot
-
-Array = NDArray[np.float64]
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
@@ -292,8 +289,7 @@ class Fixed:
         frame: ResidualFrame,
         elapsed_ns: int,
         unseen: Unseen,
-        contacts: Contacts = NOTHING,
-        lasting: Array | None = None,
+        beside: Beside = ALONE,
     ) -> Opinion:
         return Opinion(np.eye(6)[MOTOR + self.wheel], sure=True, wheel=self.wheel)
 
@@ -343,8 +339,7 @@ class Leading(Fixed):
         frame: ResidualFrame,
         elapsed_ns: int,
         unseen: Unseen,
-        contacts: Contacts = NOTHING,
-        lasting: Array | None = None,
+        beside: Beside = ALONE,
     ) -> Opinion:
         return Opinion(np.eye(6)[NORMAL], self.sure, state=self.state)
 
@@ -424,8 +419,7 @@ class OfWheel(Leading):
         frame: ResidualFrame,
         elapsed_ns: int,
         unseen: Unseen,
-        contacts: Contacts = NOTHING,
-        lasting: Array | None = None,
+        beside: Beside = ALONE,
     ) -> Opinion:
         return evolve(super().judge(frame, elapsed_ns, unseen), wheel=self.wheel)
 

@@ -9,6 +9,7 @@ from attrs import evolve
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.belief import DRAGS, HYPOTHESES, METERS, WEAKS
+from tomr_fault_diag.classifier.evidence import Beside
 from tomr_fault_diag.classifier.judges import WindowJudge
 from tomr_fault_diag.classifier.lasting import LastingWatch, _beyond_others
 from tomr_fault_diag.classifier.motors import Motors
@@ -338,7 +339,7 @@ def test_the_belief_gathers_it_but_not_after_a_push(shaken: int, drags: bool) ->
     for tick in range(2 * SECOND):
         judge._shaken = shaken
         said = judge.judge(
-            evolve(item, stamp_ns=BASE + TICK * tick), TICK, Unseen(), lasting=lasting
+            evolve(item, stamp_ns=BASE + TICK * tick), TICK, Unseen(), Beside(lasting=lasting)
         )
     assert said.sure == drags
     assert (said.leading in DRAGGING) == drags

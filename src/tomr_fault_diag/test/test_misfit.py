@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 from attrs import evolve
-from numpy.typing import NDArray
 
-from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
+from tomr_fault_diag.classifier.evidence import ALONE, Beside
 from tomr_fault_diag.classifier.judges import Opinion
 from tomr_fault_diag.classifier.misfit import MisfitWatch
 from tomr_fault_diag.classifier.motors import Motors
@@ -23,8 +22,6 @@ from tomr_fault_diag.classifier.states import (
 from tomr_fault_diag.residuals.frame import MOTORS, Residual, ResidualFrame
 from tomr_power_model.messages.plain import Level
 from tomr_power_model.robot import shipped_robot
-
-Array = NDArray[np.float64]
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
@@ -63,8 +60,7 @@ class Sure:
         frame: ResidualFrame,
         elapsed_ns: int,
         unseen: Unseen,
-        contacts: Contacts = NOTHING,
-        lasting: Array | None = None,
+        beside: Beside = ALONE,
     ) -> Opinion:
         return Opinion(np.eye(6)[self.state], sure=True)
 
@@ -344,8 +340,7 @@ def test_a_fault_that_is_not_sure_is_not_named_beside_a_low_supply() -> None:
             frame: ResidualFrame,
             elapsed_ns: int,
             unseen: Unseen,
-            contacts: Contacts = NOTHING,
-            lasting: Array | None = None,
+            beside: Beside = ALONE,
         ) -> Opinion:
             return evolve(super().judge(frame, elapsed_ns, unseen), sure=False)
 

@@ -6,9 +6,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from attrs import evolve
-from numpy.typing import NDArray
 
-from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
+from tomr_fault_diag.classifier.evidence import ALONE, Beside
 from tomr_fault_diag.classifier.judges import Opinion
 from tomr_fault_diag.classifier.messages import diagnosis_message
 from tomr_fault_diag.classifier.motors import Motors
@@ -38,8 +37,6 @@ from tomr_fault_diag.classifier.states import (
 )
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame, Unit
 from tomr_power_model.robot import shipped_robot
-
-Array = NDArray[np.float64]
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
@@ -441,7 +438,6 @@ class Dragging:
         frame: ResidualFrame,
         elapsed_ns: int,
         unseen: Unseen,
-        contacts: Contacts = NOTHING,
-        lasting: Array | None = None,
+        beside: Beside = ALONE,
     ) -> Opinion:
         return Opinion(np.eye(6)[MOTOR + 1], sure=True, wheel=1, state=DRAGGING[1])

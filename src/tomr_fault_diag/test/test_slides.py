@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.belief import DRAGS, ENCODERS, EXTERNAL, OTHER
 from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
-from tomr_fault_diag.classifier.evidence import said_by_forces
+from tomr_fault_diag.classifier.evidence import Beside, said_by_forces
 from tomr_fault_diag.classifier.judges import WindowJudge, make_judge
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import Unseen
@@ -237,7 +237,7 @@ def newest(contacts: Contacts, off: float = 0.0) -> Array:
             residuals = list(item.residuals)
             residuals[4] = evolve(residuals[4], residual=off)
             item = evolve(item, residuals=tuple(residuals))
-        judge.judge(item, 50 * MS, Unseen(), contacts)
+        judge.judge(item, 50 * MS, Unseen(), Beside(contacts))
     return judge._recent[-1]
 
 

@@ -29,6 +29,7 @@ from tomr_fault_diag.classifier.belief import (
     of_states,
 )
 from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
+from tomr_fault_diag.classifier.evidence import Beside
 from tomr_fault_diag.classifier.features import (
     BLIND,
     CHANNELS,
@@ -678,7 +679,7 @@ def test_what_a_push_leaves_is_slip_only_where_forces_show_one() -> None:
 
     def said(ticks: int, first: int, contacts: Contacts = NOTHING) -> NDArray[np.float64]:
         for tick in range(first, first + ticks):
-            judge.judge(frame(tick), 50 * MS, Unseen(), contacts)
+            judge.judge(frame(tick), 50 * MS, Unseen(), Beside(contacts))
         newest = judge._recent[-1]
         return newest - newest[NORMAL]
 
@@ -699,7 +700,7 @@ def test_within_bands_of_its_own_a_robot_hardly_slips() -> None:
         settings = ClassifierSettings(commissioned=commissioned)
         judge = WindowJudge(network, settings)  # type: ignore[arg-type]
         for tick in range(20):
-            judge.judge(frame(tick), 50 * MS, Unseen(), contacts)
+            judge.judge(frame(tick), 50 * MS, Unseen(), Beside(contacts))
         return float(judge._recent[-1][SLIP] - judge._recent[-1][NORMAL])
 
     calm = Contacts(0.0, calm=True)

@@ -7,10 +7,11 @@ pushes.
 import math
 
 import numpy as np
+from attrs import field, frozen
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.belief import DRAGS, ENCODERS, EXTERNAL, HYPOTHESES, OTHER
-from tomr_fault_diag.classifier.contacts import Contacts
+from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.misfit import is_far
 from tomr_fault_diag.classifier.states import SLIP
 from tomr_fault_diag.residuals.frame import SPEEDS, ResidualFrame
@@ -23,6 +24,17 @@ _MOST = 10.0  # that either says in a tick
 _LEAST_DOUBT = 1e-6  # of a slide
 _MISCOUNTS = 0.7  # of what forces say for slip: for an encoder that loses counts
 _CERTAIN = 24.0  # against all that leaves a wheel turning
+
+
+@frozen
+class Beside:
+    """What is known of a tick beside its residuals."""
+
+    contacts: Contacts = NOTHING
+    lasting: Array = field(factory=lambda: np.zeros(HYPOTHESES))  # by small faults that last
+
+
+ALONE = Beside()  # a tick is judged
 
 
 def astray(frame: ResidualFrame) -> list[int]:

@@ -30,8 +30,7 @@ from tomr_fault_diag.classifier.belief import (
     named_of,
     of_states,
 )
-from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
-from tomr_fault_diag.classifier.evidence import astray, said_by_forces, said_by_gyro
+from tomr_fault_diag.classifier.evidence import ALONE, Beside, astray, said_by_forces, said_by_gyro
 from tomr_fault_diag.classifier.features import CHANNELS, WINDOW, channels_of, turning
 from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.observability import Unseen
@@ -107,8 +106,8 @@ class Opinion:
 
 
 @frozen
-class _Beside:
-    """What is known of a tick beside what the network makes of it: log-likelihoods (19,)."""
+class _Weighed:
+    """What counts in a tick beside what the network makes of it: log-likelihoods (19,)."""
 
     said: Array  # by the gyro and the forces
     is_calm: bool  # all lies within bands that are the robot's own
@@ -133,11 +132,10 @@ class Judge(Protocol):
         frame: ResidualFrame,
         elapsed_ns: int,
         unseen: Unseen,
-        contacts: Contacts = NOTHING,
-        lasting: Array | None = None,
+        beside: Beside = ALONE,
     ) -> Opinion:
-        """Look at the newest frame, so long after the one before, what it cannot show, what the
-        forces of the contacts do, and what small faults that last."""
+        """Look at the newest frame, so long after the one before, what it cannot show, and
+        what is known beside."""
         ...
 
 
@@ -179,8 +177,7 @@ class WindowJudge:
         frame: ResidualFrame,
         elapsed_ns: int,
         unseen: Unseen,
-        contacts: Contacts = NOTHING,
-        lasting: Array | None = None,
+        beside: Beside = ALONE,
     ) -> Opinion:
         """Look at the newest frame."""
         if elapsed_ns > _TOO_LONG:
@@ -188,26 +185,26 @@ class WindowJudge:
         slot = frame.stamp_ns // _TICK
         count = 1 if self._slot is None else slot - self._slot
         self._slot = slot
-        said = said_by_gyro(frame) + said_by_forces(frame, contacts)
-        is_calm = contacts.calm and bool(self.settings.commissioned)
-        beside = _Beside(said, is_calm, np.zeros(HYPOTHESES) if lasting is None else lasting)
+        said = said_by_gyro(frame) + said_by_forces(frame, beside.contacts)
+        is_calm = beside.contacts.calm and bool(self.settings.commissioned)
+        weighed = _Weighed(said, is_calm, beside.lasting)
         for _ in range(count):
-            self._opinion = self._step(frame, unseen, beside)
+            self._opinion = self._step(frame, unseen, weighed)
         return self._opinion
 
-    def _step(self, frame: ResidualFrame, unseen: Unseen, beside: _Beside) -> Opinion:
+    def _step(self, frame: ResidualFrame, unseen: Unseen, weighed: _Weighed) -> Opinion:
         """Opinion after one more tick of the network."""
-        said = beside.said
+        said = weighed.said
         self._window[:-1] = self._window[1:]
         self._window[-1] = channels_of(frame)
         self._lacking = max(self._lacking - 1, 0)
         if self._lacking:
             return self._opinion
         likelihoods = self._seen(frame, unseen)
-        if (self._shaken or beside.is_calm) and said[SLIP] <= 0.0:
+        if (self._shaken or weighed.is_calm) and said[SLIP] <= 0.0:
             likelihoods[SLIP] -= _DOUBTED
         if not self._shaken:
-            likelihoods = self._with_lasting(likelihoods, beside.lasting)
+            likelihoods = self._with_lasting(likelihoods, weighed.lasting)
         likelihoods = of_states(likelihoods + said)
         shares = self._belief.update(likelihoods)
         self._shaken = _SHAKEN if shares[EXTERNAL] > 0.5 else max(self._shaken - 1, 0)
@@ -253,8 +250,8 @@ class WindowJudge:
 
     def _with_lasting(self, likelihoods: Array, lasting: Array) -> Array:
         """With small faults that last: a window that does not show them says nothing against."""
-        weighed = self.settings.evidence_weight * lasting
-        self._gathered = np.maximum(self._gathered + weighed, 0.0)
+        counted = self.settings.evidence_weight * lasting
+        self._gathered = np.maximum(self._gathered + counted, 0.0)
         unseen = (lasting > 0.0) & (likelihoods < likelihoods[NORMAL])
         return np.where(unseen, likelihoods[NORMAL], likelihoods) + lasting
 
@@ -352,8 +349,7 @@ class CodeJudge:
         frame: ResidualFrame,
         elapsed_ns: int,
         unseen: Unseen,
-        contacts: Contacts = NOTHING,
-        lasting: Array | None = None,
+        beside: Beside = ALONE,
     ) -> Opinion:
         """Look at the newest frame."""
         now = self._answer(frame.codes)

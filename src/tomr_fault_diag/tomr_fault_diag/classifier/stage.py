@@ -5,6 +5,7 @@ from typing import Self
 from attrs import evolve, field, frozen
 
 from tomr_fault_diag.classifier.contacts import NOTHING
+from tomr_fault_diag.classifier.evidence import Beside
 from tomr_fault_diag.classifier.judges import Judge, Opinion, make_judge
 from tomr_fault_diag.classifier.lasting import LastingWatch
 from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
@@ -204,8 +205,10 @@ class FaultClassifier:
             self._enter(DISOBEYS, frame.stamp_ns, None)
             return
         is_well = self._state is STATES[NORMAL]
-        lasting = None if self._lasting is None else self._lasting.take(frame, is_well)
-        self._opinion = self._judge.judge(frame, elapsed, self._unseen, contacts, lasting)
+        beside = Beside(contacts)
+        if self._lasting is not None:
+            beside = Beside(contacts, self._lasting.take(frame, is_well))
+        self._opinion = self._judge.judge(frame, elapsed, self._unseen, beside)
         if data.enough or self._state not in _QUIET:
             self._weigh(self._opinion, misfit, frame.stamp_ns)
         else:
