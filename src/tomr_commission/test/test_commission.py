@@ -13,6 +13,7 @@ import yaml
 from tomr_commission.cli import main
 from tomr_commission.commission import _observe
 from tomr_commission.explained import Split
+from tomr_commission.healthy import MOST_GATHERED
 from tomr_commission.observed import Observed
 from tomr_commission.rehearsal import Shoved
 from tomr_commission.report.figures import end_to_end
@@ -93,6 +94,30 @@ def test_short_drive_is_a_no_go_that_says_what_to_record(done: Path) -> None:
     page = (done / "commission.html").read_text()
     assert "NO-GO" in page
     assert page.count("data:image/png") == 2
+
+
+def test_small_faults_are_looked_for_from_then_on(done: Path, steps: dict[str, Mock]) -> None:
+    """In simulated hours and in trials as well, as a robot will be judged."""
+    written = done / "commissioned.yaml"
+    settings = DiagnosisSettings.of(read_node_sections(written, NODES), str(written)).classifier
+    assert settings.small_faults
+    assert report(done)["small_faults"]["looked_for"]
+    assert 0.0 <= report(done)["small_faults"]["gathered_in_healthy_driving"] <= MOST_GATHERED
+    assert steps["rehearse"].call_args.args[2].small_faults
+    assert steps["inject"].call_args.args[2].small_faults
+
+
+def test_where_healthy_driving_looks_like_a_small_fault_a_note_says_so(
+    tmp_path: Path, steps: dict[str, Mock]
+) -> None:
+    with patch("tomr_commission.healthy.MOST_GATHERED", -1.0):
+        assert run(tmp_path) == 1
+    written = tmp_path / "commissioned.yaml"
+    settings = DiagnosisSettings.of(read_node_sections(written, NODES), str(written)).classifier
+    assert not settings.small_faults
+    assert not report(tmp_path)["small_faults"]["looked_for"]
+    assert any("small faults that last are not" in note for note in report(tmp_path)["notes"])
+    assert not steps["rehearse"].call_args.args[2].small_faults
 
 
 def test_drives_that_are_held_out_are_drawn_one_after_the_other(

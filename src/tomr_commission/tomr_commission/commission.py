@@ -20,7 +20,7 @@ from tomr_commission.commissioned import (
 )
 from tomr_commission.evidence import decisions
 from tomr_commission.explained import EXPLAINED, FOLDER, Split, explain_drives
-from tomr_commission.healthy import Healthy, healthy
+from tomr_commission.healthy import MOST_GATHERED, Healthy, healthy
 from tomr_commission.injected import kinds_for, try_injected
 from tomr_commission.observed import Observed, frames_of, observe, reports_currents, unit_of_motors
 from tomr_commission.parallel import on_all_cores
@@ -56,9 +56,6 @@ _CURRENTS = (
     "shoves were not simulated: the robot reports currents, not powers; so the alarm level is the "
     "shipped one at least, and how many false alarms shoves raise is not known"
 )
-_NO_SMALL_FAULTS = (
-    "small faults that last are not looked for: within its bands healthy driving looks like one"
-)
 _MORE = 1.1  # of the least that is held out: ends of recordings are not compared
 _TO_BE = "to be"  # commissioned: it is judged as it will be
 _HOPELESS = 1.5  # times the caution that may be needed: more shoves will not bring it down
@@ -73,6 +70,7 @@ class Commissioned:
     reasons: tuple[Reason, ...]
     regimes: tuple[RegimeLine, ...]
     margin: float  # of the bands
+    driven: Healthy
     shoved: Shoved
     plan: Rehearsal
     trials: tuple[Trial, ...]
@@ -130,7 +128,10 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     trials = try_injected(longest, bands, chosen, kinds_for(longest), robot)
     notes = [note for drive in work.drives for note in drive.notes]
     if not chosen.small_faults:
-        notes.append(_NO_SMALL_FAULTS)
+        notes.append(
+            "small faults that last are not looked for: healthy driving looks like one within its "
+            f"bands (it gathers {tuned.driven.gathered:.0f} nats, {MOST_GATHERED:g} are allowed)"
+        )
     if reports_currents(longest):
         notes.append(_CURRENTS)
     simulated, note = work.simulated(described, bands, chosen, unit_of_motors(longest))
@@ -148,6 +149,7 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
         reasons=against,
         regimes=tuple(regime_table(fitted, bands)),
         margin=tuned.margin,
+        driven=tuned.driven,
         shoved=tuned.shoved,
         notes=tuple(notes),
         plan=plan,

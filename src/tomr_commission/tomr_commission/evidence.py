@@ -38,11 +38,7 @@ class _Witness(WindowJudge):
         self.newest = 0.0
 
     def judge(
-        self,
-        frame: ResidualFrame,
-        elapsed_ns: int,
-        unseen: Unseen,
-        beside: Beside = ALONE,
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, beside: Beside = ALONE
     ) -> Opinion:
         opinion = super().judge(frame, elapsed_ns, unseen, beside)
         self.newest = self.evidence()

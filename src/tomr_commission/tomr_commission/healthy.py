@@ -18,7 +18,7 @@ from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.robot import Robot
 
-_MOST = 0.5 * GATHERED  # that may gather in healthy driving
+MOST_GATHERED = 0.5 * GATHERED  # nats, in healthy driving
 
 
 @frozen
@@ -55,6 +55,6 @@ def healthy(
         return Healthy(chosen, tuple(peaks), hours, most)
 
     looking = judged(small_faults=True)
-    if looking.gathered <= _MOST:
+    if looking.gathered <= MOST_GATHERED:
         return looking
     return evolve(judged(small_faults=False), gathered=looking.gathered)

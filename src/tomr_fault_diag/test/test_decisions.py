@@ -285,11 +285,7 @@ class Fixed:
     def interrupt(self) -> None: ...
 
     def judge(
-        self,
-        frame: ResidualFrame,
-        elapsed_ns: int,
-        unseen: Unseen,
-        beside: Beside = ALONE,
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, beside: Beside = ALONE
     ) -> Opinion:
         return Opinion(np.eye(6)[MOTOR + self.wheel], sure=True, wheel=self.wheel)
 
@@ -335,11 +331,7 @@ class Leading(Fixed):
         self.state, self.sure = state, sure
 
     def judge(
-        self,
-        frame: ResidualFrame,
-        elapsed_ns: int,
-        unseen: Unseen,
-        beside: Beside = ALONE,
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, beside: Beside = ALONE
     ) -> Opinion:
         return Opinion(np.eye(6)[NORMAL], self.sure, state=self.state)
 
@@ -415,11 +407,7 @@ class OfWheel(Leading):
     wheel = 0
 
     def judge(
-        self,
-        frame: ResidualFrame,
-        elapsed_ns: int,
-        unseen: Unseen,
-        beside: Beside = ALONE,
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, beside: Beside = ALONE
     ) -> Opinion:
         return evolve(super().judge(frame, elapsed_ns, unseen), wheel=self.wheel)
 

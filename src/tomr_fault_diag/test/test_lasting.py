@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.belief import DRAGS, HYPOTHESES, METERS, WEAKS
 from tomr_fault_diag.classifier.evidence import Beside
-from tomr_fault_diag.classifier.judges import WindowJudge
+from tomr_fault_diag.classifier.judges import GATHERED, WindowJudge
 from tomr_fault_diag.classifier.lasting import LastingWatch, _beyond_others
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import Unseen
@@ -343,6 +343,20 @@ def test_the_belief_gathers_it_but_not_after_a_push(shaken: int, drags: bool) ->
         )
     assert said.sure == drags
     assert (said.leading in DRAGGING) == drags
+
+
+def test_what_ended_does_not_count_for_long() -> None:
+    """A minute of a fault is forgotten in two seconds."""
+    judge = WindowJudge(cast(WindowNetwork, Contrary()), ClassifierSettings(small_faults=True))
+    shows, ended = np.zeros(HYPOTHESES), np.zeros(HYPOTHESES)
+    shows[DRAGS.start], ended[DRAGS.start] = 12.0, -1.2
+    gathered = []
+    for tick in range(62 * SECOND):
+        lasting = shows if tick < 60 * SECOND else ended
+        judge.judge(frame(tick, NOTHING), TICK, Unseen(), Beside(lasting=lasting))
+        gathered.append(judge.gathered)
+    assert gathered[60 * SECOND - 1] > GATHERED
+    assert gathered[-1] < GATHERED
 
 
 def test_a_sensor_that_freezes_for_a_second_leaves_a_diagnosis() -> None:

@@ -56,11 +56,7 @@ class Sure:
         pass
 
     def judge(
-        self,
-        frame: ResidualFrame,
-        elapsed_ns: int,
-        unseen: Unseen,
-        beside: Beside = ALONE,
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, beside: Beside = ALONE
     ) -> Opinion:
         return Opinion(np.eye(6)[self.state], sure=True)
 
@@ -336,11 +332,7 @@ def test_other_faults_are_named_beside_a_low_supply_and_leave_it_behind() -> Non
 def test_a_fault_that_is_not_sure_is_not_named_beside_a_low_supply() -> None:
     class Unsure(Sure):
         def judge(
-            self,
-            frame: ResidualFrame,
-            elapsed_ns: int,
-            unseen: Unseen,
-            beside: Beside = ALONE,
+            self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, beside: Beside = ALONE
         ) -> Opinion:
             return evolve(super().judge(frame, elapsed_ns, unseen), sure=False)
 

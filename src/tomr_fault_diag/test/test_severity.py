@@ -434,10 +434,6 @@ class Dragging:
         pass
 
     def judge(
-        self,
-        frame: ResidualFrame,
-        elapsed_ns: int,
-        unseen: Unseen,
-        beside: Beside = ALONE,
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, beside: Beside = ALONE
     ) -> Opinion:
         return Opinion(np.eye(6)[MOTOR + 1], sure=True, wheel=1, state=DRAGGING[1])

@@ -85,6 +85,10 @@ def fields(found: Commissioned) -> dict[str, Any]:
             "tails": [asdict(tail) for tail in level.tails],
             "simulated_hours": found.shoved.hours,
         },
+        "small_faults": {
+            "looked_for": found.driven.settings.small_faults,
+            "gathered_in_healthy_driving": found.driven.gathered,
+        },
         "held_out": {
             "name": outcome.held_name,
             "hours": outcome.held_hours,

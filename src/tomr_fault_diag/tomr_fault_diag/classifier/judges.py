@@ -80,6 +80,7 @@ _SLIGHT = 1.0
 # within bands that are the robot's own: it says so much less where neither forces nor a gyro show
 # one.
 _SHAKEN, _DOUBTED = 12, 2.0
+_MOST_GATHERED = 24.0  # nats: what ended long ago must not count for long
 GATHERED = 12.0  # nats, that small faults which last have shown, in place of a striking window
 _HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
 _FIRM = _HIDDEN[1:]  # faults that hold a wheel: one without its signal goes where others pull it
@@ -128,11 +129,7 @@ class Judge(Protocol):
         ...
 
     def judge(
-        self,
-        frame: ResidualFrame,
-        elapsed_ns: int,
-        unseen: Unseen,
-        beside: Beside = ALONE,
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, beside: Beside = ALONE
     ) -> Opinion:
         """Look at the newest frame, so long after the one before, what it cannot show, and
         what is known beside."""
@@ -173,11 +170,7 @@ class WindowJudge:
         self._slot, self._lacking = None, WINDOW
 
     def judge(
-        self,
-        frame: ResidualFrame,
-        elapsed_ns: int,
-        unseen: Unseen,
-        beside: Beside = ALONE,
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, beside: Beside = ALONE
     ) -> Opinion:
         """Look at the newest frame."""
         if elapsed_ns > _TOO_LONG:
@@ -251,7 +244,7 @@ class WindowJudge:
     def _with_lasting(self, likelihoods: Array, lasting: Array) -> Array:
         """With small faults that last: a window that does not show them says nothing against."""
         counted = self.settings.evidence_weight * lasting
-        self._gathered = np.maximum(self._gathered + counted, 0.0)
+        self._gathered = np.clip(self._gathered + counted, 0.0, _MOST_GATHERED)
         unseen = (lasting > 0.0) & (likelihoods < likelihoods[NORMAL])
         return np.where(unseen, likelihoods[NORMAL], likelihoods) + lasting
 
@@ -345,11 +338,7 @@ class CodeJudge:
         self._smoothed, self._led = None, 0
 
     def judge(
-        self,
-        frame: ResidualFrame,
-        elapsed_ns: int,
-        unseen: Unseen,
-        beside: Beside = ALONE,
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, beside: Beside = ALONE
     ) -> Opinion:
         """Look at the newest frame."""
         now = self._answer(frame.codes)
