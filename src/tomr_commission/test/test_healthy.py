@@ -31,7 +31,7 @@ def test_small_faults_are_not_looked_for_where_healthy_driving_looks_like_one(
     """As of a robot one of whose motors draws a fifth less at times, for no fault."""
     strange = injected(healthy, SCALED, -0.2, 1)
     bands = BandSettings(power=2.0)
-    found = judged([healthy, strange], bands, SETTINGS, ROBOT, BLOCK)
+    found = judged([strange, healthy], bands, SETTINGS, ROBOT, BLOCK)
     assert found.gathered > 6.0
     assert found.settings == evolve(SETTINGS, small_faults=False)
     plain = judged([healthy], bands, SETTINGS, ROBOT, BLOCK)
