@@ -170,6 +170,19 @@ def test_a_dropout_of_a_second_is_no_fault_of_a_sensor() -> None:
     assert [name for _, name in changes(classified(frames))] == ["normal"]
 
 
+@pytest.mark.parametrize(
+    ("missing", "within"),
+    [("no fresh wheel_2/power", (1500, 1600)), (f"wheel_2/power{FROZEN}", (1000, 1100))],
+)
+def test_a_sensor_is_to_blame_once_no_dropout_explains_it(
+    missing: str, within: tuple[int, int]
+) -> None:
+    blind = [without(f, [MOTORS[1], ENCODERS[1]], missing) for f in ticks(2000, 5000)]
+    (_, (at, name)) = changes(classified([*ticks(50, 2000), *blind]))
+    assert name == POWER_SENSOR[1].name
+    assert within[0] <= at - 2000 <= within[1]
+
+
 def test_bad_stamps_are_no_fault_of_a_sensor() -> None:
     odd = f"{GAP}wheel_2/power: its stamps do not fit"
     blind = [without(f, [MOTORS[1], ENCODERS[1]], odd) for f in ticks(2000, 9000)]

@@ -23,7 +23,10 @@ from tomr_fault_diag.residuals.frame import (
 from tomr_power_model.model.ticks import to_ns
 
 _LATELY = to_ns(1.0)
-_DEAD = to_ns(2.0)  # without a motor's power, before its sensor is to blame
+# Without a motor's power, before its sensor is to blame: dropouts of a second are nobody's fault,
+# and readings repeat by themselves for up to 0.7 s on the real Robotino.
+_DEAD, _STUCK = to_ns(1.5), to_ns(1.0)
+_FROZEN = "power sensor frozen"
 _LEAST = 0.5  # share of the frames of that time that must be usable
 
 Blind = tuple[tuple[int, str], ...]  # wheels (0..2), and what ails the sensor, "" for a moment
@@ -68,7 +71,7 @@ class SufficiencyWatch:
         now = frame.stamp_ns
         self._since = {wheel: self._since.get(wheel, now) for wheel in blind}
         return tuple(
-            (wheel, reason if now - self._since[wheel] >= _DEAD else "")
+            (wheel, reason if now - self._since[wheel] >= _patience(reason) else "")
             for wheel, reason in blind.items()
         )
 
@@ -89,4 +92,8 @@ def _is_unmeasured(item: Residual) -> bool:
 def _ailment(item: Residual) -> str:
     if item.missing.startswith(GAP):
         return ""
-    return "power sensor frozen" if item.missing.endswith(FROZEN) else "power sensor dead"
+    return _FROZEN if item.missing.endswith(FROZEN) else "power sensor dead"
+
+
+def _patience(reason: str) -> int:
+    return _STUCK if reason == _FROZEN else _DEAD
