@@ -36,6 +36,23 @@ def test_one_of_two_currents_is_that_of_inverse_dynamics(speed: float, change: f
     assert both[0] <= both[1]
 
 
+@pytest.mark.parametrize("speed", [6.0, 0.02, 0.0, -3.0])
+@pytest.mark.parametrize("drawn", [-40.0, 0.5, 2.0, 60.0])
+def test_both_currents_leave_the_power_or_are_where_it_is_least(speed: float, drawn: float) -> None:
+    """P(i) = R i^2 + k w i + standby, either side of i = -k w / 2 R: what is less leaves that."""
+    numbers, laws = laid_out(vehicle_of(ROBOT)).tolist(), plain(tuple(ROBOT.physics))
+    both = [0.0] * 6
+    laws.motor_currents(numbers, _motion(speed, 0.0), [drawn] * 3, both, WHEELS)
+    motor, standby = ROBOT.motors[0], ROBOT.everywhere("electrical.driver_standby", "power")[0]
+    back = motor.wheel_constant * speed
+    least = -0.5 * back / motor.resistance
+    lowest = standby - 0.25 * back**2 / motor.resistance
+    for current, way in ((both[0], -1.0), (both[1], 1.0)):
+        assert way * (current - least) >= 0.0
+        power = motor.resistance * current**2 + back * current + standby
+        assert power == pytest.approx(max(drawn, lowest), abs=0.01)
+
+
 def test_force_of_a_contact_is_what_accelerates_the_body() -> None:
     # Turning on the spot: each of three wheels gives a third of I alpha / R.
     numbers, laws = laid_out(vehicle_of(ROBOT)).tolist(), plain(tuple(ROBOT.physics))

@@ -118,15 +118,16 @@ def _explain(options: argparse.Namespace) -> int:
     inputs = inputs_of(options)
     if options.suggest is not None and not options.suggest.parent.is_dir():
         raise InputError(f"{options.suggest}: no folder {options.suggest.parent}: make it first")
-    # Pictures take a second to import: --help and `check` do without.
     from tomr_power_model.files import make_folder
-    from tomr_reality_gap.report.html import picture_count
-    from tomr_reality_gap.report.terminal import print_explanation
-    from tomr_reality_gap.report.write import report_files, write_report
 
     make_folder(options.out)
     with progress_bar(options.quiet) as progress:
         explanation = _explanation(inputs, progress)
+        # Pictures take a second and 30 MB to import: --help, `check` and the fit do without.
+        from tomr_reality_gap.report.html import picture_count
+        from tomr_reality_gap.report.terminal import print_explanation
+        from tomr_reality_gap.report.write import report_files, write_report
+
         texts = report_files(
             explanation, Path(inputs.robot).name, _ticks(progress, picture_count(explanation))
         )

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomr_power_model.effects import EFFECTS
-from tomr_power_model.estimation.linear_gaussian import Gram, solve
+from tomr_power_model.estimation.linear_gaussian import Gram, solve, transposed_product
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.statistics import autocorrelation
 from tomr_power_model.robot import Robot
@@ -81,15 +81,15 @@ def gains(analysis: AnalysisResult) -> list[float]:
     dataset, found = analysis.dataset, analysis.found
     jacobian = analysis.jacobian
     weight = found.noise.weight
-    base = jacobian.matrix * weight[:, None]
-    residual = (dataset.value - found.best.value) * weight
-    everything = list(range(base.shape[1]))
-    gram = Gram.of(base, residual)
+    matrix, residual = jacobian.matrix, dataset.value - found.best.value
+    everything = list(range(matrix.shape[1]))
+    gram = Gram.of(matrix, residual, weight)
     whole, gained = _likelihood(gram, everything), []
     for part, value in zip(jacobian.own, analysis.simulated[2:], strict=True):
         others = [row for row in everything if not part.start <= row < part.stop]
-        lacking = residual + (analysis.simulated[1] - value) * weight
-        other = Gram(gram.matrix, base.T @ lacking, float(lacking @ lacking))
+        lacking = (residual + analysis.simulated[1] - value) * weight
+        vector = transposed_product(matrix, lacking * weight)
+        other = Gram(gram.matrix, vector, float(lacking @ lacking))
         gained.append(whole - _likelihood(other, others))
     return gained
 

@@ -164,27 +164,30 @@ def wheel_at(p: Numbers, m: Numbers, w: int, a: int) -> Wheel:
 def motor_currents(p: Numbers, m: Numbers, drawn: Numbers, out: Mutable, n: int) -> None:
     """The two currents that each motor may carry at a measured power [W]: out[2 i], out[2 i + 1].
 
-    Newton's steps from either side of the current at which the power is least, where both meet
-    should less than that have been measured.
+    Newton's steps from what a motor and driver without losses would carry, either side of the
+    current at which the power is least, where both meet should less than that have been measured.
     """
     stride = int(p[STRIDE])
     for i in range(n):
         w, a = HEADER + i * stride, MOTION_HEADER + i * MOTION_WHEEL
         back = p[w + CONSTANT] * m[a + MOTION_SPEED]
         hot = p[w + RESISTANCE] * (1.0 + COPPER * m[a + MOTION_RISE])
-        least, reach = -0.5 * back / hot, 1.0 + math.sqrt(abs(drawn[i]) / hot)
+        least = -0.5 * back / hot
+        over = least * least + (drawn[i] - driver_power(p, w, 0.0)) / hot
+        reach = math.sqrt(max(over, SMALL_CURRENT))
         for side in range(2):
             way = 2.0 * side - 1.0
-            current = least + way * (reach + abs(least))
+            current = least + way * reach
             for _ in range(NEWTON_STEPS):
                 power = supplied(p, w, (hot * current + back) * current)
                 power += driver_power(p, w, current)
                 more = current + way * SMALL_CURRENT
                 above = supplied(p, w, (hot * more + back) * more) + driver_power(p, w, more)
                 slope = way * max((above - power) / SMALL_CURRENT, LEAST_SLOPE)
-                change = (drawn[i] - power) / slope
-                current = way * max(way * (current + change), way * least)
-                if abs(change) < SMALL_CURRENT:
+                before = current
+                current += (drawn[i] - power) / slope
+                current = way * max(way * current, way * least)
+                if abs(current - before) < SMALL_CURRENT:
                     break
             out[2 * i + side] = current
 

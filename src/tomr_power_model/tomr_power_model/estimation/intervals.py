@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from tomr_power_model.estimation.robust import influence
 from tomr_power_model.estimation.statistics import autocorrelation_time
@@ -114,7 +114,7 @@ def jackknife_covariance(scores: Array, informed: Array) -> Array:
 
 def interval_factor(blocks: int) -> float:
     """Times the standard deviation that many blocks estimate is half of the 95 % interval."""
-    return float(student.ppf(0.5 + _LEVEL / 2.0, max(blocks - 1, 1)))
+    return float(stdtrit(max(blocks - 1, 1), 0.5 + _LEVEL / 2.0))
 
 
 def block_length(durations: Sequence[float], correlation_time: float) -> float:

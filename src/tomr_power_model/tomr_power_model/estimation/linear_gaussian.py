@@ -20,7 +20,7 @@ from tomr_power_model.estimation.factor import posterior_factor
 Array = NDArray[np.float64]
 Matrix = NDArray[np.float32] | Array  # columns may be stored in single precision
 
-_ROWS = 8192  # in double precision at a time
+AT_A_TIME = 2048  # rows that are taken in double precision
 
 
 @frozen
@@ -47,8 +47,8 @@ class Gram:
         matrix, vector = np.zeros((count, count)), np.zeros(count)
         weight = np.ones(len(residual)) if weight is None else weight
         whitened = residual * weight
-        for first in range(0, len(residual), _ROWS):
-            rows = slice(first, first + _ROWS)
+        for first in range(0, len(residual), AT_A_TIME):
+            rows = slice(first, first + AT_A_TIME)
             own = columns[rows] if chosen is None else columns[rows, chosen]
             part = own * weight[rows, None]
             matrix += part.T @ part
@@ -58,15 +58,15 @@ class Gram:
 
 def product(columns: Matrix, units: Array) -> Array:
     """Columns (n, p) times units (p,), in double precision."""
-    parts = [columns[row : row + _ROWS] @ units for row in range(0, len(columns), _ROWS)]
+    parts = [columns[row : row + AT_A_TIME] @ units for row in range(0, len(columns), AT_A_TIME)]
     return np.concatenate([np.empty(0), *parts])
 
 
 def transposed_product(columns: Matrix, values: Array) -> Array:
     """Columns (n, p), transposed, times values (n,), in double precision."""
     found = np.zeros(columns.shape[1])
-    for row in range(0, len(columns), _ROWS):
-        found += values[row : row + _ROWS] @ columns[row : row + _ROWS]
+    for row in range(0, len(columns), AT_A_TIME):
+        found += values[row : row + AT_A_TIME] @ columns[row : row + AT_A_TIME]
     return found
 
 

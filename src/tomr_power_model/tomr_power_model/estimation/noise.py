@@ -18,7 +18,7 @@ from scipy.linalg.lapack import dpstrf
 from scipy.optimize import nnls
 
 from tomr_power_model.estimation.discrepancy import SIMULATOR
-from tomr_power_model.estimation.linear_gaussian import Gram, Matrix, product
+from tomr_power_model.estimation.linear_gaussian import AT_A_TIME, Gram, Matrix, product
 from tomr_power_model.estimation.statistics import autocorrelation_time, robust_scale
 
 Array = NDArray[np.float64]
@@ -144,7 +144,7 @@ def _left(
     blocks = []
     for item in local:
         own = item.matrix * weight[item.rows, None]
-        cross = columns[np.ix_(item.rows, chosen)].T @ (own * weight[item.rows, None])
+        cross = _cross(columns, chosen, item.rows, own * weight[item.rows, None])
         inner = own.T @ own + _RIDGE * np.eye(own.shape[1])
         solved = np.linalg.solve(inner, np.column_stack([cross.T, own.T @ wanted[item.rows]]))
         matrix -= cross @ solved[:, :-1]
@@ -157,6 +157,17 @@ def _left(
     for item, solved in zip(local, blocks, strict=True):
         left[item.rows] -= item.matrix @ (solved[:, -1] - solved[:, :-1] @ found)
     return np.asarray(left)
+
+
+def _cross(
+    columns: Matrix, chosen: NDArray[np.intp], rows: NDArray[np.intp], other: Array
+) -> Array:
+    """Some columns of some rows, transposed, times (m, k); a part at a time, which needs little."""
+    found = np.zeros((len(chosen), other.shape[1]))
+    for first in range(0, len(rows), AT_A_TIME):
+        part = slice(first, first + AT_A_TIME)
+        found += columns[np.ix_(rows[part], chosen)].T @ other[part]
+    return found
 
 
 def _least(measured: Array, quantum: float) -> float:

@@ -1,21 +1,20 @@
 """Robust scales and correlation of residuals."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import median_abs_deviation
+from scipy.special import ndtri
 
 Array = NDArray[np.float64]
 
 
 def robust_scale(residual: Array) -> float:
     """Standard deviation of residuals about zero, from their median magnitude; NaN are left out."""
-    return float(
-        median_abs_deviation(
-            residual, center=lambda values, axis: 0.0, scale="normal", nan_policy="omit"
-        )
-    )
+    # scipy.stats has it too, and takes 20 MB to import.
+    known = residual[~np.isnan(residual)]
+    return float(np.median(np.abs(known)) / ndtri(0.75)) if len(known) else math.nan
 
 
 def autocorrelation(pieces: Sequence[Array], lags: int | None = None) -> Array:

@@ -34,9 +34,11 @@ class BasisResponses:
     @property
     def local(self) -> list[Local]:
         """All families' responses, each wheel by itself."""
-        joined = np.concatenate(self.responses, axis=1)
         wheels = self.rows if len({tuple(rows[:1]) for rows in self.rows}) > 1 else self.rows[:1]
-        return [Local(rows, joined[rows]) for rows in wheels]
+        return [
+            Local(rows, np.concatenate([one[rows] for one in self.responses], axis=1))
+            for rows in wheels
+        ]
 
 
 def basis_responses(

@@ -7,7 +7,8 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.estimation.linear_gaussian import Matrix
-from tomr_power_model.estimation.parameter import prior_stds
+from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot
+from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.simulation import Tick
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.model import Model
@@ -46,41 +47,38 @@ def linearise(
     """Derivatives at a model, by its parameters and those of candidates.
 
     With `before` the derivatives by nuisances and candidates are taken from there: they change
-    little from one model to the next, and cost most.
+    little from one model to the next, and cost most. They are the most memory as well, so its
+    matrix is used again: `before` has none that holds afterwards.
     """
     described = model.described
-    parameters = [*([] if before else model.nuisances), *model.own]
-    steps = [item.step for item in parameters[: len(parameters) - len(model.own)]]
-    steps += [
-        item.step_at(offset) for item, offset in zip(model.own, model.own_offsets, strict=True)
-    ]
-    robots = [described.offset([p], [s]).robot for p, s in zip(parameters, steps, strict=True)]
+    own = zip(model.own, model.own_offsets, strict=True)
+    varied = [] if before else [_varied(described, item, item.step) for item in model.nuisances]
+    varied += [_varied(described, item, item.step_at(offset)) for item, offset in own]
     for candidate in candidates if before is None else ():
         started = described.given(
             {key: at for key, at in candidate.start.items() if key not in described.values}
         )
-        for parameter in candidate.sizes:
-            step = parameter.discrete_offset or parameter.step
-            robots.append(started.offset([parameter], [step]).robot)
-            steps.append(step)
-            parameters.append(parameter)
+        varied += [
+            _varied(started, item, item.discrete_offset or item.step) for item in candidate.sizes
+        ]
     first, edge = len(model.nuisances), len(model.nuisances) + dataset.sensor_count
     kept = edge + len(model.own)
-    matrix = np.empty(
-        (kept + sum(len(c.sizes) for c in candidates), len(dataset.value)), np.float32
-    )
+    count = kept + sum(len(c.sizes) for c in candidates)
     if before is None:
+        matrix: Matrix = np.empty((count, len(dataset.value)), np.float32)
         into = [*matrix[:first], *matrix[edge:]]
     else:
+        old = [row for item in candidates for row in _of(before.candidates[item.key])]
+        places = [
+            *zip(range(first), _of(before.nuisance), strict=True),
+            *zip(range(kept, count), old, strict=True),
+        ]
+        matrix = _moved(before.matrix.T, count, places)
         into = list(matrix[edge:kept])
-        old = [before.nuisance, *(before.candidates[item.key] for item in candidates)]
-        matrix[:first] = before.matrix[:, old[0]].T
-        if candidates:
-            np.concatenate([before.matrix[:, part].T for part in old[1:]], out=matrix[kept:])
     value, time_derivative = dataset.with_time_derivative(
         described.robot,
-        robots,
-        scale=prior_stds(parameters) / np.array(steps),
+        [robot for robot, _ in varied],
+        scale=np.array([scale for _, scale in varied]),
         into=into,
         tick=tick,
     )
@@ -100,3 +98,25 @@ def linearise(
         tuple(parts),
         found,
     )
+
+
+def _varied(
+    described: ParameterisedRobot, parameter: Parameter, step: float
+) -> tuple[Robot, float]:
+    """A robot with one parameter a step further, and what turns its change into a derivative."""
+    return described.offset([parameter], [step]).robot, parameter.prior_std / step
+
+
+def _of(part: slice) -> range:
+    return range(part.start, part.stop)
+
+
+def _moved(rows: Matrix, count: int, places: Sequence[tuple[int, int]]) -> Matrix:
+    """Rows (count, n) with some of `rows` at new places (to, from), in the same order as before;
+    in their own memory where that suffices."""
+    moved = rows[:count] if count <= len(rows) else np.empty((count, rows.shape[1]), rows.dtype)
+    forwards = [pair for pair in places if pair[0] > pair[1]]
+    backwards = [pair for pair in places if pair[0] <= pair[1]]
+    for to, at in [*reversed(forwards), *backwards]:  # none is overwritten before it has moved
+        moved[to] = rows[at]
+    return moved

@@ -29,14 +29,16 @@ def own_sigma(dataset: Dataset, found: Selection, jacobian: Jacobian) -> Array:
     At least what the noise makes of them; 1.96 times it is half of the 95 % interval.
     """
     best, weight = found.best, found.noise.weight
-    columns = np.asarray(jacobian.matrix * weight[:, None], dtype=np.float64)
     residual = (dataset.value - best.value) * weight
     block = blocks_of(dataset, residual)
-    rows = [block == number for number in range(int(block.max()) + 1)]
-    scores = np.stack([columns[row].T @ residual[row] for row in rows])
-    informed = np.stack([columns[row].T @ columns[row] for row in rows])
-    deviation = np.sqrt(np.diag(jackknife_covariance(scores, informed)))
-    deviation *= interval_factor(len(rows)) / HALF_WIDTH
+    scores, informed = [], []
+    for number in range(int(block.max()) + 1):
+        rows = block == number
+        columns = jacobian.matrix[rows] * weight[rows, None]
+        scores.append(columns.T @ residual[rows])
+        informed.append(columns.T @ columns)
+    deviation = np.sqrt(np.diag(jackknife_covariance(np.stack(scores), np.stack(informed))))
+    deviation *= interval_factor(len(scores)) / HALF_WIDTH
     own = best.model.own
     return np.maximum(best.own_sigma, deviation[len(deviation) - len(own) :] * prior_stds(own))
 
