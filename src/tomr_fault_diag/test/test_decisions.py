@@ -10,6 +10,7 @@ from attrs import evolve
 from tomr_fault_diag.classifier import states
 from tomr_fault_diag.classifier.advice import check_first
 from tomr_fault_diag.classifier.belief import CONTROLS, HYPOTHESES
+from tomr_fault_diag.classifier.belief import ENCODERS as LOST_ENCODERS
 from tomr_fault_diag.classifier.evidence import ALONE, Beside
 from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
 from tomr_fault_diag.classifier.messages import diagnosis_message, six_state
@@ -324,6 +325,33 @@ class Likely:
         found = np.full(HYPOTHESES, -20.0)
         found[[CONTROLS.start + 1, SLIP]] = 20.0, 0.0
         return found
+
+
+class Lost:
+    """A network to which one encoder after the other is lost."""
+
+    wheel = 2
+
+    def log_likelihoods(self, window: np.ndarray) -> np.ndarray:
+        found = np.full(HYPOTHESES, -20.0)
+        found[LOST_ENCODERS.start + self.wheel] = 20.0
+        return found
+
+
+def test_without_any_speed_no_other_encoder_is_the_lost_one() -> None:
+    network = Lost()
+    judge = WindowJudge(cast(WindowNetwork, network), ClassifierSettings())
+    for t in range(50, 2000, 50):
+        opinion = judge.judge(frame(t), to_ns(0.05), Unseen())
+    assert (opinion.wheel, opinion.sure) == (2, True)
+    network.wheel = 1
+    for t in range(2000, 4000, 50):
+        unread = without(frame(t), SPEEDS, SCATTER)
+        opinion = judge.judge(unread, to_ns(0.05), Unseen())
+    assert (opinion.wheel, opinion.sure) == (2, True)
+    for t in range(4000, 6000, 50):
+        opinion = judge.judge(frame(t), to_ns(0.05), Unseen())
+    assert (opinion.wheel, opinion.sure) == (1, True)
 
 
 def test_what_looks_like_a_blind_motors_fault_is_no_evidence_of_another() -> None:

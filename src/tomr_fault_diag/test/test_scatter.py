@@ -74,6 +74,31 @@ def test_a_speed_that_no_wheel_reaches_is_disorder_until_others_outweigh_it() ->
     assert not watch.is_disorder
 
 
+@pytest.mark.parametrize("lossy", [0, 1, 2])
+def test_an_encoder_that_loses_counts_is_no_scatter_of_stamps(lossy: int) -> None:
+    """One wheel's angle comes in leaps; what the other two show agrees with the stamps."""
+    dice = random.Random(4)
+    window, watch = EncoderWindow(100 * MS, 50 * MS, 200 * MS), ScatterWatch(fastest=40.0)
+    for number in range(300):
+        positions = [SPEED * 0.01 * number, -4.0 * 0.01 * number, -4.0 * 0.01 * number]
+        positions[lossy] += dice.gauss(0.0, 0.1)
+        window.add(EncoderSample(BASE + 10 * number * MS, tuple(positions), NOTHING))
+        if number % 5 == 4:
+            watch.take(window.at(BASE + 10 * number * MS))
+    assert watch.seconds < 1e-9
+
+
+def test_a_wheel_that_turns_alone_cannot_say_what_scatters() -> None:
+    dice = random.Random(4)
+    window, watch = EncoderWindow(100 * MS, 50 * MS, 200 * MS), ScatterWatch(fastest=40.0)
+    for number in range(300):
+        turned = SPEED * 0.01 * number + dice.gauss(0.0, 0.05)
+        window.add(EncoderSample(BASE + 10 * number * MS, (turned, 0.0, 0.0), NOTHING))
+        if number % 5 == 4:
+            watch.take(window.at(BASE + 10 * number * MS))
+    assert watch.seconds == pytest.approx(0.05 / SPEED, rel=0.3)
+
+
 def test_ticks_whose_scatter_does_not_show_change_nothing() -> None:
     watch = _watched(_shuffled(200.0), lambda time: SPEED * time)
     for _ in range(30):

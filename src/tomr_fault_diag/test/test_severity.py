@@ -100,13 +100,13 @@ def test_friction_added() -> None:
 
 
 def test_a_winding_that_heats_more() -> None:
-    shown = power(CURRENT, SPEED) + np.array([0.5 * RESISTANCE * CURRENT[0] ** 2, 0.0, 0.0])
+    shown = power(CURRENT, SPEED) + np.array([0.6 * RESISTANCE * CURRENT[0] ** 2, 0.0, 0.0])
     words = said(DEGRADED[0], 0, lambda tick: frame(tick, shown))
-    assert words == "winding resistance, or a loss like it, +50 % (+47 to +52 %)"
+    assert words == "winding resistance, or a loss like it, +60 % (+57 to +63 %)"
 
 
 def test_a_wheel_that_stands_shows_nothing_of_its_winding() -> None:
-    shown = power(CURRENT, SPEED) + np.array([0.5 * RESISTANCE * CURRENT[0] ** 2, 0.0, 0.0])
+    shown = power(CURRENT, SPEED) + np.array([0.6 * RESISTANCE * CURRENT[0] ** 2, 0.0, 0.0])
     still = SPEED * np.array([0.0, 1.0, 1.0])
 
     def now_and_then(tick: int) -> ResidualFrame:
@@ -115,7 +115,7 @@ def test_a_wheel_that_stands_shows_nothing_of_its_winding() -> None:
         return frame(tick, shown)
 
     words = said(DEGRADED[0], 0, now_and_then)
-    assert words == "winding resistance, or a loss like it, +50 % (+47 to +52 %)"
+    assert words == "winding resistance, or a loss like it, +60 % (+57 to +63 %)"
 
 
 def test_currents_do_not_show_what_a_winding_loses() -> None:

@@ -47,7 +47,7 @@ from tomr_fault_diag.classifier.states import (
     State,
 )
 from tomr_fault_diag.classifier.window_network import WindowNetwork
-from tomr_fault_diag.residuals.frame import INPUT_ORDERS, ResidualFrame
+from tomr_fault_diag.residuals.frame import INPUT_ORDERS, SPEEDS, ResidualFrame
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import WHEELS
 
@@ -178,7 +178,7 @@ class WindowJudge:
         slot = frame.stamp_ns // _TICK
         count = 1 if self._slot is None else slot - self._slot
         self._slot = slot
-        said = said_by_gyro(frame) + said_by_forces(frame, beside.contacts)
+        said = said_by_gyro(frame, beside.counted) + said_by_forces(frame, beside.contacts)
         is_calm = beside.contacts.calm and bool(self.settings.commissioned)
         weighed = _Weighed(said, is_calm, beside.lasting)
         for _ in range(count):
@@ -202,7 +202,7 @@ class WindowJudge:
         shares = self._belief.update(likelihoods)
         self._shaken = _SHAKEN if shares[EXTERNAL] > 0.5 else max(self._shaken - 1, 0)
         striking = _ratios(likelihoods)
-        striking[ENCODERS] -= said[ENCODERS]  # which alone accuses no encoder
+        striking[ENCODERS] -= np.maximum(said[ENCODERS], 0.0)  # which alone accuses no encoder
         self._recent.append(striking)
         group = max(_GROUPS, key=lambda group: float(shares[group].sum()))
         best = self._kept(shares, group)
@@ -229,6 +229,8 @@ class WindowJudge:
         for moved in unseen.moved:  # no fault turns a wheel that stands: somebody pushes
             kinds = _FIRM if unseen.driven else _HIDDEN
             likelihoods[[kind.start + moved for kind in kinds]] = likelihoods[NORMAL]
+        if all(frame.residuals[channel].stale for channel in SPEEDS):
+            likelihoods[ENCODERS] = likelihoods[ENCODERS].max()  # whose it is does not show
         meters = [METERS.start + number for number in astray(frame)]
         # No power sensor makes a wheel turn otherwise.
         likelihoods[meters] = np.minimum(likelihoods[meters], likelihoods[NORMAL])

@@ -2,10 +2,12 @@
 
 from typing import Self
 
+import numpy as np
 from attrs import evolve, field, frozen
+from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.contacts import NOTHING
-from tomr_fault_diag.classifier.evidence import Beside
+from tomr_fault_diag.classifier.evidence import Beside, counted
 from tomr_fault_diag.classifier.judges import Judge, Opinion, make_judge
 from tomr_fault_diag.classifier.lasting import LastingWatch
 from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
@@ -32,7 +34,10 @@ from tomr_fault_diag.classifier.states import (
 )
 from tomr_fault_diag.classifier.sufficiency import Sufficiency, SufficiencyWatch
 from tomr_fault_diag.residuals.frame import GAP, MOTORS, NO_COMMAND, ResidualFrame
+from tomr_power_model.dynamics.body import Body
 from tomr_power_model.robot import Robot
+
+Array = NDArray[np.float64]
 
 
 @frozen
@@ -76,16 +81,19 @@ class FaultClassifier:
         slides: SlideWatch | None = None,
         lasting: LastingWatch | None = None,
         misfits: MisfitWatch | None = None,
+        turning: Array | None = None,
     ) -> None:
         """Without `severity` it is not stated how bad a fault is, nor what has changed slowly;
         without `slides` residuals alone show a slip, without `lasting` small faults are not
-        looked for; without `misfits` it is not known what a motor draws that is not driven."""
+        looked for; without `misfits` it is not known what a motor draws that is not driven;
+        without `turning`, the yaw rate per wheel speed (3,), a gyro bears no encoder out."""
         self._judge = judge
         self._lasting = lasting
         self._severity = severity
         self._slides = slides
         self._motion = MotionWatch()
         self._misfits = misfits or MisfitWatch()
+        self._turning = turning
         self._data = SufficiencyWatch()
         self.clear()
 
@@ -99,7 +107,8 @@ class FaultClassifier:
         """A judge, and what contacts and, where they are looked for, small faults show beside."""
         lasting = LastingWatch(robot) if judge.settings.small_faults else None
         misfits = MisfitWatch(Motors(robot).idle.tolist())
-        return cls(judge, severity, SlideWatch(robot), lasting, misfits)
+        turning = Body.of(robot).to_twist[2]
+        return cls(judge, severity, SlideWatch(robot), lasting, misfits, turning)
 
     @property
     def settings(self) -> ClassifierSettings:
@@ -205,9 +214,9 @@ class FaultClassifier:
             self._enter(DISOBEYS, frame.stamp_ns, None)
             return
         is_well = self._state is STATES[NORMAL]
-        beside = Beside(contacts)
+        beside = Beside(contacts, () if self._turning is None else counted(frame, self._turning))
         if self._lasting is not None:
-            beside = Beside(contacts, self._lasting.take(frame, is_well))
+            beside = evolve(beside, lasting=self._lasting.take(frame, is_well))
         self._opinion = self._judge.judge(frame, elapsed, self._unseen, beside)
         if data.enough or self._state not in _QUIET:
             self._weigh(self._opinion, misfit, frame.stamp_ns)

@@ -22,6 +22,7 @@ _EVERY = 25  # samples: how often
 LONG_S = 0.2  # of the fit beside a simulation
 _FIT = 5  # samples that it takes
 _PART = 50_000_000  # ns of a window for which a fit stands
+_ALONE = 3.0  # times as far as the others' does the angle of one wheel scatter that is at fault
 _FREE = 2  # more samples than unknowns, to show how they scatter
 _MOVING = 1.0  # rad/s of the fastest wheel, likewise
 _LEEWAY = 0.05  # s that a stamp may be late: angles that no motor reaches till then are bad
@@ -301,9 +302,22 @@ def _from_positions(times: tuple[int, ...], positions: Array) -> WheelEstimate:
         return estimate
     powers = (1e-9 * np.array(times))[:, None] ** np.arange(3)
     rest = positions - positions[0] - powers @ shape
-    # All wheels are read at once: what scatters is when.
-    scatter = math.sqrt(float((rest**2).sum() / (free * (shape[1] ** 2).sum())))
-    return evolve(estimate, scatter=scatter)
+    off = (rest**2).sum(axis=0).tolist()
+    return evolve(estimate, scatter=math.sqrt(_of_times(off, (shape[1] ** 2).tolist()) / free))
+
+
+def _of_times(rest: Sequence[float], speed: Sequence[float]) -> float:
+    """Of each wheel's squared rest and speed, how far the samples' times scatter, squared.
+
+    All wheels are read at once: what scatters is when. But where all others agree about that, it is
+    the angle of one that scatters, whose encoder loses counts.
+    """
+    scatter = sum(rest) / sum(speed)
+    for off, turns in zip(rest, speed, strict=True):
+        others = sum(speed) - turns
+        if others > _MOVING**2 and (sum(rest) - off) / others < scatter / _ALONE**2:
+            return (sum(rest) - off) / others
+    return scatter
 
 
 @lru_cache(maxsize=64)
