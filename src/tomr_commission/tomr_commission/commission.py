@@ -141,7 +141,15 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     outcome = Outcome(request, explained, fitted, held, bands, level, held_said, fitted_said)
     against = tuple(reasons(outcome))
     date = datetime.datetime.now(datetime.UTC).date().isoformat()
-    text = _text(work, described, outcome, (against, floors, date, chosen.small_faults))
+    text = _text(
+        work,
+        described,
+        outcome,
+        against=against,
+        floors=floors,
+        date=date,
+        small_faults=chosen.small_faults,
+    )
     progress("done", 1.0)
     return Commissioned(
         request=request,
@@ -360,9 +368,13 @@ def _text(
     work: _Work,
     described: Path | None,
     outcome: Outcome,
-    rest: tuple[Sequence[Reason], Sequence[Floor], str, bool],
+    *,
+    against: Sequence[Reason],
+    floors: Sequence[Floor],
+    date: str,
+    small_faults: bool,
 ) -> str:
-    against, floors, date, small_faults = rest
+    """Of commissioned.yaml."""
     request = work.request
     record = Record(
         date=date,

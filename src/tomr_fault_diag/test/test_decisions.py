@@ -9,7 +9,7 @@ from attrs import evolve
 
 from tomr_fault_diag.classifier import states
 from tomr_fault_diag.classifier.advice import check_first
-from tomr_fault_diag.classifier.belief import CONTROLS, HYPOTHESES
+from tomr_fault_diag.classifier.belief import CONTROLS, DRAGS, HYPOTHESES
 from tomr_fault_diag.classifier.belief import ENCODERS as LOST_ENCODERS
 from tomr_fault_diag.classifier.evidence import ALONE, Beside
 from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
@@ -325,6 +325,26 @@ class Likely:
         found = np.full(HYPOTHESES, -20.0)
         found[[CONTROLS.start + 1, SLIP]] = 20.0, 0.0
         return found
+
+
+class Content:
+    """A network to which all is well."""
+
+    def log_likelihoods(self, window: np.ndarray) -> np.ndarray:
+        return np.where(np.arange(HYPOTHESES) == NORMAL, 0.0, -3.0)
+
+
+@pytest.mark.parametrize("period", [20, 50, 200])
+def test_what_a_tick_says_of_small_faults_counts_once_at_any_rate(period: int) -> None:
+    judge = WindowJudge(cast(WindowNetwork, Content()), ClassifierSettings())
+    for t in range(period, 3000, period):
+        judge.judge(frame(t), to_ns(1e-3 * period), Unseen())
+    said = np.zeros(HYPOTHESES)
+    said[DRAGS.start] = 0.3
+    for t in range(3000, 4000, period):
+        judge.judge(frame(t), to_ns(1e-3 * period), Unseen(), Beside(lasting=said))
+    ticks_seen = 1000 / max(period, 50)
+    assert judge.gathered == pytest.approx(0.3 * judge.settings.evidence_weight * ticks_seen)
 
 
 class Lost:

@@ -11,7 +11,7 @@ from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.belief import (
@@ -183,6 +183,8 @@ class WindowJudge:
         weighed = _Weighed(said, is_calm, beside.lasting)
         for _ in range(count):
             self._opinion = self._step(frame, unseen, weighed)
+            # A size is fitted to what is new in a tick, however long it stands for.
+            weighed = evolve(weighed, lasting=np.zeros(HYPOTHESES))
         return self._opinion
 
     def _step(self, frame: ResidualFrame, unseen: Unseen, weighed: _Weighed) -> Opinion:

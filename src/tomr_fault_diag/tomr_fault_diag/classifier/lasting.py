@@ -59,31 +59,40 @@ _TYPICAL = np.array([fault.typical for fault in FAULTS])[:, None]
 _NEGLIGIBLE = np.array([fault.negligible for fault in FAULTS])[:, None]
 _SIGNED = np.array([fault.is_signed for fault in FAULTS])[:, None]
 _IN_TOTAL = np.array([1.0 if fault.in_total else -1.0 for fault in FAULTS])[:, None]
+_OTHERS = np.array([[1, 2], [0, 2], [0, 1]])  # wheels beside each
 _SPEED = 5.0  # rad/s, at which an axle's friction is taken
 _SLOT = to_ns(0.05)  # of faster ticks the first in each is taken
-_MEMORY = to_ns(1.5)  # over which a size is fitted
-_LONG = to_ns(10.0)  # and over which sizes of all faults are, that are no fault where they came ...
-_SLOWLY = to_ns(60.0)  # ... within so long
-_MOST_SLOW = 0.5  # bands, in which they are believed
-_SCATTER = 0.2  # bands: 3.3 standard deviations of noise, and half as much again
-_TOTAL_SCATTER = 0.25  # bands of the total power
-_LITTLE = 0.08  # bands by which a healthy robot's residuals may lie off nothing
-_CLIP = 2.0  # bands: what is larger is the network's
-_FORCES = (0.1, 0.3, 1.0)  # N/kg, standard deviations of a force on the body
-_LEVER = 0.3  # of the robot's radius, at which it acts
-_WORTH = 6.0  # that a tick counts: most robots scatter less
-_MOST, _LEAST = 2.0, -0.2  # that it says; a fault may be none of these, and large
-_AGAINST = -3.0  # that its total power says
-_PAUSE = to_ns(0.5)  # after a wheel did not turn as it should
+
+
+@frozen
+class LastingSettings:
+    """What residuals of a healthy robot may do, and how much a small fault must."""
+
+    memory: int = to_ns(1.5)  # over which a size is fitted
+    long: int = to_ns(10.0)  # and over which sizes of all faults are, that are no fault ...
+    slowly: int = to_ns(60.0)  # ... where they came within so long ...
+    most_slow: float = 0.5  # bands: ... and add no more
+    scatter: float = 0.2  # bands: 3.3 standard deviations of noise, and half as much again
+    total_scatter: float = 0.25  # bands of the total power
+    little: float = 0.08  # bands by which a healthy robot's residuals may lie off nothing
+    clip: float = 2.0  # bands: what is larger is the network's
+    forces: tuple[float, ...] = (0.1, 0.3, 1.0)  # N/kg, deviations of a force on the body
+    lever: float = 0.3  # of the robot's radius, at which it acts
+    worth: float = 6.0  # that a tick counts: most robots scatter less
+    most: float = 2.0  # that it says
+    least: float = -0.2  # a fault may be none of these, and large
+    against: float = -3.0  # that its total power says
+    pause: int = to_ns(0.5)  # after a wheel did not turn as it should
 
 
 class LastingWatch:
     """Follows a commissioned robot tick by tick; driven by stamps."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, settings: LastingSettings | None = None) -> None:
+        self.settings = settings or LastingSettings()
         self._motors = motors = Motors(robot)
         self._friction = motors.friction(_SPEED)
-        lever = _LEVER * robot.robot_radius
+        lever = self.settings.lever * robot.robot_radius
         self._shares = motors.mass * motors.from_force * np.array([1.0, 1.0, lever])
         self.clear()
 
@@ -109,12 +118,12 @@ class LastingWatch:
         elapsed, self._newest = frame.stamp_ns - self._newest, frame.stamp_ns
         self._said = np.zeros(HYPOTHESES)
         if any(abs(item.residual) > item.band for item in _of(frame, SPEEDS)):
-            self._resumes = frame.stamp_ns + _PAUSE
+            self._resumes = frame.stamp_ns + self.settings.pause
         if frame.stamp_ns < self._resumes:
             return self._said
         with np.errstate(over="ignore", invalid="ignore"):
             effects, shared = self._effects(frame)
-        shown = _shown(frame)
+        shown = _shown(frame, self.settings.clip)
         if not all(np.isfinite(part).all() for part in (shown, effects, shared)):
             return self._said  # something is not known, or beyond all numbers
         sudden = shown - self._came_slowly(effects)
@@ -123,7 +132,7 @@ class LastingWatch:
         found = self._predicted(sudden, effects, shared, frame)
         self._learn(sudden, effects, elapsed)
         for fault, row in zip(FAULTS, found, strict=True):
-            self._said[fault.hypotheses] = _WORTH * row
+            self._said[fault.hypotheses] = self.settings.worth * row
         return self._said
 
     def _effects(self, frame: ResidualFrame) -> tuple[Array, Array]:
@@ -147,13 +156,14 @@ class LastingWatch:
     ) -> Array:
         """How much better each fault predicts a tick than nothing does, or a force on the body,
         and what the total power leaves of it, (3, 3)."""
-        size = self._products / (self._squares + _SCATTER**2)
+        s = self.settings
+        size = self._products / (self._squares + s.scatter**2)
         size = _beyond_others(np.where(_SIGNED, size, np.maximum(size, 0.0)))
         mean = size * effects
-        little = np.maximum(_NEGLIGIBLE / _TYPICAL * np.abs(effects), _LITTLE)
-        found = _better(sudden, np.clip(mean, -little, little), mean, _SCATTER)
-        found = np.minimum(found - _by_force(sudden, shared), _MOST)
-        return np.maximum(found + self._against(mean, frame), _LEAST)
+        little = np.maximum(_NEGLIGIBLE / _TYPICAL * np.abs(effects), s.little)
+        found = _better(sudden, np.clip(mean, -little, little), mean, s.scatter)
+        found = np.minimum(found - _by_force(sudden, shared, s), s.most)
+        return np.maximum(found + self._against(mean, frame), s.least)
 
     def _against(self, mean: Array, frame: ResidualFrame) -> Array:
         """What the total power says against a motor that draws so much more [bands], (2, 3), and
@@ -161,37 +171,38 @@ class LastingWatch:
         total = frame.residuals[TOTAL]
         if total.stale:
             return np.zeros_like(mean)
-        bands = np.array([item.band for item in _of(frame, ENCODERS)])
-        drawn = np.clip(np.full(WHEELS, total.residual / total.band), -_CLIP, _CLIP)
-        shows = _better(drawn, np.zeros(1), mean * bands / total.band, _TOTAL_SCATTER)
-        return np.asarray(np.clip(_IN_TOTAL * shows, _AGAINST, 0.0))
+        s, bands = self.settings, np.array([item.band for item in _of(frame, ENCODERS)])
+        drawn = np.clip(np.full(WHEELS, total.residual / total.band), -s.clip, s.clip)
+        shows = _better(drawn, np.zeros(1), mean * bands / total.band, s.total_scatter)
+        return np.asarray(np.clip(_IN_TOTAL * shows, s.against, 0.0))
 
     def _learn(self, shown: Array, effects: Array, elapsed: int) -> None:
-        kept = np.exp(-elapsed / _MEMORY)
+        kept = np.exp(-elapsed / self.settings.memory)
         self._squares = kept * self._squares + effects**2
         self._products = kept * self._products + effects * shown
 
     def _came_slowly(self, effects: Array) -> Array:
         """What that adds to each wheel's residual [bands], (3,)."""
+        s = self.settings
         added = (effects.T * self._slow).sum(axis=1)
-        return np.asarray(np.clip(added, -_MOST_SLOW, _MOST_SLOW))
+        return np.asarray(np.clip(added, -s.most_slow, s.most_slow))
 
     def _learn_slowly(self, shown: Array, effects: Array, elapsed: int) -> None:
         if not effects.any():
             return
-        kept = np.exp(-elapsed / _LONG)
+        kept = np.exp(-elapsed / self.settings.long)
         self._normal = kept * self._normal + effects.T[:, :, None] * effects.T[:, None, :]
         self._right = kept * self._right + effects.T * shown[:, None]
-        prior = _SCATTER**2 * np.eye(_COUNT)
+        prior = self.settings.scatter**2 * np.eye(_COUNT)
         sizes = np.linalg.solve(self._normal + prior, self._right[:, :, None])[:, :, 0]
-        self._slow += min(elapsed, NANOSECONDS) / _SLOWLY * (sizes - self._slow)
+        self._slow += min(elapsed, NANOSECONDS) / self.settings.slowly * (sizes - self._slow)
 
 
 def _of(frame: ResidualFrame, channels: range) -> list[Residual]:
     return [frame.residuals[index] for index in channels]
 
 
-def _shown(frame: ResidualFrame) -> Array:
+def _shown(frame: ResidualFrame, most: float) -> Array:
     """Residual of each motor [bands]: of its two the smaller, for either is late at times."""
     by_encoder, by_command = (
         np.array([item.residual / item.band for item in _of(frame, channels)])
@@ -199,12 +210,12 @@ def _shown(frame: ResidualFrame) -> Array:
     )
     is_smaller = np.abs(by_command) < np.abs(by_encoder)  # not where it is NaN
     shown = np.where(is_smaller, by_command, by_encoder)
-    return np.asarray(np.clip(shown, -_CLIP, _CLIP))
+    return np.asarray(np.clip(shown, -most, most))
 
 
 def _beyond_others(size: Array) -> Array:
     """How far each wheel's sizes, (faults, 3), go beyond what another wheel shows as well."""
-    others = np.stack([np.delete(size, wheel, axis=1) for wheel in range(WHEELS)], axis=1)
+    others = size[:, _OTHERS]  # (faults, wheels, 2)
     up = np.maximum(size - np.maximum(others.max(axis=2), 0.0), 0.0)
     down = np.minimum(size - np.minimum(others.min(axis=2), 0.0), 0.0)
     return np.asarray(np.where(size > 0.0, up, down))
@@ -215,15 +226,15 @@ def _better(shown: Array, nothing: Array, mean: Array, scatter: float) -> Array:
     return np.asarray(((shown - nothing) ** 2 - (shown - mean) ** 2) / (2.0 * scatter**2))
 
 
-def _by_force(shown: Array, shared: Array) -> float:
+def _by_force(shown: Array, shared: Array, s: LastingSettings) -> float:
     """Log-likelihood of a force on the body over none, as strong as explains most; at least 0.
 
     `shared`: what forces along and across and a moment do to the wheels, (3, 3).
     """
     variances, ways = np.linalg.eigh(shared @ shared.T)
-    seen = (ways.T @ shown) ** 2 / _SCATTER**2
+    seen = (ways.T @ shown) ** 2 / s.scatter**2
     most = 0.0
-    for force in _FORCES:
-        ratio = 1.0 + force**2 * np.maximum(variances, 0.0) / _SCATTER**2
+    for force in s.forces:
+        ratio = 1.0 + force**2 * np.maximum(variances, 0.0) / s.scatter**2
         most = max(most, 0.5 * float(np.sum(seen * (1.0 - 1.0 / ratio) - np.log(ratio))))
     return most
