@@ -9,7 +9,7 @@ import pytest
 from attrs import evolve
 
 from tomr_fault_diag.classifier.belief import ENCODERS, HYPOTHESES, OTHER
-from tomr_fault_diag.classifier.evidence import counted, said_by_gyro
+from tomr_fault_diag.classifier.evidence import Beside, counted, said_by_gyro
 from tomr_fault_diag.classifier.judges import WindowJudge, make_judge
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
@@ -275,3 +275,11 @@ def test_an_encoder_is_not_lost_where_the_body_turns_as_it_shows(yaw: float, sta
         now = BASE + 50 * tick * MS
         classifier.classify(evolve(fast, residuals=tuple(residuals), stamp_ns=now))
     assert classifier._state is state
+
+
+def test_what_a_gyro_clears_is_not_striking_for_it() -> None:
+    judge = WindowJudge(cast(WindowNetwork, Lost()), ClassifierSettings())
+    for tick in range(60):
+        frame = evolve(healthy_frame(0.0), stamp_ns=BASE + 50 * tick * MS)
+        judge.judge(frame, 50 * MS, Unseen(), Beside(counted=(0,)))
+    assert judge._recent[-1][ENCODERS.start] < 0.0

@@ -74,18 +74,33 @@ def test_a_speed_that_no_wheel_reaches_is_disorder_until_others_outweigh_it() ->
     assert not watch.is_disorder
 
 
-@pytest.mark.parametrize("lossy", [0, 1, 2])
-def test_an_encoder_that_loses_counts_is_no_scatter_of_stamps(lossy: int) -> None:
-    """One wheel's angle comes in leaps; what the other two show agrees with the stamps."""
+def _noisy(angles: tuple[float, float, float], stamps: float = 0.0) -> ScatterWatch:
+    """Wheels at 8, -4 and -4 rad/s whose angles scatter by so much [rad], and all stamps [s]."""
     dice = random.Random(4)
     window, watch = EncoderWindow(100 * MS, 50 * MS, 200 * MS), ScatterWatch(fastest=40.0)
     for number in range(300):
-        positions = [SPEED * 0.01 * number, -4.0 * 0.01 * number, -4.0 * 0.01 * number]
-        positions[lossy] += dice.gauss(0.0, 0.1)
-        window.add(EncoderSample(BASE + 10 * number * MS, tuple(positions), NOTHING))
+        at = 0.01 * number + dice.gauss(0.0, stamps)
+        speeds = zip((SPEED, -4.0, -4.0), angles, strict=True)
+        first, second, third = (speed * at + dice.gauss(0.0, off) for speed, off in speeds)
+        window.add(EncoderSample(BASE + 10 * number * MS, (first, second, third), NOTHING))
         if number % 5 == 4:
             watch.take(window.at(BASE + 10 * number * MS))
-    assert watch.seconds < 1e-9
+    return watch
+
+
+@pytest.mark.parametrize("lossy", [0, 1, 2])
+def test_an_encoder_that_loses_counts_is_no_scatter_of_stamps(lossy: int) -> None:
+    """One wheel's angle comes in leaps; what the other two show agrees with the stamps."""
+    angles = [0.0, 0.0, 0.0]
+    angles[lossy] = 0.1
+    assert _noisy((angles[0], angles[1], angles[2])).seconds < 1e-9
+    shaken = _noisy((angles[0], angles[1], angles[2]), stamps=0.0005)
+    assert shaken.seconds == pytest.approx(0.0005, rel=0.4)
+
+
+def test_an_angle_that_scatters_a_little_more_than_others_is_not_left_out() -> None:
+    # sqrt(0.02^2 + 2 x 0.01^2) rad over sqrt(8^2 + 2 x 4^2) rad/s
+    assert _noisy((0.02, 0.01, 0.01)).seconds == pytest.approx(0.0025, rel=0.15)
 
 
 def test_a_wheel_that_turns_alone_cannot_say_what_scatters() -> None:

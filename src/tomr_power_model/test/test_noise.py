@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tomr_power_model.estimation.noise import Local, noise_of
+from tomr_power_model.estimation.linear_gaussian import AT_A_TIME
+from tomr_power_model.estimation.noise import Local, _cross, noise_of
 
 COUNT = 4000
 NOTHING = np.zeros((COUNT, 1))
@@ -108,3 +109,12 @@ def test_a_channel_that_repeats_a_value_is_no_more_exact_than_a_sensor() -> None
     value = np.full(COUNT, 24.0)
     sigma = noise_of([_channel()], STILL, value[:, None], value, time_derivative=STILL).sigma
     np.testing.assert_allclose(sigma, 24e-6)
+
+
+def test_products_of_some_rows_are_those_of_all_at_once() -> None:
+    dice = np.random.default_rng(6)
+    rows = np.arange(3, 3 + 2 * AT_A_TIME + 7)
+    columns = dice.standard_normal((len(rows) + 5, 4)).astype(np.float32)
+    chosen, other = np.array([0, 2, 3]), dice.standard_normal((len(rows), 2))
+    found = _cross(columns, chosen, rows, other)
+    assert found == pytest.approx(columns[rows][:, chosen].T @ other)
