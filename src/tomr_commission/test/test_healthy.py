@@ -8,9 +8,8 @@ from tomr_commission.injected import KINDS, injected
 from tomr_commission.observed import Observed
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.settings import BandSettings
-from tomr_power_model.robot import shipped_robot
 
-ROBOT = shipped_robot("reference")
+ROBOT = "reference"
 SETTINGS = ClassifierSettings(commissioned="to be")
 BLOCK = 2.0  # s
 SCALED = next(kind for kind in KINDS if kind.name == "power sensor scaled")

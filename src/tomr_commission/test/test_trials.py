@@ -10,7 +10,6 @@ from tomr_commission.observed import Observed
 from tomr_commission.trials import Trial, floors_of, smallest_found
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.settings import BandSettings
-from tomr_power_model.robot import shipped_robot
 
 BY_NAME = {kind.name: kind for kind in KINDS}
 
@@ -69,9 +68,7 @@ def test_frozen_sensor_reports_what_it_reported_first(steady: Callable[..., Obse
 
 def test_dead_sensor_is_found_in_a_real_drive(healthy: Observed) -> None:
     kinds = [BY_NAME["power sensor biased"]]
-    trials = try_injected(
-        healthy, BandSettings(), ClassifierSettings(), kinds, shipped_robot("reference")
-    )
+    trials = try_injected(healthy, BandSettings(), ClassifierSettings(), kinds, "reference")
     (floor,) = floors_of(trials)
     assert floor.everywhere is not None
     assert floor.everywhere <= 20.0

@@ -18,13 +18,12 @@ from tomr_commission.commissioned import (
     base_sections,
     commissioned_text,
 )
-from tomr_commission.evidence import decisions
 from tomr_commission.explained import EXPLAINED, FOLDER, Split, explain_drives
-from tomr_commission.healthy import MOST_GATHERED, Healthy, healthy
+from tomr_commission.healthy import MOST_GATHERED, Healthy, decided, healthy
 from tomr_commission.injected import kinds_for, try_injected
-from tomr_commission.observed import Observed, frames_of, observe, reports_currents, unit_of_motors
+from tomr_commission.observed import Observed, observe, reports_currents, unit_of_motors
 from tomr_commission.parallel import on_all_cores
-from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse, robot_of
+from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse
 from tomr_commission.request import CommissionRequest
 from tomr_commission.simulated import try_simulated
 from tomr_commission.store import Store, digest, fingerprint
@@ -119,12 +118,10 @@ def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
     tuned = work.tuned(described, fitted, classifier, plan)
     bands, level = tuned.bands, tuned.level
     chosen = evolve(tuned.driven.settings, caution=level.caution)
-    robot = robot_of(str(work.source(described)))
+    robot = str(work.source(described))
     progress("validating", 0.85)
-    held_said, fitted_said = (
-        tuple(decisions(frames_of(drive, bands), chosen, robot) for drive in part)
-        for part in (held, fitted)
-    )
+    said = decided([*held, *fitted], bands, chosen, robot)
+    held_said, fitted_said = said[: len(held)], said[len(held) :]
     trials = try_injected(longest, bands, chosen, kinds_for(longest), robot)
     notes = [note for drive in work.drives for note in drive.notes]
     if not chosen.small_faults:
@@ -276,7 +273,7 @@ class _Work:
         plan: Rehearsal,
     ) -> Tuned:
         """The narrowest bands with which false alarms can be as rare as wanted."""
-        robot, choice, share = robot_of(str(self.source(described))), self.request.bands, 0.55
+        robot, choice, share = str(self.source(described)), self.request.bands, 0.55
         first = evolve(plan, shoves=plan.first)
         while True:
             self.progress("simulating healthy hours", share)

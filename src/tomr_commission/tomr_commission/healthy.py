@@ -8,15 +8,20 @@ asked, with narrower bands.
 
 from collections.abc import Sequence
 
+import numpy as np
 from attrs import evolve, frozen
+from numpy.typing import NDArray
 
 from tomr_commission.alarm import block_peaks
-from tomr_commission.evidence import witnessed
+from tomr_commission.evidence import Decided, decisions, witnessed
 from tomr_commission.observed import Observed, frames_of
+from tomr_commission.parallel import on_all_cores
+from tomr_commission.rehearsal import robot_of
 from tomr_fault_diag.classifier.judges import GATHERED
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.settings import BandSettings
-from tomr_power_model.robot import Robot
+
+Array = NDArray[np.float64]
 
 MOST_GATHERED = 0.5 * GATHERED  # nats, in healthy driving
 
@@ -35,12 +40,12 @@ def healthy(
     drives: Sequence[Observed],
     bands: BandSettings,
     settings: ClassifierSettings,
-    robot: Robot,
+    robot: str,
     block: float,
 ) -> Healthy:
-    """Judge healthy drives; small faults are looked for if that shows none.
+    """Judge healthy drives, on all cores; small faults are looked for if that shows none.
 
-    `block`: length of a block [s].
+    `robot`: where it is described; `block`: length of a block [s].
     """
     hours = sum(drive.hours for drive in drives)
 
@@ -48,8 +53,8 @@ def healthy(
         chosen = evolve(settings, small_faults=small_faults)
         peaks: list[float] = []
         most = 0.0
-        for drive in drives:
-            evidence, gathered = witnessed(frames_of(drive, bands), chosen, robot)
+        seen = on_all_cores(_witnessed, [(drive, bands, chosen, robot) for drive in drives])
+        for drive, (evidence, gathered) in zip(drives, seen, strict=True):
             peaks += block_peaks(evidence, drive.seconds, block)
             most = max(most, gathered)
         return Healthy(chosen, tuple(peaks), hours, most)
@@ -58,3 +63,23 @@ def healthy(
     if looking.gathered <= MOST_GATHERED:
         return looking
     return evolve(judged(small_faults=False), gathered=looking.gathered)
+
+
+def decided(
+    drives: Sequence[Observed], bands: BandSettings, settings: ClassifierSettings, robot: str
+) -> tuple[Decided, ...]:
+    """What a diagnosis says of each drive of a described robot, on all cores."""
+    return tuple(on_all_cores(_decided, [(drive, bands, settings, robot) for drive in drives]))
+
+
+_Job = tuple[Observed, BandSettings, ClassifierSettings, str]
+
+
+def _decided(job: _Job) -> Decided:
+    drive, bands, settings, robot = job
+    return decisions(frames_of(drive, bands), settings, robot_of(robot))
+
+
+def _witnessed(job: _Job) -> tuple[Array, float]:
+    drive, bands, settings, robot = job
+    return witnessed(frames_of(drive, bands), settings, robot_of(robot))

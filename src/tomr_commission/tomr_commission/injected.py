@@ -5,7 +5,6 @@ else stay as recorded. What a fault does to the motion is not in it: such faults
 """
 
 from collections.abc import Callable, Sequence
-from functools import partial
 
 import numpy as np
 from attrs import evolve, frozen
@@ -13,11 +12,12 @@ from numpy.typing import NDArray
 
 from tomr_commission.evidence import decisions
 from tomr_commission.observed import Observed, frames_of, reports_currents
+from tomr_commission.parallel import on_all_cores
+from tomr_commission.rehearsal import robot_of
 from tomr_commission.trials import Trial, first_alarm, smallest_found
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, TOTAL
 from tomr_fault_diag.residuals.settings import BandSettings
-from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -40,19 +40,27 @@ def _scaled(power: Array, size: float) -> Array:
     return power * (1.0 + size)
 
 
+def _dead(power: Array, size: float) -> Array:
+    return np.zeros_like(power)
+
+
+def _raised(power: Array, size: float) -> Array:
+    return power + size
+
+
 def _held(power: Array, size: float) -> Array:
     return np.full_like(power, power[0])
 
 
 KINDS: tuple[InjectedKind, ...] = (
-    InjectedKind("power sensor dead", (1.0,), "", lambda power, size: np.zeros_like(power)),
+    InjectedKind("power sensor dead", (1.0,), "", _dead),
     InjectedKind("power sensor frozen", (1.0,), "", _held),
     InjectedKind("power sensor scaled", (1.0, 0.5, 0.3, 0.2, 0.1, 0.05), "of the power", _scaled),
     InjectedKind(
         "power sensor biased",
         (20.0, 10.0, 5.0, 3.0, 2.0, 1.0, 0.5),
         "W",
-        lambda power, size: power + size,
+        _raised,
     ),
     InjectedKind(
         "motor draws more", (1.0, 0.5, 0.3, 0.2, 0.1, 0.05), "of its power", _scaled, in_total=True
@@ -99,22 +107,33 @@ def try_injected(
     bands: BandSettings,
     settings: ClassifierSettings,
     kinds: Sequence[InjectedKind],
-    robot: Robot,
+    robot: str,
 ) -> list[Trial]:
-    """Each kind at each wheel, down to the smallest size that is found."""
-    shown = drive.part(slice(0, _SHOWN), drive.name)
+    """Each kind at each wheel, down to the smallest size that is found, on all cores.
 
-    def attempt(kind: InjectedKind, wheel: int, size: float) -> Trial:
+    `robot`: where it is described.
+    """
+    shown = drive.part(slice(0, _SHOWN), drive.name)
+    jobs = [
+        (shown, bands, settings, kind, robot, wheel)
+        for kind in kinds
+        for wheel in range(len(MOTORS))
+    ]
+    return [trial for trials in on_all_cores(_tried, jobs) for trial in trials]
+
+
+_Job = tuple[Observed, BandSettings, ClassifierSettings, InjectedKind, str, int]
+
+
+def _tried(job: _Job) -> list[Trial]:
+    shown, bands, settings, kind, robot, wheel = job
+
+    def attempt(size: float) -> Trial:
         frames = frames_of(injected(shown, kind, size, wheel), bands)
         begin = float(shown.seconds[min(_HEALTHY, len(frames) - 1)])
-        found = first_alarm(decisions(frames, settings, robot).alarms, begin)
+        found = first_alarm(decisions(frames, settings, robot_of(robot)).alarms, begin)
         delay = None if found is None else found.begin - begin
         name = "" if found is None else found.state
         return Trial(kind.name, size, kind.unit, wheel, delay, name)
 
-    return [
-        trial
-        for kind in kinds
-        for wheel in range(len(MOTORS))
-        for trial in smallest_found(kind.sizes, partial(attempt, kind, wheel))
-    ]
+    return smallest_found(kind.sizes, attempt)
