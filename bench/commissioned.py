@@ -1,6 +1,6 @@
 """Commissioned robots in MuJoCo whose descriptions lack physics: false alarms, faults, delays.
 
-    .venv/bin/python bench/commissioned.py --out DIR [--robots 4] [--hours 1] [--drives 96]
+    .venv/bin/python bench/commissioned.py --out DIR [--robots 0 1 2 3] [--hours 1] [--drives 96]
 
 Each robot is drawn from three families, every value up to 5 % off its robot.yaml, which besides
 lacks three effects of the vocabulary. It drives the plan of `tomr_commission` twice and a tour that
@@ -43,7 +43,8 @@ from tomr_training.simulated_drive import healthy_twin, simulated_drive
 
 _FIRST_SEED = 90_000_000
 _ROBOT = 100_000  # seeds of one robot
-_HEALTHY = 50_000  # seeds of healthy drives follow so many later
+_FAULTY = 1000  # seeds of faulty drives follow so many later ...
+_HEALTHY = 50_000  # ... and those of healthy ones
 _OFF = 0.05
 _CONCEALED = 3
 _HIDDEN = (
@@ -164,27 +165,28 @@ def _main(arguments: Sequence[str] | None) -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--out", type=Path, required=True, help="recordings and commissionings")
-    parser.add_argument("--robots", type=int, default=4)
+    parser.add_argument("--robots", type=int, nargs="+", default=[0, 1, 2, 3], help="numbers")
     parser.add_argument("--hours", type=float, default=1.0, help="healthy, of all robots together")
     parser.add_argument("--drives", type=int, default=96, help="with a fault, of all together")
+    parser.add_argument("--skip", type=int, default=0, help="of each robot's drives with a fault")
     parser.add_argument("--json", type=Path, help="write the report to this file as well")
     options = parser.parse_args(arguments)
-    folders = [options.out / f"robot_{number}" for number in range(options.robots)]
+    folders = {number: options.out / f"robot_{number}" for number in options.robots}
     robots = []
-    for number, folder in enumerate(folders):
+    for number, folder in folders.items():
         robots.append(commissioned(number, folder))
         print(json.dumps(robots[-1]), flush=True)
 
     def tasks(count: int, first: int, fault: str | None) -> list[tuple[int, int, str | None, Path]]:
         found = []
         for index in range(count):
-            number, k = index % options.robots, index // options.robots
+            number, k = options.robots[index % len(folders)], index // len(folders)
             seed = _FIRST_SEED + _ROBOT * number + first + k
             found.append((number, seed, fault, folders[number]))
         return found
 
     healthy = math.ceil(options.hours * 3600.0 / _DRIVE_SECONDS)
-    sick = _outcomes("faulty", tasks(options.drives, 1000, "fault"))
+    sick = _outcomes("faulty", tasks(options.drives, _FAULTY + options.skip, "fault"))
     well = _outcomes("healthy", tasks(healthy, _HEALTHY, None))
     publish({"robots": robots, "diagnosis": report(sick, well)}, options.json)
     return 0

@@ -129,7 +129,7 @@ def driven(task: tuple[str, int, int]) -> Found:
     change, seed, tours = task
     robot = random_drive(shipped_robot("reference"), seed, None).believed
     watch = SeverityWatch(robot)
-    classifier = FaultClassifier(make_judge(ClassifierSettings()), watch, SlideWatch(robot))
+    classifier = FaultClassifier(make_judge(ClassifierSettings()), watch, slides=SlideWatch(robot))
     alarms: Counter[str] = Counter()
     named, ticks, reported = None, 0, watch.conditions
     for _, frame in _frames(change, seed, tours):

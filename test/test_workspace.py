@@ -243,6 +243,15 @@ def test_nodes_import_nothing_large(node: str) -> None:
     assert not {"scipy", "numba", "matplotlib", "rosbags", "torch"} & set(run.stdout.split())
 
 
+def test_a_fit_imports_neither_pictures_nor_all_of_statistics() -> None:
+    """Together they would add a tenth to the memory of `tomr_gap explain`."""
+    program = "import tomr_reality_gap.cli, tomr_reality_gap.explain, sys; print(*sys.modules)"
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert not {"matplotlib", "jinja2", "scipy.stats"} & set(run.stdout.split())
+
+
 def test_launch_files_start_commands_that_exist() -> None:
     known = {(package.name, name) for package in PACKAGES for name in commands(package)}
     started = set()

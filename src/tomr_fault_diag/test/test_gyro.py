@@ -9,7 +9,7 @@ import pytest
 from attrs import evolve
 
 from tomr_fault_diag.classifier.belief import ENCODERS, HYPOTHESES, OTHER
-from tomr_fault_diag.classifier.evidence import Beside, counted, said_by_gyro
+from tomr_fault_diag.classifier.evidence import Beside, borne_out, said_by_gyro
 from tomr_fault_diag.classifier.judges import WindowJudge, make_judge
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
@@ -248,7 +248,7 @@ def test_encoders_that_a_gyro_bears_out_by_hand(
     turning: float, yaw: float, off: float, wheels: tuple[int, ...]
 ) -> None:
     frame = healthy_frame(yaw, off)
-    assert counted(frame, np.full(3, turning)) == wheels
+    assert borne_out(frame, np.full(3, turning)) == wheels
     said = said_by_gyro(frame, wheels)[ENCODERS]
     assert [number for number in range(3) if said[number] < 0.0] == list(wheels)
 
@@ -281,5 +281,5 @@ def test_what_a_gyro_clears_is_not_striking_for_it() -> None:
     judge = WindowJudge(cast(WindowNetwork, Lost()), ClassifierSettings())
     for tick in range(60):
         frame = evolve(healthy_frame(0.0), stamp_ns=BASE + 50 * tick * MS)
-        judge.judge(frame, 50 * MS, Unseen(), Beside(counted=(0,)))
+        judge.judge(frame, 50 * MS, Unseen(), Beside(borne_out=(0,)))
     assert judge._recent[-1][ENCODERS.start] < 0.0

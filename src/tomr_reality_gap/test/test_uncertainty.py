@@ -21,14 +21,19 @@ def _dataset(recordings: int, seconds: float = 30.0, step: float = 0.02) -> Simp
     return SimpleNamespace(simulations=items, channels=channels, value=value)
 
 
-def _sigma(dataset: SimpleNamespace, residual: np.ndarray, column: np.ndarray) -> float:
+def _sigma(
+    dataset: SimpleNamespace,
+    residual: np.ndarray,
+    column: np.ndarray,
+    weight: np.ndarray | None = None,
+) -> float:
     information = 1.0 + float(column @ column)
     best = SimpleNamespace(
         value=dataset.value - residual,
         own_sigma=np.array([STD / np.sqrt(information)]),
         model=SimpleNamespace(own=(Parameter("torque", ("made",), "N m", STD),)),
     )
-    noise = SimpleNamespace(weight=np.ones(len(residual)))
+    noise = SimpleNamespace(weight=np.ones(len(residual)) if weight is None else weight)
     found = SimpleNamespace(best=best, noise=noise)
     jacobian = SimpleNamespace(matrix=column[:, None])
     return float(own_sigma(dataset, found, jacobian)[0])  # type: ignore[arg-type]
@@ -58,6 +63,19 @@ def test_what_each_drive_says_otherwise_makes_it_as_uncertain_as_their_mean_is(
     sigma = _sigma(dataset, column * own.repeat(rows), column)
     factor = {12: 2.201, 8: 2.365}[recordings] / 1.96  # Student, of so many drives
     assert sigma == pytest.approx(factor * 0.2 / np.sqrt(recordings), rel=0.02)
+
+
+def test_samples_weigh_by_their_own_noise() -> None:
+    """In units of each sample's noise it is all the same."""
+    dataset = _dataset(8)
+    random = np.random.default_rng(4)
+    column = random.choice([-10.0, 10.0], len(dataset.value))
+    residual = 0.3 * column + random.standard_normal(len(column))
+    weight = random.uniform(0.5, 2.0, len(column))
+    plain = _sigma(dataset, residual, column)
+    # The noise's own share, which `_sigma` makes for weights of 1, is far below.
+    weighed = _sigma(dataset, residual / weight, column / weight, weight)
+    assert weighed == pytest.approx(plain, rel=1e-6)
 
 
 def test_blocks_are_as_long_as_what_is_left_is_correlated_and_no_fewer_than_twelve() -> None:

@@ -34,7 +34,7 @@ class Beside:
     """What is known of a tick beside its residuals."""
 
     contacts: Contacts = NOTHING
-    counted: tuple[int, ...] = ()  # wheels 0..2 whose encoders a gyro bears out
+    borne_out: tuple[int, ...] = ()  # wheels 0..2 whose encoders a gyro bears out
     lasting: Array = field(factory=lambda: np.zeros(HYPOTHESES))  # by small faults that last
 
 
@@ -46,7 +46,7 @@ def astray(frame: ResidualFrame) -> list[int]:
     return [wheel for wheel, index in enumerate(SPEEDS) if is_far(frame.residuals[index])]
 
 
-def counted(frame: ResidualFrame, turning: Array) -> tuple[int, ...]:
+def borne_out(frame: ResidualFrame, turning: Array) -> tuple[int, ...]:
     """Wheels whose encoders a gyro bears out: had one lost a fifth of its counts, its driver would
     turn it as much faster, and it the body. `turning`: yaw rate per wheel speed, (3,)."""
     yaw = frame.yaw
@@ -60,16 +60,16 @@ def counted(frame: ResidualFrame, turning: Array) -> tuple[int, ...]:
     )
 
 
-def said_by_gyro(frame: ResidualFrame, counted: tuple[int, ...] = ()) -> Array:
+def said_by_gyro(frame: ResidualFrame, cleared: tuple[int, ...] = ()) -> Array:
     """Of the body's yaw rate; 0 within the band, and without a gyro.
 
     Slip makes it another one, and need not; so does an encoder that shows too little, by turning
     the body on as its wheel does. Where an encoder shows what it should not the others are not in
-    doubt: a wheel that is slow in truth turns the body as it shows. `counted`: wheels whose
+    doubt: a wheel that is slow in truth turns the body as it shows. `cleared`: wheels whose
     encoders it bears out.
     """
     said, yaw = np.zeros(HYPOTHESES), frame.yaw
-    said[[ENCODERS.start + wheel for wheel in counted]] = _AGAINST
+    said[[ENCODERS.start + wheel for wheel in cleared]] = _AGAINST
     beyond = abs(yaw.residual) / yaw.band - 1.0
     if not beyond > 0.0:  # nor where it is NaN
         return said

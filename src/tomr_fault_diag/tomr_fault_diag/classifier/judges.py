@@ -178,7 +178,7 @@ class WindowJudge:
         slot = frame.stamp_ns // _TICK
         count = 1 if self._slot is None else slot - self._slot
         self._slot = slot
-        said = said_by_gyro(frame, beside.counted) + said_by_forces(frame, beside.contacts)
+        said = said_by_gyro(frame, beside.borne_out) + said_by_forces(frame, beside.contacts)
         is_calm = beside.contacts.calm and bool(self.settings.commissioned)
         weighed = _Weighed(said, is_calm, beside.lasting)
         for _ in range(count):

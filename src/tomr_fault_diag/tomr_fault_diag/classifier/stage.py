@@ -7,7 +7,7 @@ from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.contacts import NOTHING
-from tomr_fault_diag.classifier.evidence import Beside, counted
+from tomr_fault_diag.classifier.evidence import Beside, borne_out
 from tomr_fault_diag.classifier.judges import Judge, Opinion, make_judge
 from tomr_fault_diag.classifier.lasting import LastingWatch
 from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
@@ -78,6 +78,7 @@ class FaultClassifier:
         self,
         judge: Judge,
         severity: SeverityWatch | None = None,
+        *,
         slides: SlideWatch | None = None,
         lasting: LastingWatch | None = None,
         misfits: MisfitWatch | None = None,
@@ -105,10 +106,14 @@ class FaultClassifier:
     @classmethod
     def around(cls, judge: Judge, robot: Robot, severity: SeverityWatch | None = None) -> Self:
         """A judge, and what contacts and, where they are looked for, small faults show beside."""
-        lasting = LastingWatch(robot) if judge.settings.small_faults else None
-        misfits = MisfitWatch(Motors(robot).idle.tolist())
-        turning = Body.of(robot).to_twist[2]
-        return cls(judge, severity, SlideWatch(robot), lasting, misfits, turning)
+        return cls(
+            judge,
+            severity,
+            slides=SlideWatch(robot),
+            lasting=LastingWatch(robot) if judge.settings.small_faults else None,
+            misfits=MisfitWatch(Motors(robot).idle.tolist()),
+            turning=Body.of(robot).to_twist[2],
+        )
 
     @property
     def settings(self) -> ClassifierSettings:
@@ -214,7 +219,7 @@ class FaultClassifier:
             self._enter(DISOBEYS, frame.stamp_ns, None)
             return
         is_well = self._state is STATES[NORMAL]
-        beside = Beside(contacts, () if self._turning is None else counted(frame, self._turning))
+        beside = Beside(contacts, () if self._turning is None else borne_out(frame, self._turning))
         if self._lasting is not None:
             beside = evolve(beside, lasting=self._lasting.take(frame, is_well))
         self._opinion = self._judge.judge(frame, elapsed, self._unseen, beside)

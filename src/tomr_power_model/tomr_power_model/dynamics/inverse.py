@@ -66,6 +66,7 @@ MESHING_SWEEPS = 8  # at most, of friction that grows with the torque that the g
 SETTLED = 1e-6  # N m
 NEWTON_STEPS = 8  # at most, from a power to its current
 SMALL_CURRENT = 1e-3  # A, over which the slope of the power is taken
+LEAST_REACH = 1e-3  # A^2: no nearer to the least power do steps begin, where it is flat
 LEAST_SLOPE = 0.2  # W/A: a power that hardly depends on the current is no equation for it
 
 
@@ -174,7 +175,7 @@ def motor_currents(p: Numbers, m: Numbers, drawn: Numbers, out: Mutable, n: int)
         hot = p[w + RESISTANCE] * (1.0 + COPPER * m[a + MOTION_RISE])
         least = -0.5 * back / hot
         over = least * least + (drawn[i] - driver_power(p, w, 0.0)) / hot
-        reach = math.sqrt(max(over, SMALL_CURRENT))
+        reach = math.sqrt(max(over, LEAST_REACH))
         for side in range(2):
             way = 2.0 * side - 1.0
             current = least + way * reach
