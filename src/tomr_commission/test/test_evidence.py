@@ -11,6 +11,7 @@ from tomr_commission.evidence import (
     Episode,
     decisions,
     evidence_in,
+    first_alarm,
     together,
 )
 from tomr_commission.injected import KINDS, InjectedKind, injected
@@ -41,6 +42,18 @@ def test_alarm_comes_where_evidence_passes_the_caution(faulty: Observed) -> None
         assert abs(alarms[0].begin - first) <= 0.1001
         assert alarms[0].state == "motor system fault 3"
         assert alarms[0].wheel == 2
+
+
+def test_first_alarm_is_the_first_that_begins_after_a_time(faulty: Observed) -> None:
+    frames = frames_of(faulty, BandSettings())
+    begins = [alarm.begin for alarm in decisions(frames, COMMISSIONED, ROBOT).alarms]
+    for begin in (0.0, begins[0], begins[0] + 0.01, 1e3):
+        alarm = first_alarm(frames, COMMISSIONED, ROBOT, begin)
+        later = [time for time in begins if time >= begin]
+        assert (alarm is None) == (not later)
+        if alarm is not None:
+            assert alarm.begin == later[0]
+            assert alarm.state == "motor system fault 3"
 
 
 @pytest.mark.parametrize("kind", KINDS[2:4], ids=lambda kind: kind.name)

@@ -52,6 +52,17 @@ def test_rehearsal_depends_on_its_arguments_alone() -> None:
     assert len(one.peaks) == 3
 
 
+def test_first_shoves_and_the_others_are_all_of_them() -> None:
+    plan = Rehearsal(shoves=9, first=3)
+    args = ("reference", BandSettings(), ClassifierSettings(), USAGE)
+    whole, few, others = (rehearse(*args, asked) for asked in (plan, *plan.parts))
+    assert len(few.peaks) == 3
+    both = few.followed_by(others)
+    assert both.peaks == whole.peaks
+    assert math.isclose(both.hours, whole.hours)
+    assert len(set(whole.peaks)) > 3
+
+
 def test_cases_are_those_that_the_simulator_can_do() -> None:
     found = cases()
     assert {case.kind.fault for case in found} >= {"control_signal_lost", "encoder_lost"}

@@ -274,24 +274,19 @@ class _Work:
     ) -> Tuned:
         """The narrowest bands with which false alarms can be as rare as wanted."""
         robot, choice, share = str(self.source(described)), self.request.bands, 0.55
-        first = evolve(plan, shoves=plan.first)
         while True:
             self.progress("simulating healthy hours", share)
             bands = bands_of(fitted, choice)
             driven = healthy(fitted, bands, settings, robot, self.request.alarm.block)
             wider = choice.wider * choice.margin
+            shoved = Shoved()
             # A few shoves show where many are not worth while.
-            for asked, most in (
-                (first, _HOPELESS * choice.most_caution),
-                (plan, choice.most_caution),
-            ):
-                shoved = (
-                    Shoved((), 0.0)
-                    if reports_currents(fitted[0])
-                    else self.rehearsed(described, bands, driven.settings, asked)
-                )
+            for part, patience in zip(plan.parts, (_HOPELESS, 1.0), strict=True):
+                if not reports_currents(fitted[0]):
+                    more = self.rehearsed(described, bands, driven.settings, part)
+                    shoved = shoved.followed_by(more)
                 level = _level(self.request, driven, shoved, plan)
-                if level.needed > most and wider <= choice.widest:
+                if level.needed > patience * choice.most_caution and wider <= choice.widest:
                     break
             else:
                 return Tuned(choice.margin, bands, driven, shoved, level)

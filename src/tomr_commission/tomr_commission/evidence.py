@@ -5,7 +5,7 @@ decades of `caution` a tick would have overcome. It is read off the classifier i
 most caution there is, so that it follows whatever the classifier becomes.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from attrs import evolve, frozen
@@ -16,7 +16,7 @@ from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
-from tomr_fault_diag.classifier.states import FAULTLESS
+from tomr_fault_diag.classifier.states import FAULTLESS, State
 from tomr_fault_diag.classifier.window_network import WindowNetwork
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_power_model.model.ticks import NANOSECONDS
@@ -97,26 +97,44 @@ def together(said: Sequence[Decided]) -> Decided:
 
 def decisions(frames: list[ResidualFrame], settings: ClassifierSettings, robot: Robot) -> Decided:
     """Diagnose frames of a described robot with a classifier of given settings."""
-    classifier = FaultClassifier.around(make_judge(settings), robot)
     alarms: list[Episode] = []
-    current: Diagnosis | None = None
     undecided = 0
-    start = frames[0].stamp_ns if frames else 0
+    for at, state, begun in _said(frames, settings, robot):
+        if begun is not None:
+            alarms.append(begun)
+        if state is None or state.name in _QUIET:
+            undecided += 1
+        elif state.name not in FAULTLESS:
+            alarms[-1] = evolve(alarms[-1], end=at)
+    return Decided(len(frames), undecided, tuple(alarms))
+
+
+def first_alarm(
+    frames: list[ResidualFrame], settings: ClassifierSettings, robot: Robot, begin: float
+) -> Episode | None:
+    """The first alarm that begins at a time [s] or later; frames after it are not looked at."""
+    for _, _, begun in _said(frames, settings, robot):
+        if begun is not None and begun.begin >= begin:
+            return begun
+    return None
+
+
+def _said(
+    frames: list[ResidualFrame], settings: ClassifierSettings, robot: Robot
+) -> Iterator[tuple[float, State | None, Episode | None]]:
+    """Time of each frame [s], the state that holds, and an alarm that begins."""
+    classifier = FaultClassifier.around(make_judge(settings), robot)
+    current: Diagnosis | None = None
     for frame in frames:
-        said = classifier.classify(frame)
+        at = (frame.stamp_ns - frames[0].stamp_ns) / NANOSECONDS
+        said, begun = classifier.classify(frame), None
         if said is not None and (
             current is None or (said.state, said.wheel) != (current.state, current.wheel)
         ):
             current = said
             if said.state.name not in FAULTLESS:
-                at = (frame.stamp_ns - start) / NANOSECONDS
-                alarms.append(Episode(said.state.name, said.wheel, at, at))
-        if current is None or current.state.name in _QUIET:
-            undecided += 1
-        elif current.state.name not in FAULTLESS:
-            last = alarms[-1]
-            alarms[-1] = evolve(last, end=(frame.stamp_ns - start) / NANOSECONDS)
-    return Decided(len(frames), undecided, tuple(alarms))
+                begun = Episode(said.state.name, said.wheel, at, at)
+        yield at, None if current is None else current.state, begun
 
 
 _QUIET = FAULTLESS - {"normal"}

@@ -10,11 +10,11 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from tomr_commission.evidence import decisions
+from tomr_commission.evidence import first_alarm
 from tomr_commission.observed import Observed, frames_of, reports_currents
 from tomr_commission.parallel import on_all_cores
 from tomr_commission.rehearsal import robot_of
-from tomr_commission.trials import Trial, first_alarm, smallest_found
+from tomr_commission.trials import Trial, smallest_found
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, TOTAL
 from tomr_fault_diag.residuals.settings import BandSettings
@@ -131,9 +131,7 @@ def _tried(job: _Job) -> list[Trial]:
     def attempt(size: float) -> Trial:
         frames = frames_of(injected(shown, kind, size, wheel), bands)
         begin = float(shown.seconds[min(_HEALTHY, len(frames) - 1)])
-        found = first_alarm(decisions(frames, settings, robot_of(robot)).alarms, begin)
-        delay = None if found is None else found.begin - begin
-        name = "" if found is None else found.state
-        return Trial(kind.name, size, kind.unit, wheel, delay, name)
+        alarm = first_alarm(frames, settings, robot_of(robot), begin)
+        return Trial.of(kind.name, size, kind.unit, wheel=wheel, begin=begin, alarm=alarm)
 
     return smallest_found(kind.sizes, attempt)

@@ -9,7 +9,7 @@ import math
 from functools import cache
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_commission.evidence import evidence_in
@@ -69,22 +69,33 @@ class Rehearsal:
     friction: tuple[float, float] = (0.6, 1.0)  # traction of the floor
     shoves_per_hour: float = 30.0  # that a robot meets, for the rate of alarms
     silent: tuple[int, ...] = ()  # residuals that the robot does not report
+    done: int = 0  # shoves that came before: these follow
+
+    @property
+    def parts(self) -> tuple["Rehearsal", "Rehearsal"]:
+        """The first shoves, and all others."""
+        others = evolve(self, shoves=self.shoves - self.first, done=self.first)
+        return evolve(self, shoves=self.first), others
 
 
 @frozen
 class Shoved:
     """Peaks of evidence after simulated shoves [decades]."""
 
-    peaks: tuple[float, ...]  # one for each shove
-    hours: float  # simulated
+    peaks: tuple[float, ...] = ()  # one for each shove
+    hours: float = 0.0  # judged
+
+    def followed_by(self, more: "Shoved") -> "Shoved":
+        """With those of other drives as well."""
+        return Shoved(self.peaks + more.peaks, self.hours + more.hours)
 
 
 def rehearse(
     robot: str, bands: BandSettings, settings: ClassifierSettings, usage: Usage, plan: Rehearsal
 ) -> Shoved:
     """Drive a described robot and shove it, on all cores; the result depends on arguments alone."""
-    count = math.ceil(plan.shoves / _PER_DRIVE)
-    jobs = [(robot, bands, settings, usage, plan, _SEED + index) for index in range(count)]
+    first, last = plan.done // _PER_DRIVE, math.ceil((plan.done + plan.shoves) / _PER_DRIVE)
+    jobs = [(robot, bands, settings, usage, plan, _SEED + index) for index in range(first, last)]
     _one(jobs[0])  # compiled before processes start
     parts = on_all_cores(_one, jobs, _CHUNK)
     return Shoved(
@@ -96,18 +107,20 @@ def rehearse(
 def _one(
     job: tuple[str, BandSettings, ClassifierSettings, Usage, Rehearsal, int],
 ) -> tuple[list[float], int]:
-    """Peaks of a drive's shoves, and its ticks."""
+    """Peaks of a drive's shoves, and the ticks up to the last one's end, which are judged."""
     described, bands, settings, usage, plan, seed = job
     robot = robot_of(described)
     drive = shoved_drive(robot, usage, plan, seed)
-    seen = observed_of(drive).silenced(plan.silent)
+    spans = [_ticks_of(bump) for bump in drive.bumps]
+    seen = observed_of(drive).silenced(plan.silent).part(slice(0, spans[-1].stop), str(seed))
     evidence = evidence_in(frames_of(seen, bands), settings, robot)
-    peaks = []
-    for bump in drive.bumps:
-        first = math.floor(bump.start * 1e9 / TICK_NS)
-        last = math.ceil((bump.start + bump.duration + _SETTLING) * 1e9 / TICK_NS)
-        peaks.append(float(evidence[first:last].max(initial=0.0)))
-    return peaks, len(evidence)
+    return [float(evidence[span].max(initial=0.0)) for span in spans], len(evidence)
+
+
+def _ticks_of(shove: Bump) -> slice:
+    """Of a shove and what follows from it."""
+    end = shove.start + shove.duration + _SETTLING
+    return slice(math.floor(shove.start * 1e9 / TICK_NS), math.ceil(end * 1e9 / TICK_NS))
 
 
 @cache

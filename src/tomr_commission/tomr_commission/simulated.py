@@ -2,11 +2,11 @@
 
 from attrs import frozen
 
-from tomr_commission.evidence import decisions
+from tomr_commission.evidence import first_alarm
 from tomr_commission.observed import Observed, frames_of, unit_of_motors
 from tomr_commission.parallel import on_all_cores
 from tomr_commission.rehearsal import Usage, robot_of
-from tomr_commission.trials import Trial, first_alarm, smallest_found
+from tomr_commission.trials import Trial, smallest_found
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.errors import InputError
@@ -110,12 +110,10 @@ def _tried(job: _Job) -> list[Trial]:
             raise InputError(
                 f"the recordings hold {unit} of the motors, the simulator {unit_of_motors(seen)}"
             )
-        said = decisions(frames_of(seen, bands), settings, robot_of(robot))
         begin = _ONSET - (int(seen.stamp_ns[0]) - START_NS) / NANOSECONDS
-        found = first_alarm(said.alarms, begin)
-        delay = None if found is None else found.begin - begin
-        name = "" if found is None else found.state
-        return Trial(f"{kind.label} (simulated)", size, kind.unit, wheel, delay, name)
+        alarm = first_alarm(frames_of(seen, bands), settings, robot_of(robot), begin)
+        name = f"{kind.label} (simulated)"
+        return Trial.of(name, size, kind.unit, wheel=wheel, begin=begin, alarm=alarm)
 
     return smallest_found(kind.sizes, attempt)
 

@@ -1,6 +1,7 @@
 """Trials of faults in ever smaller sizes, and the detection floors that they amount to."""
 
 from collections.abc import Callable, Sequence
+from typing import Self
 
 import numpy as np
 from attrs import frozen
@@ -19,6 +20,15 @@ class Trial:
     delay: float | None  # s from its beginning to the first alarm; None: not found
     called: str  # what it was called, empty where it was not found
 
+    @classmethod
+    def of(
+        cls, kind: str, size: float, unit: str, *, wheel: int, begin: float, alarm: Episode | None
+    ) -> Self:
+        """Of a fault that began at a time [s], and the first alarm since."""
+        if alarm is None:
+            return cls(kind, size, unit, wheel, None, "")
+        return cls(kind, size, unit, wheel, alarm.begin - begin, alarm.state)
+
 
 def smallest_found(sizes: Sequence[float], attempt: Callable[[float], Trial]) -> list[Trial]:
     """Trials that find the smallest size that is found, by bisection; sizes the largest first."""
@@ -32,11 +42,6 @@ def smallest_found(sizes: Sequence[float], attempt: Callable[[float], Trial]) ->
         else:
             first = middle + 1
     return trials
-
-
-def first_alarm(alarms: Sequence[Episode], begin: float) -> Episode | None:
-    """The first alarm from a time on."""
-    return next((alarm for alarm in alarms if alarm.begin >= begin), None)
 
 
 @frozen

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
+from tomr_power_model.dynamics.binding import has_numba
 from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.model.predictor import PowerPredictor
@@ -103,7 +104,7 @@ class LabelledDrive:
 
 def simulated_drive(chosen: Drive) -> LabelledDrive:
     """Run a drive through the simulator and the first two stages."""
-    predictor = PowerPredictor(chosen.believed)
+    predictor = PowerPredictor(chosen.believed, is_compiled=has_numba())
     stage = ResidualStage(chosen.believed)
     takers: dict[str, list[Callable[[Any, int], str | None]]] = {}
     for item in (
