@@ -40,6 +40,17 @@ def test_a_wheel_that_slides_has_what_it_transmits_until_it_grips_with_more() ->
     assert np.isnan(limit.interval[:, 1]).all()
 
 
+def test_a_slide_on_another_floor_begins_anew() -> None:
+    limit = Available()
+    limit.take(np.full(3, 9.0), STD, YES, 0.01)
+    limit.take(np.full(3, 1.0), STD, NO, 3.0)  # long ago
+    limit.take(np.full(3, 2.0), STD, YES, 0.01)
+    assert limit.interval[:, 1] == pytest.approx(np.full(3, 3.0))
+    limit.take(np.full(3, 9.0), STD, NO, 0.01)  # more than there was: it is another floor
+    limit.take(np.full(3, 8.0), STD, YES, 0.01)
+    assert limit.interval == pytest.approx(np.tile([7.0, 9.0], (3, 1)))
+
+
 def test_a_slide_without_known_forces_limits_nothing() -> None:
     limit = Available()
     limit.take(np.full(3, np.nan), np.full(3, np.nan), YES, 0.01)
@@ -68,6 +79,15 @@ def test_the_floor_is_marked_where_contacts_slid() -> None:
     far = floor.grid()
     assert far is not None
     assert far.cells.size < 10
+
+
+@pytest.mark.parametrize(
+    "pose", [(1e7, 0.0, 0.0), (0.0, math.nan, 0.0), (0.0, 0.0, math.nan), (0.0, 0.0, math.inf)]
+)
+def test_a_pose_that_is_nowhere_marks_nothing(pose: tuple[float, float, float]) -> None:
+    floor = Floor(ROBOT)
+    floor.take(np.array(pose), YES, np.full(3, 0.1))
+    assert floor.grid() is None
 
 
 def test_contacts_turn_with_the_robot() -> None:

@@ -1,6 +1,7 @@
 """Creep: contacts that slide a little below their limit."""
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Self, cast
 
 import numpy as np
@@ -54,5 +55,9 @@ class Creep:
 
     def shape(self, used: Array) -> Array:
         """How far each wheel creeps per unit of the mean coefficient, from traction over load."""
-        share = np.array(self.coefficient) / self.mean if self.mean > 0.0 else np.ones(3)
-        return np.asarray(share * used * (1.0 + self.growth * used**2))
+        return np.asarray(self._share * used * (1.0 + self.growth * used**2))
+
+    @cached_property
+    def _share(self) -> Array:
+        """Of each wheel in the mean coefficient."""
+        return np.array(self.coefficient) / self.mean if self.mean > 0.0 else np.ones(3)

@@ -3,7 +3,6 @@
 import math
 from collections import deque
 from collections.abc import Iterator
-from heapq import merge
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +31,7 @@ _UNKNOWN_WAY = 1e4  # m^2
 _FRESH_NS = to_ns(0.25)  # how long a sensor may be silent
 _NO_IMU = np.full(6, np.nan)
 _NO_FORCES = np.zeros((0, 4))
+_NOTHING, _EACH = np.zeros((3, 3)), np.eye(3)
 _TURNING = 0.02  # m/s: below it there is no slip ratio
 _CREEPING = 0.05  # m/s, the same of creep: a ratio to a wheel that hardly turns says nothing
 _SLIDES_ON = 2.0  # s, for which a slide may go on unseen
@@ -68,6 +68,10 @@ class SlipOdometry:
         # Magnitudes of currents are good for creep, but no evidence of what the body does.
         self._are_evidence = robot.measurement.signed
         self.floor = Floor(robot)
+        self._wanted = {"encoders": "encoders", "imu": "imu/data"}  # streams, and what they are
+        if robot.measurement.source != "total_only":
+            names = enumerate(robot.wheel_topics)
+            self._wanted |= {f"power {wheel}": f"{name}/power" for wheel, name in names}
         self._by_power = Unaided(robot, self._body, self._radius)
         self._clear()
 
@@ -145,11 +149,9 @@ class SlipOdometry:
         """All samples up to a tick, in the order of their stamps."""
         found = []
         for queue in self._queues.values():
-            own = []
             while queue and queue[0][0] <= tick:
-                own.append(queue.popleft())
-            found.append(own)
-        return list(merge(*found))
+                found.append(queue.popleft())
+        return sorted(found)
 
     def _take(self, stamp: int, stream: str, values: tuple[float, ...]) -> None:
         if stream == "command":
@@ -221,8 +223,8 @@ class SlipOdometry:
         dt = 1e-9 * (time - self._time)
         forces = self._evidence(dt)
         self._ask_power(dt)
-        ways = np.stack([ways[0] - self._by_power.slid, ways[1]])
-        inertial = np.mean(self._inertial, axis=0) if self._inertial else _NO_IMU
+        ways[0] -= self._by_power.slid
+        inertial = _mean(self._inertial)
         self._inertial, self._tractive = [], []
         self._advance(time, dt, ways, inertial, forces)
         self._time = time
@@ -242,8 +244,9 @@ class SlipOdometry:
     def _ask_power(self, dt: float) -> None:
         """What the contacts slid in a step without an IMU."""
         is_known = self._are_evidence and np.isfinite(self._forces).sum() >= FEWEST_POWERS
-        speeds = self._tractions.speeds
-        if self._is_aided or not is_known or speeds is None:
+        is_asked = is_known and not self._is_aided
+        speeds = self._tractions.speeds if is_asked else None
+        if speeds is None:
             self._by_power.rest()
             return
         twist, rims = self._x[VX : WZ + 1], speeds * self._radius
@@ -263,7 +266,8 @@ class SlipOdometry:
         for wheel in range(WHEELS):
             if not self._is_fresh(f"power {wheel}", self._heard["encoders"]):
                 self._forces[wheel] = self._force_std[wheel] = math.nan
-        known = np.nan_to_num(self._forces) / self._body.load
+        is_known = np.isfinite(self._forces)
+        known = np.where(is_known, self._forces, 0.0) / self._body.load
         self._used = known + keep * (self._used - known)
         if not self._tractive or not self._are_evidence or not self._is_aided:
             return _NO_FORCES
@@ -302,7 +306,8 @@ class SlipOdometry:
         pose = x[:3].copy()
         pose += (c * moved[0] - s * moved[1], s * moved[0] + c * moved[1], moved[2])
         silent = 1e-9 * (tick - self._rims.time) - _AHEAD
-        lost = (_LOST_SPEED * max(silent, 0.0)) ** 2  # encoders are silent: anything may happen
+        # Encoders are silent: anything may happen.
+        lost = (_LOST_SPEED * max(silent, 0.0)) ** 2 * _EACH
         ground = body.rows @ twist
         rim = self._rims.speed
         creeps = x[CREEP] * self.settings.creep.shape(self._used) * math.hypot(*self._travel)
@@ -316,10 +321,10 @@ class SlipOdometry:
         return Estimate(
             stamp_ns=tick,
             pose=pose,
-            pose_covariance=P[:3, :3] + lost * np.eye(3),
+            pose_covariance=P[:3, :3] + lost,
             twist=twist,
-            twist_covariance=P[VX : WZ + 1, VX : WZ + 1] + lost * np.eye(3) + self._unseen(),
-            slip=np.clip(slip, -1.0, 1.0),
+            twist_covariance=P[VX : WZ + 1, VX : WZ + 1] + lost + self._unseen(),
+            slip=np.minimum(np.maximum(slip, -1.0), 1.0),
             sliding=sliding,
             creeping=creeps,
             probability=self._probability.copy(),
@@ -337,7 +342,7 @@ class SlipOdometry:
     def _unseen(self) -> Array:
         """Variance of a velocity that nothing but the wheels shows."""
         if self._is_aided and self._has_stood:
-            return np.zeros((3, 3))
+            return _NOTHING
         noise, travel = self._unsure, math.hypot(*self._travel)
         # What makes the pose spread as it does where slides last so long.
         unseen = np.square((noise.way, noise.way, noise.turn)) * travel**2 / _SLIDES_ON
@@ -345,19 +350,15 @@ class SlipOdometry:
 
     def _sensors(self, tick: int) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:
         """Sensors that are silent, and what is used of each."""
-        wanted = {"encoders": "encoders", "imu": "imu/data"}
-        wanted |= {
-            f"power {wheel}": f"{name}/power"
-            for wheel, name in enumerate(self._robot.wheel_topics)
-            if self._robot.measurement.source != "total_only"
-        }
-        off = {"imu"} if not self.settings.use_imu else set()
-        fresh = {name: self._is_fresh(name, tick) and name not in off for name in wanted}
-        missing = tuple(said for name, said in wanted.items() if not fresh[name])
-        return missing, tuple(
-            (said, "used" if fresh[name] else "silent" if name in self._heard else "not there")
-            for name, said in wanted.items()
-        )
+        missing, found = [], []
+        for name, said in self._wanted.items():
+            is_off = name == "imu" and not self.settings.use_imu
+            if self._is_fresh(name, tick) and not is_off:
+                found.append((said, "used"))
+                continue
+            missing.append(said)
+            found.append((said, "silent" if name in self._heard else "not there"))
+        return tuple(missing), tuple(found)
 
     def _assumed(self, missing: tuple[str, ...]) -> tuple[str, ...]:
         found = []
@@ -375,3 +376,10 @@ class SlipOdometry:
         named += [("slope_x", x[SLOPE]), ("slope_y", x[SLOPE + 1])]
         named += [(f"friction_{wheel + 1}", x[FRICTION + wheel]) for wheel in range(WHEELS)]
         return tuple((name, float(value)) for name, value in named)
+
+
+def _mean(samples: list[tuple[float, ...]]) -> Array:
+    """Of IMU samples since the last step: one as a rule."""
+    if len(samples) == 1:
+        return np.array(samples[0])
+    return np.asarray(np.mean(samples, axis=0)) if samples else _NO_IMU

@@ -17,6 +17,7 @@ _MEMORY = 2.0  # s, for which a wheel's traction says something of the floor und
 _SHARE = 0.1  # of a new sample in the mean while a wheel slides
 _FARTHEST = 100  # cells from the robot, of a grid
 _MOST_CELLS = 40_000
+_LARGEST = 1e6  # m, of a coordinate
 
 
 class Available:
@@ -40,19 +41,23 @@ class Available:
 
     def take(self, force: Array, std: Array, sliding: NDArray[np.bool_], dt: float) -> None:
         """Tractions [N], NaN where not known, and whether the wheels slide."""
-        size, known = np.abs(force), np.isfinite(force)
-        # Forces are noisy: their mean over a slide is the limit.
-        joined = self._mean + _SHARE * (size - self._mean)
-        self._age = np.where(sliding & known, 0.0, self._age + dt)
-        begun = ~np.isfinite(joined) | (self._age > _MEMORY)
-        self._mean = np.where(sliding & known, np.where(begun, size, joined), self._mean)
-        self._std = np.where(sliding & known, std, self._std)
+        self._age += dt
         self._low *= math.exp(-dt / _MEMORY)
-        grips = ~sliding & known
-        seen = np.maximum(size - _SIGMAS * std, 0.0)
-        self._low = np.where(grips, np.fmax(self._low, seen), self._low)
-        more = grips & (seen > self._mean + _SIGMAS * self._std)  # the floor is another one
-        self._age[more] = math.inf
+        rows = zip(force.tolist(), std.tolist(), sliding.tolist(), strict=True)
+        for wheel, (signed, doubt, slides) in enumerate(rows):
+            if not math.isfinite(signed):
+                continue
+            size, mean = abs(signed), float(self._mean[wheel])
+            if slides:
+                # Forces are noisy: their mean over a slide is the limit.
+                goes_on = math.isfinite(mean) and self._age[wheel] <= _MEMORY
+                self._mean[wheel] = mean + _SHARE * (size - mean) if goes_on else size
+                self._std[wheel], self._age[wheel] = doubt, 0.0
+                continue
+            seen = max(size - _SIGMAS * doubt, 0.0)
+            self._low[wheel] = max(self._low[wheel], seen)
+            if seen > mean + _SIGMAS * self._std[wheel]:  # the floor is another one
+                self._age[wheel] = math.inf
 
 
 @frozen
@@ -68,23 +73,29 @@ class Floor:
 
     def __init__(self, robot: Robot) -> None:
         angles = wheel_angles(robot)
-        self._contacts = robot.robot_radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        places = robot.robot_radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        self._contacts: list[tuple[float, float]] = list(map(tuple, places.tolist()))
         # Cell: samples, those that slid, and the lack of traction of these added up.
-        self._cells: dict[tuple[int, int], Array] = {}
+        self._cells: dict[tuple[int, int], list[float]] = {}
         self._here = (0, 0)
 
     def take(self, pose: Array, sliding: NDArray[np.bool_], share: Array) -> None:
         """Pose (x, y [m], yaw [rad]); which wheels slide; traction over load, NaN: not known."""
-        c, s = math.cos(pose[2]), math.sin(pose[2])
-        places = pose[:2] + self._contacts @ np.array([[c, s], [-s, c]])
-        if not (np.abs(places) < 1e6).all():
+        x, y, yaw = pose.tolist()
+        if not (abs(x) < _LARGEST and abs(y) < _LARGEST and math.isfinite(yaw)):
             return
-        rows = np.floor(places / SIDE).astype(int).tolist()
-        for (column, row), slid, used in zip(rows, sliding, share, strict=True):
-            cell = self._cells.setdefault((column, row), np.zeros(3))
+        c, s = math.cos(yaw), math.sin(yaw)
+        rows = zip(self._contacts, sliding.tolist(), share.tolist(), strict=True)
+        for wheel, ((ahead, left), slid, used) in enumerate(rows):
+            column = math.floor((x + c * ahead - s * left) / SIDE)
+            row = math.floor((y + s * ahead + c * left) / SIDE)
             lack = 1.0 - min(abs(used), 1.0) if math.isfinite(used) else 1.0
-            cell += (1.0, slid, slid * lack)
-        self._here = (rows[0][0], rows[0][1])
+            cell = self._cells.setdefault((column, row), [0.0, 0.0, 0.0])
+            cell[0] += 1.0
+            cell[1] += slid
+            cell[2] += slid * lack
+            if wheel == 0:
+                self._here = column, row
         while len(self._cells) > _MOST_CELLS:  # the oldest go
             del self._cells[next(iter(self._cells))]
 

@@ -8,7 +8,7 @@ An encoder counts its rim's way, always: the measurement is never rejected. What
 process that ties the rim to the body, d(rim_i) = (row_i v + creep_i) dt + noise, whose noise
 is small while the wheel grips and large while it slides. So counts do not turn into velocities,
 their quantum does not random-walk, and where nothing slides the pose is that of plain wheel
-odometry. The functions use what numba compiles, too.
+odometry.
 """
 
 import math
@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 X, Y, YAW, VX, VY, WZ, AX, AY, AW = range(9)
 RIM, ACCELEROMETER, GYRO, SLOPE, FRICTION, DRAG, CREEP = 9, 12, 14, 15, 17, 20, 21
 SIZE = 22
+_ONE = np.eye(SIZE)
+_DIAGONAL = np.diag_indices(SIZE)
 FORCE_WHEEL, FORCE, FORCE_VARIANCE, FORCE_SPEED = range(4)  # columns of measured tractions
 RESTING = 0.3  # rad/s, below which dry friction does
 TAILS = 2.0  # of the encoders' variance, where sliding is looked for
@@ -88,32 +90,30 @@ def predict(
     P[AW, AW] += n.turn_rate**2 * (1.0 - keep * keep)
     v, a = x[VX : WZ + 1].copy(), x[AX : AW + 1].copy()
     step = v * dt + a * half
-    yaw = x[YAW] + 0.5 * step[2]
+    sx, sy, turned = step.tolist()
+    yaw = float(x[YAW]) + 0.5 * turned
     c, s = math.cos(yaw), math.sin(yaw)
-    dx, dy = c * step[0] - s * step[1], s * step[0] + c * step[1]
-    f = np.eye(SIZE)
+    dx, dy = c * sx - s * sy, s * sx + c * sy
+    f = _ONE.copy()
     f[X, YAW], f[Y, YAW] = -dy, dx
     turn = np.array([[c, -s, -0.5 * dy], [s, c, 0.5 * dx], [0.0, 0.0, 1.0]])
     f[X : YAW + 1, VX : WZ + 1] = turn * dt
     f[X : YAW + 1, AX : AW + 1] = turn * half
-    ground = b.rows @ v
-    travel = math.sqrt(v[0] ** 2 + v[1] ** 2)
+    f[RIM : RIM + 3, VX : WZ + 1] = b.rows * dt
+    f[RIM : RIM + 3, AX : AW + 1] = b.rows * half
+    f[VX, AX] = f[VY, AY] = f[WZ, AW] = dt
+    if n.slip_rate > 0.0:  # unaided, creep looks like travel: it is taken as known
+        f[RIM : RIM + 3, CREEP] = used * dt
     q = np.zeros(SIZE)
-    for i in range(3):
-        f[RIM + i, VX : WZ + 1] = b.rows[i] * dt
-        f[RIM + i, AX : AW + 1] = b.rows[i] * half
-        if n.slip_rate > 0.0:  # unaided, creep looks like travel: it is taken as known
-            f[RIM + i, CREEP] = used[i] * dt
-        x[RIM + i] += b.rows[i] @ step + x[CREEP] * used[i] * dt
-        f[VX + i, AX + i] = dt
-        loose = 1.0 + n.doubt * mode[3]
-        q[RIM + i] = (n.grip**2 + (n.grip_share * ground[i]) ** 2) * loose**2 * dt
-        q[RIM + i] += mode[i] * (n.slide * dt) ** 2
-        q[FRICTION + i] = n.walk_friction**2 * dt
-        x[VX + i] += a[i] * dt
+    grip = n.grip**2 + (n.grip_share * (b.rows @ v)) ** 2
+    q[RIM : RIM + 3] = grip * ((1.0 + n.doubt * mode[3]) ** 2 * dt) + mode[:3] * (n.slide * dt) ** 2
+    q[FRICTION : FRICTION + 3] = n.walk_friction**2 * dt
+    x[RIM : RIM + 3] += b.rows @ step + x[CREEP] * used * dt
+    x[VX : WZ + 1] += a * dt
     x[X] += dx
     x[Y] += dy
-    x[YAW] += step[2]
+    x[YAW] += turned
+    travel = math.hypot(v[0], v[1])
     # What the model leaves out adds up along the way, and while wheels slide.
     lost = (n.way * travel) ** 2 + (n.slid * mode[3]) ** 2
     q[X] = q[Y] = lost * dt
@@ -121,7 +121,9 @@ def predict(
     q[ACCELEROMETER] = q[ACCELEROMETER + 1] = n.walk_bias**2 * dt
     q[GYRO] = n.walk_gyro**2 * dt
     q[SLOPE] = q[SLOPE + 1] = n.walk_slope**2 * dt
-    return f @ P @ f.T + np.diag(q)
+    P = f @ P @ f.T
+    P[_DIAGONAL] += q
+    return P
 
 
 def judge(x: Array, P: Array, n: Noise, mode: Array, rims: Array, dt: float) -> None:
@@ -130,15 +132,15 @@ def judge(x: Array, P: Array, n: Noise, mode: Array, rims: Array, dt: float) -> 
     rims: ways by the encoders [m] and their variances, (2, 3).
     """
     wide = (n.slide * dt) ** 2
-    for i in range(3):
-        k, was = RIM + i, mode[i]
-        if n.slip_rate == 0.0:  # nothing shows it: the wheels are taken for gripping
-            mode[i] = 0.0
-            continue
-        grips = max(P[k, k] - was * wide, 0.0) + TAILS * rims[1, i]
+    if n.slip_rate == 0.0:  # nothing shows it: the wheels are taken for gripping
+        mode[:3] = 0.0
+        return
+    apart, variance = (rims[0] - x[RIM : RIM + 3]).tolist(), rims[1].tolist()
+    for i, was in enumerate(mode[:3].tolist()):
+        k = RIM + i
+        grips = max(float(P[k, k]) - was * wide, 0.0) + TAILS * variance[i]
         slides = grips + wide
-        square = (rims[0, i] - x[k]) ** 2
-        exponent = min(0.5 * square * (1.0 / grips - 1.0 / slides), 50.0)
+        exponent = min(0.5 * apart[i] * apart[i] * (1.0 / grips - 1.0 / slides), 50.0)
         odds = math.sqrt(grips / slides) * math.exp(exponent)
         prior = was * (1.0 - n.grip_rate * dt) + (1.0 - was) * n.slip_rate * dt
         now = prior * odds / (prior * odds + 1.0 - prior)
@@ -157,17 +159,17 @@ def correct(
     """
     ph = P @ h.T
     s = h @ ph
+    own = s.diagonal().tolist()
     noise = np.abs(variance)
-    for i in range(len(innovation)):
-        square = innovation[i] ** 2
-        if variance[i] > 0.0 and square > gate * (s[i, i] + noise[i]):
-            noise[i] = square / gate - s[i, i]  # an outlier counts less
-    s += np.diag(noise)
-    gain = np.linalg.solve(s, ph.T.copy()).T
+    for i, (off, said) in enumerate(zip(innovation.tolist(), variance.tolist(), strict=True)):
+        if said > 0.0 and off * off > gate * (own[i] + said):
+            noise[i] = off * off / gate - own[i]  # an outlier counts less
+    s.ravel()[:: len(s) + 1] += noise
+    gain = ph / s if len(s) == 1 else np.linalg.solve(s, ph.T).T
     if held:
         gain = gain.copy()
         gain[ACCELEROMETER:] = 0.0
-        left = np.eye(SIZE) - gain @ h
+        left = _ONE - gain @ h
         P = left @ P @ left.T + (gain * noise) @ gain.T
     else:
         P = P - gain @ ph.T

@@ -86,7 +86,7 @@ class Rims:
         self._last.append((time, angle))
         while len(self._last) > 2 and self._last[1][0] <= time - _WINDOW_NS:
             self._last.popleft()
-        return np.stack([(angle - self._first) * self._radius, variance])
+        return np.array([(angle - self._first) * self._radius, variance])
 
     def _count(self, turned: Array) -> None:
         """Learn the encoders' quantum: ways are multiples of it, and so are their differences."""

@@ -81,6 +81,7 @@ class Tractions:
     def clear(self) -> None:
         """Forget all: what the drivers hold is that of a robot at rest."""
         self._state = [0.0] * at.state_size(WHEELS)
+        self._drawn = [0.0] * (WHEELS * at.POWER_WHEEL)
         self._input = list(no_input(WHEELS))
         self._samples: deque[tuple[int, Triple]] = deque()
         self._commands: deque[tuple[int, Triple]] = deque()
@@ -123,10 +124,11 @@ class Tractions:
     def _fit(self) -> tuple[list[float], list[float], list[float]]:
         """Angles [rad], speeds and accelerations at the newest encoder sample, by a parabola."""
         newest, last = self._samples[-1]
-        times = np.array([1e-9 * (stamp - newest) for stamp, _ in self._samples])
-        times /= -times[0]
         angles = np.array([angle for _, angle in self._samples]) - last
-        powers = np.stack([np.ones_like(times), times, times * times])
+        powers = np.ones((3, len(angles)))
+        powers[1] = [1e-9 * (stamp - newest) for stamp, _ in self._samples]
+        powers[1] /= -powers[1, 0]
+        powers[2] = powers[1] * powers[1]
         shape = np.linalg.solve(powers @ powers.T, powers @ angles)
         scale = 1e-9 * (newest - self._samples[0][0])
         shown = WheelEstimate(shape[1] / scale, 2.0 / scale**2 * shape[2], np.array(last))
@@ -169,11 +171,13 @@ class Tractions:
         speed = own[at.MOTION_HEADER + at.MOTION_SPEED]
         if is_sure and abs(speed) > _MOVING:
             self._follow(wheel, current, speed)
-        force, left = self._force(wheel, current, own)
+        each = {one: self._force(wheel, one, own) for one in found}
+        force, left = each.get(current) or self._force(wheel, current, own)
         rough = math.sqrt(self._rough[wheel].take(force))
         newtons = self._constant[wheel] / self._radius
         std = math.hypot(newtons * noise, left, rough)
-        either = self._either(wheel, drawn, own, found)
+        first, second = (self._doubted(wheel, drawn, speed, one, each[one]) for one in found)
+        either = (first[0], second[0]), (first[1], second[1])
         rolling = self._force(wheel, rolls, own)[0]
         return Traction(stamp_ns, wheel, force, std, speed, either, rolling)
 
@@ -181,9 +185,8 @@ class Tractions:
         """Of a motor whose wheel rolls [A]; magnitudes of currents have nothing to compare."""
         if self._unsigned:
             return math.nan
-        out = [0.0] * (WHEELS * at.POWER_WHEEL)
-        self._laws.drive_power(self._numbers, motion, out, WHEELS)
-        return out[wheel * at.POWER_WHEEL + at.POWER_CURRENT]
+        self._laws.one_drive_power(self._numbers, motion, self._drawn, WHEELS, wheel)
+        return self._drawn[wheel * at.POWER_WHEEL + at.POWER_CURRENT]
 
     def _force(self, wheel: int, current: float, own: list[float]) -> tuple[float, float]:
         """Force of a contact at a motor's current, and what dry friction leaves open of it [N]."""
@@ -191,16 +194,13 @@ class Tractions:
         self._laws.tractions(self._alone[wheel], own, [current], forces, 1)
         return forces[0], forces[1]
 
-    def _either(self, wheel: int, drawn: float, own: list[float], found: list[float]) -> Pair:
-        """Forces of both currents, each with its own deviation: which is right does not count."""
-        speed = own[at.MOTION_HEADER + at.MOTION_SPEED]
+    def _doubted(
+        self, wheel: int, drawn: float, speed: float, current: float, force: tuple[float, float]
+    ) -> tuple[float, float]:
+        """Force of a current and its own deviation [N]: which current is right does not count."""
         newtons = self._constant[wheel] / self._radius
-        forces, stds = [], []
-        for current in found:
-            force, left = self._force(wheel, current, own)
-            forces.append(force)
-            stds.append(math.hypot(newtons * self._spread(wheel, drawn, current, speed), left))
-        return (forces[0], forces[1]), (stds[0], stds[1])
+        spread = newtons * self._spread(wheel, drawn, current, speed)
+        return force[0], math.hypot(spread, force[1])
 
     def _spread(self, wheel: int, drawn: float, current: float, speed: float) -> float:
         """Deviation of a current that follows from a power [A]."""

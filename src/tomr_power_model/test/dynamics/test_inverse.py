@@ -41,7 +41,14 @@ def powers(
     wheels[:, at.MOTION_SPEED], wheels[:, at.MOTION_ACCELERATION] = roll @ twist, roll @ rate
     wheels[:, at.MOTION_RISE], wheels[:, at.MOTION_VOLTAGE] = rise, held
     found = np.zeros((1, n * at.POWER_WHEEL))
-    plain(tuple(vehicle.physics)).drive_powers(p, motion[None], found, n)
+    laws = plain(tuple(vehicle.physics))
+    laws.drive_powers(p, motion[None], found, n)
+    each = np.zeros(n * at.POWER_WHEEL)
+    for wheel in range(n):
+        laws.one_drive_power(p, motion, each, n, wheel)
+        done = (wheel + 1) * at.POWER_WHEEL
+        np.testing.assert_array_equal(each[:done], found[0, :done])
+        assert not each[done:].any()
     return found.reshape(n, at.POWER_WHEEL)
 
 

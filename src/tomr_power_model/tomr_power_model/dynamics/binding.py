@@ -27,7 +27,7 @@ from tomr_power_model.effects import EFFECTS, LAWS, base
 _MODULES = (contacts, step, inverse, start, batch)
 _ENTRIES = (
     *("advance", "begin", "control", "drive_power", "drive_powers", "motor_currents"),
-    *("predict", "read", "run", "tractions"),
+    *("one_drive_power", "predict", "read", "run", "tractions"),
 )
 _CACHE = "TOMR_CACHE_DIR"  # where compiled code is kept; default: the user's cache folder
 _ROOM = 2_000_000  # bytes that it takes, and some more

@@ -99,8 +99,8 @@ def carried_force(
     return fx, fy, mz, vx, vy, wz, ax - wz * vy, ay + wz * vx
 
 
-def drive_power(p: Numbers, m: Numbers, out: Mutable, n: int) -> None:
-    """Torque, current, voltage and power of each drive from one row of motion."""
+def needed_force(p: Numbers, m: Numbers, n: int) -> tuple[float, float, float, float, float]:
+    """Force that the body's motion and its rollers' drag take [N, N, N m], and how it leans."""
     stride = int(p[STRIDE])
     fx, fy, mz, vx, vy, wz, along_x, along_y = carried_force(p, m, n)
     for i in range(n):
@@ -116,38 +116,60 @@ def drive_power(p: Numbers, m: Numbers, out: Mutable, n: int) -> None:
                 fx += p[w + ALONG] * drag
                 fy += p[w + ALONG + 1] * drag
                 mz += p[w + ALONG + 2] * drag
+    return fx, fy, mz, along_x, along_y
+
+
+def one_drive_power(p: Numbers, m: Numbers, out: Mutable, n: int, wheel: int) -> None:
+    """`drive_power` of one wheel alone; what is written for the others stays."""
+    fx, fy, mz, along_x, along_y = needed_force(p, m, n)
+    turned_by(p, m, out, wheel, (fx, fy, mz), (along_x, along_y))
+
+
+def drive_power(p: Numbers, m: Numbers, out: Mutable, n: int) -> None:
+    """Torque, current, voltage and power of each drive from one row of motion."""
+    fx, fy, mz, along_x, along_y = needed_force(p, m, n)
     for i in range(n):
-        w, a, o = HEADER + i * stride, MOTION_HEADER + i * MOTION_WHEEL, i * POWER_WHEEL
-        speed = m[a + MOTION_SPEED]
-        carried = times(p, w + TO_TWIST, fx, fy, mz)
-        carried += p[w + AXLE_INERTIA] * m[a + MOTION_ACCELERATION]
-        load = max(p[w + LOAD] + p[w + LOAD_X] * along_x + p[w + LOAD_Y] * along_y, 0.0)
-        k, hot = p[w + CONSTANT], p[w + RESISTANCE] * (1.0 + COPPER * m[a + MOTION_RISE])
-        carried += p[w + VISCOUS] * speed + m[a + MOTION_RESISTING]
-        moves, held = math.tanh(speed / STICKING_SPEED), m[a + MOTION_VOLTAGE]
-        torque = carried
-        for _ in range(MESHING_SWEEPS):  # the gear carries what friction at the axle takes as well
-            before = torque
-            gear = before - p[w + ROTOR] * m[a + MOTION_ACCELERATION]
-            wheel = Wheel(
-                speed, load, gear, m[a + MOTION_ANGLE], p[w + NOMINAL_RADIUS], p[w + GEAR]
-            )
-            dry, free = max(dry_torque(p, w, wheel), 0.0), carried + moving_torque(p, w, wheel)
-            rests = 0.0
-            if held == held:
-                hold = k / hot * held - free
-                # A driver that asks for more than friction holds is not obeyed: nothing is known.
-                if abs(hold) < OBEYED * dry:
-                    rests = (1.0 - abs(moves)) * min(max(hold, -dry), dry)
-            torque = free + dry * moves + rests
-            if abs(torque - before) < SETTLED:
-                break
-        current = torque / k
-        volts = hot * current + k * speed
-        out[o + POWER_TORQUE] = torque
-        out[o + POWER_CURRENT] = current
-        out[o + POWER_VOLTAGE] = volts
-        out[o + POWER_DRAWN] = supplied(p, w, volts * current) + driver_power(p, w, current)
+        turned_by(p, m, out, i, (fx, fy, mz), (along_x, along_y))
+
+
+def turned_by(
+    p: Numbers,
+    m: Numbers,
+    out: Mutable,
+    i: int,
+    force: tuple[float, float, float],
+    lean: tuple[float, float],
+) -> None:
+    """What a drive does that gives its share of the body's force; torque, current and so on."""
+    w, a, o = HEADER + i * int(p[STRIDE]), MOTION_HEADER + i * MOTION_WHEEL, i * POWER_WHEEL
+    speed = m[a + MOTION_SPEED]
+    carried = times(p, w + TO_TWIST, force[0], force[1], force[2])
+    carried += p[w + AXLE_INERTIA] * m[a + MOTION_ACCELERATION]
+    load = max(p[w + LOAD] + p[w + LOAD_X] * lean[0] + p[w + LOAD_Y] * lean[1], 0.0)
+    k, hot = p[w + CONSTANT], p[w + RESISTANCE] * (1.0 + COPPER * m[a + MOTION_RISE])
+    carried += p[w + VISCOUS] * speed + m[a + MOTION_RESISTING]
+    moves, held = math.tanh(speed / STICKING_SPEED), m[a + MOTION_VOLTAGE]
+    torque = carried
+    for _ in range(MESHING_SWEEPS):  # the gear carries what friction at the axle takes as well
+        before = torque
+        gear = before - p[w + ROTOR] * m[a + MOTION_ACCELERATION]
+        wheel = Wheel(speed, load, gear, m[a + MOTION_ANGLE], p[w + NOMINAL_RADIUS], p[w + GEAR])
+        dry, free = max(dry_torque(p, w, wheel), 0.0), carried + moving_torque(p, w, wheel)
+        rests = 0.0
+        if held == held:
+            hold = k / hot * held - free
+            # A driver that asks for more than friction holds is not obeyed: nothing is known.
+            if abs(hold) < OBEYED * dry:
+                rests = (1.0 - abs(moves)) * min(max(hold, -dry), dry)
+        torque = free + dry * moves + rests
+        if abs(torque - before) < SETTLED:
+            break
+    current = torque / k
+    volts = hot * current + k * speed
+    out[o + POWER_TORQUE] = torque
+    out[o + POWER_CURRENT] = current
+    out[o + POWER_VOLTAGE] = volts
+    out[o + POWER_DRAWN] = supplied(p, w, volts * current) + driver_power(p, w, current)
 
 
 def drive_powers(p: Numbers, motion: Mutable, out: Mutable, n: int) -> None:

@@ -93,7 +93,8 @@ class Particles:
         self._body, self._dry, self._described_drag = body, friction, drag
         self._light = np.asarray(np.linalg.inv(body.inertia))
         self._per_force = body.rows @ self._light  # change of the twist by each contact's impulse
-        self._yields = np.einsum("ij,ij->i", self._per_force, body.rows)
+        self._each = self._per_force @ body.rows.T  # way of each contact by each one's impulse
+        self._yields = self._each.diagonal()
         self.start(np.zeros(3))
 
     def start(self, twist: Array) -> None:
@@ -190,18 +191,30 @@ class Particles:
         free = twist + dt * (self._wrench() @ self._light + self._force @ self._per_force)
         free[:, 0] += dt * twist[:, 2] * twist[:, 1]
         free[:, 1] -= dt * twist[:, 2] * twist[:, 0]
-        limit = self._traction[:, None] * b.load
-        for _ in range(s.sweeps):
-            for i in range(WHEELS):
-                more = (rims[i] - free @ b.rows[i]) / (dt * self._yields[i])
-                force = np.clip(self._force[:, i] + more, -limit[:, i], limit[:, i])
-                free += (dt * (force - self._force[:, i]))[:, None] * self._per_force[i]
-                self._force[:, i] = force
+        free += self._pushed(dt, free, rims) @ self._per_force * dt
         slides = np.flatnonzero((np.abs(rims - free @ b.rows.T) > _SLIDING).any(axis=1))
         shaken = self._random.standard_normal((len(slides), 3))
         free[slides] += s.walk_twist * math.sqrt(dt) * shaken
         self._twist = free
         self._yaw += dt * free[:, 2]
+
+    def _pushed(self, dt: float, free: Array, rims: Array) -> Array:
+        """What contacts give beside the forces of before, by sweeps over them [N], (n, 3).
+
+        In ways of the contacts and wheel by wheel: the rows of one are near each other in memory.
+        """
+        b, before = self._body, self._force.T
+        most = b.load[:, None] * self._traction
+        least, apart, force = -most, rims[:, None] - b.rows @ free.T, before.copy()
+        for i in [*range(WHEELS)] * self._set.sweeps:
+            more = apart[i] / (dt * self._yields[i])
+            more += force[i]
+            np.minimum(more, most[i], out=more)
+            np.maximum(more, least[i], out=more)
+            apart -= np.multiply.outer(dt * self._each[i], more - force[i])
+            force[i] = more
+        self._force = np.ascontiguousarray(force.T)
+        return np.asarray((force - before).T)
 
     def _wrench(self) -> Array:
         """Of drag and slope on the body [N, N, N m]."""
@@ -250,7 +263,7 @@ class Particles:
         spread = np.sqrt(common + stds**2 + share**2)
         off = (forces[:, None] - expected) / spread[:, None]
         nearer = np.where(np.abs(off[0]) < np.abs(off[1]), off[0], off[1])
-        return np.asarray(np.clip(nearer, -s.farthest, s.farthest))
+        return np.asarray(np.maximum(np.minimum(nearer, s.farthest), -s.farthest))
 
     def _draw(self) -> None:
         """As many particles again, each as often as it weighs; what is constant is spread a bit."""
