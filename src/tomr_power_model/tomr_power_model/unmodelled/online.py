@@ -63,47 +63,27 @@ class OnlineTerms:
         wheel angles [rad] and a heading [rad].
         """
         wheels, angles = np.array(speed, dtype=np.float64), np.array(angle, dtype=np.float64)
-        before, tick = self._memory, self._tick
         vx, vy, wz = self._inverse @ wheels
-        middle = heading + 0.5 * wz * tick
+        middle = heading + 0.5 * wz * self._tick
         cos, sin = np.cos(middle), np.sin(middle)
         velocity = cos * vx - sin * vy, sin * vx + cos * vy
-        # A wheel that has turned about stood in between.
-        slow = np.abs(wheels) < STANDING
-        moves = ~slow & (wheels * before.speed >= 0.0)
-        stood = np.where(slow, before.stood + tick, 0.0)
-        turned = np.minimum(before.turned + tick * np.abs(wheels), LONG_AGO)
-        now = _Memory(
-            before.time + tick,
-            before.x + tick * velocity[0],
-            before.y + tick * velocity[1],
-            wheels,
-            np.where(moves, np.minimum(before.since + tick, LONG_AGO), 0.0),
-            stood,
-            np.where(stood < RESTED, turned, 0.0),
-            np.where(stood < RESTED, before.place, angles),
-        )
-        self._memory = now
-
-        def body(value: float) -> Array:
-            return np.array([[value]])
-
+        self._memory = now = _gone_on(self._memory, self._tick, velocity, wheels, angles)
         contact_x, contact_y = contacts_at(
             self._inverse, np.array([now.x]), np.array([now.y]), np.array([middle])
         )
         motion = Motion(
-            time=body(now.time),
+            time=_body(now.time),
             speed=wheels[None],
             current=np.array([current], dtype=np.float64),
             angle=angles[None],
-            heading=body(middle),
-            x=body(now.x),
-            y=body(now.y),
+            heading=_body(middle),
+            x=_body(now.x),
+            y=_body(now.y),
             contact_x=contact_x,
             contact_y=contact_y,
-            velocity_x=body(velocity[0]),
-            velocity_y=body(velocity[1]),
-            direction=body(float(np.arctan2(vy, vx))),
+            velocity_x=_body(velocity[0]),
+            velocity_y=_body(velocity[1]),
+            direction=_body(float(np.arctan2(vy, vx))),
             since_stand=now.since[None],
             turned=now.turned[None],
             from_rest=np.minimum(np.abs(angles - now.place), LONG_AGO)[None],
@@ -116,6 +96,32 @@ class OnlineTerms:
             sum(float(item.supply[0]) for item in found),
             tuple(term.family.family_id for term in self._terms if term.outside(motion) > 0.0),
         )
+
+
+def _gone_on(
+    before: _Memory, tick: float, velocity: tuple[float, float], wheels: Array, angles: Array
+) -> _Memory:
+    """After a tick [s] at a velocity in the world [m/s], wheel speeds [rad/s] and angles [rad]."""
+    slow = np.abs(wheels) < STANDING
+    # A wheel that has turned about stood in between.
+    moves = ~slow & (wheels * before.speed >= 0.0)
+    stood = np.where(slow, before.stood + tick, 0.0)
+    turned = np.minimum(before.turned + tick * np.abs(wheels), LONG_AGO)
+    return _Memory(
+        before.time + tick,
+        before.x + tick * velocity[0],
+        before.y + tick * velocity[1],
+        wheels,
+        np.where(moves, np.minimum(before.since + tick, LONG_AGO), 0.0),
+        stood,
+        np.where(stood < RESTED, turned, 0.0),
+        np.where(stood < RESTED, before.place, angles),
+    )
+
+
+def _body(value: float) -> Array:
+    """Of the whole robot, in one tick."""
+    return np.array([[value]])
 
 
 def _summed(rows: Sequence[Array]) -> list[float]:

@@ -50,17 +50,7 @@ def linearise(
     little from one model to the next, and cost most. They are the most memory as well, so its
     matrix is used again: `before` has none that holds afterwards.
     """
-    described = model.described
-    own = zip(model.own, model.own_offsets, strict=True)
-    varied = [] if before else [_varied(described, item, item.step) for item in model.nuisances]
-    varied += [_varied(described, item, item.step_at(offset)) for item, offset in own]
-    for candidate in candidates if before is None else ():
-        started = described.given(
-            {key: at for key, at in candidate.start.items() if key not in described.values}
-        )
-        varied += [
-            _varied(started, item, item.discrete_offset or item.step) for item in candidate.sizes
-        ]
+    varied = _all_varied(model, candidates, before is None)
     first, edge = len(model.nuisances), len(model.nuisances) + dataset.sensor_count
     kept = edge + len(model.own)
     count = kept + sum(len(c.sizes) for c in candidates)
@@ -76,7 +66,7 @@ def linearise(
         matrix = _moved(before.matrix.T, count, places)
         into = list(matrix[edge:kept])
     value, time_derivative = dataset.with_time_derivative(
-        described.robot,
+        model.described.robot,
         [robot for robot, _ in varied],
         scale=np.array([scale for _, scale in varied]),
         into=into,
@@ -98,6 +88,24 @@ def linearise(
         tuple(parts),
         found,
     )
+
+
+def _all_varied(
+    model: Model, candidates: Sequence[Hypothesis], whole: bool
+) -> list[tuple[Robot, float]]:
+    """By whatever derivatives are taken: of a model's own parameters alone where not `whole`."""
+    described = model.described
+    own = zip(model.own, model.own_offsets, strict=True)
+    varied = [_varied(described, item, item.step) for item in model.nuisances] if whole else []
+    varied += [_varied(described, item, item.step_at(offset)) for item, offset in own]
+    for candidate in candidates if whole else ():
+        started = described.given(
+            {key: at for key, at in candidate.start.items() if key not in described.values}
+        )
+        varied += [
+            _varied(started, item, item.discrete_offset or item.step) for item in candidate.sizes
+        ]
+    return varied
 
 
 def _varied(
