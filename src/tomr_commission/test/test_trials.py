@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from tomr_commission.evidence import Episode
 from tomr_commission.injected import KINDS, injected, try_injected
 from tomr_commission.observed import Observed
 from tomr_commission.trials import Trial, floors_of, smallest_found
@@ -26,6 +27,15 @@ def test_bisection_finds_what_a_walk_down_finds(limit: float) -> None:
     walked = [size for size in sizes if size >= limit]
     assert floor.everywhere == (min(walked) if walked else None)
     assert len(trials) <= 3
+
+
+def test_delay_counts_from_the_beginning_of_the_fault() -> None:
+    alarm = Episode("slip", None, 4.5, 9.0)
+    assert Trial.of("f", 0.2, "W", wheel=1, begin=3.0, alarm=alarm) == Trial(
+        "f", 0.2, "W", 1, 1.5, "slip"
+    )
+    nothing = Trial.of("f", 0.2, "W", wheel=1, begin=3.0, alarm=None)
+    assert nothing == Trial("f", 0.2, "W", 1, None, "")
 
 
 def test_floor_everywhere_is_that_of_the_worst_wheel() -> None:

@@ -44,3 +44,19 @@ def test_bands_widen_until_shoves_pass(steady: Callable[..., Observed]) -> None:
     assert tuned.margin == request.bands.margin * request.bands.wider
     assert tuned.bands.relative > 0.15
     assert tuned.level.needed < request.bands.most_caution
+
+
+def test_few_shoves_that_hint_at_too_much_are_followed_by_the_others(
+    steady: Callable[..., Observed],
+) -> None:
+    request = CommissionRequest("reference", (), Path())
+    needed = iter((1.2, 0.9))  # of the most: after the first shoves, after all
+    level = Mock(side_effect=lambda *_: Mock(needed=next(needed) * request.bands.most_caution))
+    seen = [steady(sigma=0.1, ticks=2500)]
+    with (
+        patch("tomr_commission.commission._level", level),
+        patch.object(_Work, "rehearsed", return_value=Shoved((1.0,), 0.5)),
+    ):
+        tuned = work_on(request).tuned(None, seen, ClassifierSettings(), Rehearsal())
+    assert tuned.margin == request.bands.margin
+    assert tuned.shoved == Shoved((1.0, 1.0), 1.0)

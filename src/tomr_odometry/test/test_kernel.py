@@ -77,6 +77,21 @@ def test_prediction_spreads_doubt_as_it_moves_the_state() -> None:
         assert spread == pytest.approx(np.outer(wanted[:, k], wanted[:, k]), abs=2e-4), k
 
 
+def test_rims_are_loose_where_a_wheel_slid_a_moment_ago() -> None:
+    x = np.zeros(SIZE)
+    x[VX] = 0.5
+    ground = BODY.rows @ (0.5, 0.0, 0.0)
+    grip = NOISE.grip**2 + (NOISE.grip_share * ground) ** 2
+    for recent, loose in ((0.0, 1.0), (0.5, 6.0)):  # 1 + doubt x recent
+        mode = np.array([0.0, 0.2, 0.0, recent])
+        spread = predict(x.copy(), np.zeros((SIZE, SIZE)), BODY, NOISE, mode, USED, DT).diagonal()
+        rates = 0.5 * DT**2 * BODY.rows  # of the body's acceleration
+        by_rates = rates**2 @ spread[AX : AX + 3]
+        slides = mode[:3] * (NOISE.slide * DT) ** 2
+        wanted = grip * loose**2 * DT + slides + by_rates
+        assert spread[RIM : RIM + 3] == pytest.approx(wanted, rel=1e-9)
+
+
 def test_rims_that_creep_turn_faster_than_the_ground_goes() -> None:
     x = np.zeros(SIZE)
     x[VX], x[CREEP] = 0.5, 0.4
