@@ -1,10 +1,15 @@
 """How columns of one linearisation are used again in the next."""
 
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import Mock
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tomr_reality_gap.fit.jacobian import _moved
+from tomr_reality_gap.fit.jacobian import _all_varied, _moved
 
 
 @given(
@@ -33,6 +38,20 @@ def test_their_memory_is_used_again_where_it_suffices() -> None:
     rows = np.zeros((5, 2))
     assert np.shares_memory(_moved(rows, 5, [(4, 0)]), rows)
     assert not np.shares_memory(_moved(rows, 6, [(4, 0)]), rows)
+
+
+@pytest.mark.parametrize(("whole", "scales"), [(True, [2.0, 4.0, 8.0, 9.0]), (False, [4.0])])
+def test_only_a_models_own_parameters_are_varied_anew(whole: bool, scales: list[float]) -> None:
+    def parameter(prior_std: float) -> Any:
+        return Mock(prior_std=prior_std, step=1.0, discrete_offset=None, step_at=lambda _: 1.0)
+
+    described = Mock(values={})
+    described.given.return_value = described
+    model: Any = SimpleNamespace(
+        described=described, nuisances=[parameter(2.0)], own=[parameter(4.0)], own_offsets=[0.0]
+    )
+    candidate: Any = SimpleNamespace(start={}, sizes=[parameter(8.0), parameter(9.0)])
+    assert [scale for _, scale in _all_varied(model, [candidate], whole)] == scales
 
 
 def _rows(edges: np.ndarray, part: int) -> range:

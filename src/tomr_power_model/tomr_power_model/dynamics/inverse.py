@@ -99,8 +99,10 @@ def carried_force(
     return fx, fy, mz, vx, vy, wz, ax - wz * vy, ay + wz * vx
 
 
-def needed_force(p: Numbers, m: Numbers, n: int) -> tuple[float, float, float, float, float]:
-    """Force that the body's motion and its rollers' drag take [N, N, N m], and how it leans."""
+def needed_force(
+    p: Numbers, m: Numbers, n: int
+) -> tuple[tuple[float, float, float], tuple[float, float]]:
+    """Force that the body's motion and its rollers' drag take [N, N, N m]; its lean [m/s^2]."""
     stride = int(p[STRIDE])
     fx, fy, mz, vx, vy, wz, along_x, along_y = carried_force(p, m, n)
     for i in range(n):
@@ -116,23 +118,23 @@ def needed_force(p: Numbers, m: Numbers, n: int) -> tuple[float, float, float, f
                 fx += p[w + ALONG] * drag
                 fy += p[w + ALONG + 1] * drag
                 mz += p[w + ALONG + 2] * drag
-    return fx, fy, mz, along_x, along_y
+    return (fx, fy, mz), (along_x, along_y)
 
 
 def one_drive_power(p: Numbers, m: Numbers, out: Mutable, n: int, wheel: int) -> None:
     """`drive_power` of one wheel alone; what is written for the others stays."""
-    fx, fy, mz, along_x, along_y = needed_force(p, m, n)
-    turned_by(p, m, out, wheel, (fx, fy, mz), (along_x, along_y))
+    force, lean = needed_force(p, m, n)
+    drive_state(p, m, out, wheel, force, lean)
 
 
 def drive_power(p: Numbers, m: Numbers, out: Mutable, n: int) -> None:
     """Torque, current, voltage and power of each drive from one row of motion."""
-    fx, fy, mz, along_x, along_y = needed_force(p, m, n)
+    force, lean = needed_force(p, m, n)
     for i in range(n):
-        turned_by(p, m, out, i, (fx, fy, mz), (along_x, along_y))
+        drive_state(p, m, out, i, force, lean)
 
 
-def turned_by(
+def drive_state(
     p: Numbers,
     m: Numbers,
     out: Mutable,
@@ -140,7 +142,7 @@ def turned_by(
     force: tuple[float, float, float],
     lean: tuple[float, float],
 ) -> None:
-    """What a drive does that gives its share of the body's force; torque, current and so on."""
+    """Torque, current, voltage and power of drive i, of what `needed_force` returns."""
     w, a, o = HEADER + i * int(p[STRIDE]), MOTION_HEADER + i * MOTION_WHEEL, i * POWER_WHEEL
     speed = m[a + MOTION_SPEED]
     carried = times(p, w + TO_TWIST, force[0], force[1], force[2])
