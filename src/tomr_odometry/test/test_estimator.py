@@ -206,3 +206,12 @@ def test_encoders_that_are_described_as_flawed_are_read_so() -> None:
         poses.append(list(core.due())[-1].pose)
     assert np.hypot(*poses[0][:2]) > 0.2
     np.testing.assert_allclose(poses[1], poses[0], atol=1e-3)
+
+
+def test_a_robot_that_measures_its_total_alone_lacks_no_power_of_wheels() -> None:
+    core = SlipOdometry(evolve(ROBOT, measurement=evolve(ROBOT.measurement, source="total_only")))
+    for tick in range(10):
+        core.encoders(START + 20_000_000 * tick, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    (*_, item) = core.due()
+    assert dict(item.sensors) == {"encoders": "used", "imu/data": "not there"}
+    assert item.missing == ("imu/data",)

@@ -10,6 +10,7 @@ from tomr_odometry.creep import Creep
 from tomr_odometry.kernel import (
     AX,
     CREEP,
+    DRAG,
     RIM,
     SIZE,
     SLOPE,
@@ -98,6 +99,14 @@ def test_rims_that_creep_turn_faster_than_the_ground_goes() -> None:
     predict(x, np.eye(SIZE), BODY, NOISE, np.zeros(4), USED, DT)
     ground = BODY.rows @ (0.5, 0.0, 0.0) * DT
     assert x[RIM : RIM + 3] - ground == pytest.approx(0.4 * USED * DT)
+
+
+def test_one_measurement_weighs_by_what_was_known() -> None:
+    # News of 1, variances of 3 and 1: three quarters of it are believed.
+    h, x = np.eye(SIZE)[[DRAG]], np.zeros(SIZE)
+    left = correct(x, 3.0 * np.eye(SIZE), h, np.ones(1), np.ones(1), NOISE.gate, False)
+    assert x == pytest.approx(0.75 * np.eye(SIZE)[DRAG])
+    assert left.diagonal() == pytest.approx(3.0 - 2.25 * np.eye(SIZE)[DRAG])
 
 
 def test_a_robot_at_rest_on_a_slope_feels_it_as_a_pull_back() -> None:
