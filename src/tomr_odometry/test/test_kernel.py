@@ -19,6 +19,7 @@ from tomr_odometry.kernel import (
     Noise,
     correct,
     force_rows,
+    judge,
     motion_rows,
     predict,
 )
@@ -99,6 +100,12 @@ def test_rims_that_creep_turn_faster_than_the_ground_goes() -> None:
     predict(x, np.eye(SIZE), BODY, NOISE, np.zeros(4), USED, DT)
     ground = BODY.rows @ (0.5, 0.0, 0.0) * DT
     assert x[RIM : RIM + 3] - ground == pytest.approx(0.4 * USED * DT)
+
+
+def test_wheels_are_taken_for_gripping_where_nothing_shows_a_slide() -> None:
+    mode = np.array([0.9, 0.2, 1.0, 0.5])
+    judge(np.zeros(SIZE), np.eye(SIZE), NOISE._replace(slip_rate=0.0), mode, RIMS, DT)
+    assert mode.tolist() == [0.0, 0.0, 0.0, 0.5]
 
 
 def test_one_measurement_weighs_by_what_was_known() -> None:
