@@ -75,7 +75,7 @@ def test_biases_that_no_imu_has_are_a_start_that_misled(has_stood: bool) -> None
     core._x[0], core._x[VX], core._x[GYRO] = 3.0, 0.5, 0.1
     core._x[RIM : RIM + 3], core._P[1, 1] = 7.0, 100.0
     ways = np.stack([np.full(3, 7.0), np.full(3, 1e-6)])
-    core._advance(START, 0.001, ways, np.full(6, np.nan), np.zeros((0, 4)))
+    core._advance(START, 0.001, ways, np.full(6, np.nan))
     assert (core._x[GYRO] == 0.0) != has_stood
     assert (core._mode[:3] == 1.0).all() != has_stood
     assert core._x[0] == pytest.approx(3.0, abs=0.01)  # what is known of the way is kept

@@ -176,11 +176,12 @@ def test_slip_ratios_are_the_true_ones(slippery: Recorded) -> None:
             for step in (-0.05, 0.0)
         )
         rim = (after - before) / 0.05 * radius
-        twist = [np.interp(time, slippery.times, column) for column in slippery.twist.T]
+        middle = time - 0.025  # of the samples that show the rims' speed
+        twist = [np.interp(middle, slippery.times, column) for column in slippery.twist.T]
         ground = body.rows @ np.array(twist)
         larger = np.maximum(np.abs(rim), np.abs(ground))
         true = np.where(larger > 0.05, (rim - ground) / np.maximum(larger, 0.05), 0.0)
-        off.append(np.where(larger > 0.05, item.slip - np.clip(true, -1.0, 1.0), 0.0))
+        off.append(np.where(larger > 0.05, item.slip - true, 0.0))
         largest = max(largest, float(np.abs(true).max()))
     assert largest > 0.8
     assert np.sqrt(np.mean(np.square(off))) < 0.05

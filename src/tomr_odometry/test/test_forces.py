@@ -1,4 +1,4 @@
-"""What the odometry makes of its wheels' forces: creep, and evidence of what the body does."""
+"""What the odometry makes of its wheels' forces: creep, and slides where there is no IMU."""
 
 from functools import cache
 from types import SimpleNamespace
@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from attrs import evolve
 from numpy.typing import NDArray
 from odometry_drives import ROBOT, START, Recorded, drive, play
 
@@ -58,21 +57,15 @@ def test_a_force_is_forgotten_when_its_power_is_silent() -> None:
     assert np.isnan(last.traction).tolist() == [True, False, False]
 
 
-@pytest.mark.parametrize(
-    ("signed", "aided", "rows"), [(True, True, 1), (False, True, 0), (True, False, 0)]
-)
-def test_forces_are_evidence_with_signs_and_an_imu(signed: bool, aided: bool, rows: int) -> None:
-    measurement = evolve(ROBOT.measurement, signed=signed)
-    core = SlipOdometry(evolve(ROBOT, measurement=measurement))
+def test_the_forces_of_powers_that_are_heard_are_kept() -> None:
+    core = SlipOdometry(ROBOT)
     core._heard = {"encoders": START, "power 1": START}
-    core._tractive, core._is_aided = (
-        [Traction(START, 1, 3.0, 2.0, 5.0, ((3.0, -9.0), (2.0, 2.0)), 0.0)],
-        aided,
-    )
-    found = core._evidence(0.01)
-    assert found.tolist() == [[1.0, 3.0, core.settings.noise.force**2 + 4.0, 5.0]] * rows
+    core._tractive = [Traction(START, 1, 3.0, 2.0, 5.0, ((3.0, -9.0), (2.0, 2.0)), 0.0)]
+    core._keep_forces(0.01)
     assert core._forces[1] == 3.0
+    assert core._force_std[1] == 2.0
     assert np.isnan(core._forces[[0, 2]]).all()
+    assert core._used[0] == core._used[2] == 0.0 < core._used[1]
 
 
 def test_without_an_imu_the_force_reported_is_the_one_that_the_slides_speak_for() -> None:

@@ -32,3 +32,11 @@ def test_a_sample_without_a_weight_is_left_out() -> None:
 
 def test_what_feels_no_gravity_says_nothing_of_a_weight() -> None:
     assert not carried(lambda t: 3.0 * math.sin(20.0 * t), length=2.0)
+
+
+def test_a_bump_and_wheels_that_chatter_are_no_lift() -> None:
+    """Samples of up to 5 m/s^2 off are what contacts do that grip and slip in turn."""
+    chatter = [4.0, -3.5, 2.0, -5.0, 3.0, -0.5]
+    assert not carried(lambda t: 9.81 + chatter[round(100 * t) % 6] * (1.0 < t < 2.0))
+    assert not carried(lambda t: 9.81 + 4.0 * (1.0 < t < 1.015))
+    assert carried(lambda t: 9.81 + 2.0 * (1.0 < t < 1.3))

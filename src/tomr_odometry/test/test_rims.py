@@ -47,3 +47,37 @@ def test_encoders_that_repeat_themselves_are_waited_for_a_second() -> None:
 def test_a_wheel_rests_while_it_turns_by_no_more_than_a_count() -> None:
     assert taken([0, 3, 5, 5, 6, 5, 5])[0].rest == pytest.approx(0.04)
     assert taken([0, 3, 5, 5, 6, 7, 7])[0].rest == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(
+    ("counts", "after"),
+    [
+        ([0, 3, 5, *(5 + 20.0 * k - k * k for k in range(11))], 0.3),  # braked down to nothing
+        (
+            [0, 3, 5, *(5 + 20.0 * k for k in range(11))],
+            1.0,
+        ),  # at speed, and then the same again and again
+    ],
+    ids=["braked", "frozen"],
+)
+def test_wheels_stand_after_a_while_and_where_they_stopped_abruptly_later(
+    counts: list[float], after: float
+) -> None:
+    for rest in (0.1, 0.25, 0.35, 0.95, 1.05):
+        rims, _ = taken([*counts, *[counts[-1]] * round(100 * rest)])
+        assert rims.stands == (rest > after), rest
+
+
+def test_a_rim_that_turns_as_the_ground_goes_by_does_not_slide() -> None:
+    rims = Rims(RADIUS)
+    for k in range(40):
+        time, speed = 0.01 * k, np.array([0.5, -0.2, 1.0]) * 0.01 * k
+        rims.take(MS * 10 * (k + 1), 0.5 * speed * time / RADIUS, 1e-4)
+        rims.passes(speed)  # it speeds up: means over different times would differ by 2.5 cm/s
+    assert rims.sliding == pytest.approx(np.zeros(3), abs=6e-3)
+    rims.passes(np.array([0.0, 0.0, 1.0]))
+    for k in range(40, 60):
+        rims.take(MS * 10 * (k + 1), np.array([0.4, 0.0, 0.0]) * 0.01 * k / RADIUS, 1e-4)
+        rims.passes(np.array([0.1, 0.0, -0.2]))
+    assert rims.sliding == pytest.approx([0.3, 0.0, 0.2], abs=1e-6)
+    assert rims.blur == pytest.approx(rims._quantum * RADIUS / 0.05)

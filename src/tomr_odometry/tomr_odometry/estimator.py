@@ -7,9 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_odometry.aided import Aided
 from tomr_odometry.estimate import SLIDES, Estimate
 from tomr_odometry.grip import Available, Floor
-from tomr_odometry.kernel import AX, CREEP, DRAG, FRICTION, GYRO, RIM, SLOPE, VX, WZ, YAW, step
+from tomr_odometry.hindsight import Inputs
+from tomr_odometry.kernel import AX, CREEP, GYRO, RIM, SLOPE, VX, WZ, YAW, step
+from tomr_odometry.lifted import Lifted
 from tomr_odometry.rims import Rims
 from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.start import is_incredible, start, start_again
@@ -19,7 +22,7 @@ from tomr_power_model.drive.sources import PowerReading
 from tomr_power_model.model.encoder_flaws import EncoderFlaws
 from tomr_power_model.model.encoders import RecentStamps
 from tomr_power_model.model.ticks import Arrival, TickClock, to_ns
-from tomr_power_model.robot import GRAVITY, WHEELS, Robot
+from tomr_power_model.robot import WHEELS, Robot
 from tomr_power_model.slides.body import body_of
 
 Array = NDArray[np.float64]
@@ -30,24 +33,22 @@ _SILENT_NS = to_ns(0.1)  # of the encoders, from which the IMU alone goes on
 _UNKNOWN_WAY = 1e4  # m^2
 _FRESH_NS = to_ns(0.25)  # how long a sensor may be silent
 _NO_IMU = np.full(6, np.nan)
-_NO_FORCES = np.zeros((0, 4))
+_NONE_SLIDES = np.zeros(WHEELS, dtype=bool)
 _NOTHING, _EACH = np.zeros((3, 3)), np.eye(3)
 _TURNING = 0.02  # m/s: below it there is no slip ratio
 _CREEPING = 0.05  # m/s, the same of creep: a ratio to a wheel that hardly turns says nothing
+_SEEN = 0.01  # m/s, the least sliding that is one
 _SLIDES_ON = 2.0  # s, for which a slide may go on unseen
 _GRID_NS = to_ns(1.0)  # of data, between two maps of the floor
 _TRACTION_TIME = 0.3  # s, over which traction is averaged where creep depends on it
-_GRAVITY_TIME = 0.5  # s, over which a new gravity would be taken for granted
 _AHEAD = 0.25  # s, for which the motion of the last encoder sample is taken to go on
 _REST = 0.3  # s of standstill, in which an IMU shows its biases
 _LOST_SPEED = 1.0  # m/s, by which a robot without encoders may be off
 _LOST_MOST = 10.0  # s, after which it may be off no further
 _DOUBTED = 5.0  # s, over which a velocity that turns out wrong is taken to have been so at most
 _FASTEST = 30.0  # m/s, of a rim
-_LIFTED = 1.5  # m/s^2 off the usual weight
-_LIFTED_TILT = 0.6  # rad/s of rolling or pitching
-_CARRIED_NS = to_ns(0.7)  # how long after such a moment the robot may still be carried
-_CARRIED_SPEED = 0.6  # m/s/sqrt(Hz)
+_TILTED = 1.5  # m/s^2, of gravity in what a tilted robot feels along the floor
+_CARRIED_SPEED = 1.0  # m/s/sqrt(Hz)
 
 
 class SlipOdometry:
@@ -83,7 +84,7 @@ class SlipOdometry:
         self._mode = np.zeros(4)
         self._trusted = 0.0  # s, since the state was doubted last
         self._has_stood = False  # long enough for the IMU to show its biases
-        self._x, self._P = start(self._robot, self.settings.noise, self.settings.creep)
+        self._x, self._P = start(self.settings.noise, self.settings.creep)
         self._rims = Rims(self._radius)
         self._stamps = RecentStamps()
         self._forces, self._force_std = np.full((2, WHEELS), np.nan)
@@ -91,12 +92,12 @@ class SlipOdometry:
         self._travel = np.zeros(2)
         self._available = Available()
         self._inertial: list[tuple[float, ...]] = []
+        self._aided = Aided(self._body)
         self._tractive: list[Traction] = []
         self._heard: dict[str, int] = {}
         self._is_aided = False
-        self._weight = math.nan
-        self._felt = 0  # stamp of the last weight
-        self._carried_until = 0
+        self._lifted = Lifted()
+        self._seen = np.zeros(3)  # m/s, m/s, rad/s: the twist at the last sample of the IMU
 
     def _start_afresh(self, stamp_ns: int) -> None:
         """After a leap of the stamps: where the robot was, and how far it may have come since.
@@ -161,7 +162,7 @@ class SlipOdometry:
         elif stream == "imu":
             if self.settings.use_imu and self._time:
                 self._inertial.append(values)
-                self._feel(stamp, values)
+                self._lifted.take(stamp, values)
                 if self._is_aided and stamp - self._time > _SILENT_NS:
                     unknown = np.full(WHEELS, _UNKNOWN_WAY)
                     self._step(stamp, np.stack([self._x[RIM : RIM + WHEELS], unknown]))
@@ -169,18 +170,6 @@ class SlipOdometry:
             found = self._tractions.power(stamp, int(stream[-1]), values[0])
             if found is not None:
                 self._tractive.append(found)
-
-    def _feel(self, stamp: int, values: tuple[float, ...]) -> None:
-        """Notice a robot that is lifted: its weight changes, or it rolls and pitches."""
-        weight, tilting = values[5], math.hypot(values[0], values[1])
-        before = self._weight if math.isfinite(self._weight) else weight
-        is_heavy = abs(before) > 0.5 * GRAVITY and abs(weight - before) > _LIFTED
-        if is_heavy or tilting > _LIFTED_TILT:
-            self._carried_until = stamp + _CARRIED_NS
-        if math.isfinite(weight):
-            share = min(1e-9 * (stamp - self._felt) / _GRAVITY_TIME, 1.0)
-            self._weight = before + share * (weight - before)
-            self._felt = stamp
 
     def _is_fresh(self, stream: str, now: int) -> bool:
         return now - self._heard.get(stream, -_FRESH_NS) < _FRESH_NS
@@ -195,7 +184,7 @@ class SlipOdometry:
         angle = self._flaws.angle(angle)
         if self._time:
             is_aided = self.settings.use_imu and self._is_fresh("imu", stamp)
-            if self._is_aided and not is_aided and self._mode[3] > SLIDES:
+            if self._is_aided and not is_aided:
                 self._lose_sight()
             self._is_aided = is_aided
             # With an IMU the filter weighs itself whether encoders that repeat are frozen.
@@ -212,8 +201,8 @@ class SlipOdometry:
         self._time = time
 
     def _lose_sight(self) -> None:
-        """The IMU dies while wheels slide: nothing shows for how long they go on."""
-        sliding = self._rims.speed - self._body.rows @ self._x[VX : WZ + 1]
+        """The IMU is dead: wheels that slide go on unseen, and so do those that began since."""
+        sliding = self._rims.speed - self._body.rows @ self._seen
         lost = (float(np.abs(sliding).max()) * _SLIDES_ON) ** 2
         for place in (0, 1):
             self._P[place, place] += lost
@@ -221,14 +210,15 @@ class SlipOdometry:
     def _step(self, time: int, ways: Array) -> None:
         """Go on to a time, with the ways of the rims there."""
         dt = 1e-9 * (time - self._time)
-        forces = self._evidence(dt)
+        self._keep_forces(dt)
         self._ask_power(dt)
         ways[0] -= self._by_power.slid
         inertial = _mean(self._inertial)
         self._inertial, self._tractive = [], []
-        self._advance(time, dt, ways, inertial, forces)
+        self._advance(time, dt, ways, inertial)
         self._time = time
-        if time < self._carried_until:
+        self._rims.passes(self._body.rows @ self._x[VX : WZ + 1])
+        if time < self._lifted.until:
             lost = _CARRIED_SPEED**2 * dt
             for place in (0, 1, 2, VX, VX + 1, WZ):
                 self._P[place, place] += lost
@@ -258,9 +248,9 @@ class SlipOdometry:
             near = found.nearer(self._by_power.force[found.wheel])
             self._forces[found.wheel], self._force_std[found.wheel] = near
 
-    def _evidence(self, dt: float) -> Array:
-        """Forces for the filter, if they are evidence; keeps what creep and messages need."""
-        noise, keep = self.settings.noise, math.exp(-dt / _TRACTION_TIME)
+    def _keep_forces(self, dt: float) -> None:
+        """Keep what creep and messages need of the contacts' forces."""
+        keep = math.exp(-dt / _TRACTION_TIME)
         for found in self._tractive:
             self._forces[found.wheel], self._force_std[found.wheel] = found.force, found.std
         for wheel in range(WHEELS):
@@ -269,29 +259,34 @@ class SlipOdometry:
         is_known = np.isfinite(self._forces)
         known = np.where(is_known, self._forces, 0.0) / self._body.load
         self._used = known + keep * (self._used - known)
-        if not self._tractive or not self._are_evidence or not self._is_aided:
-            return _NO_FORCES
-        rows = [(f.wheel, f.force, noise.force**2 + f.std**2, f.speed) for f in self._tractive]
-        return np.array(rows)
 
-    def _advance(self, time: int, dt: float, rims: Array, inertial: Array, forces: Array) -> None:
-        used = self.settings.creep.shape(self._used)
-        noise = self.settings.noise if self._has_stood else self._unsure
-        noise = noise if self._is_aided else self._unaided
+    def _advance(self, time: int, dt: float, rims: Array, inertial: Array) -> None:
         keep = math.exp(-dt / _TRACTION_TIME)
         self._travel = self._x[VX : VX + 2] + keep * (self._travel - self._x[VX : VX + 2])
-        used = used * math.hypot(*self._travel)
-        self._P = step(
-            self._x, self._P, self._body, noise, self._mode, used, dt,
-            rims, inertial, forces,
+        used = self.settings.creep.shape(self._used) * math.hypot(*self._travel)
+        if not self._is_aided:
+            self._aided.clear()
+            self._P = step(
+                self._x, self._P, self._body, self._unaided, self._mode, used, dt,
+                rims, inertial, _NONE_SLIDES,
+            )  # fmt: skip
+            return
+        is_carried = time < self._lifted.until
+        noise = self.settings.noise if self._has_stood else self._unsure
+        if is_carried:
+            noise = noise._replace(accelerometer=_TILTED)
+        given = Inputs(1e-9 * time, dt, noise, used, rims, inertial)
+        self._P = self._aided.step(
+            self._x, self._P, self._mode, given, self._rims,
+            is_known=self._has_stood and not is_carried,
         )  # fmt: skip
+        if not np.isnan(inertial).all():
+            self._seen = self._x[VX : WZ + 1].copy()
         self._trusted += dt
-        if self._is_aided and not self._has_stood and is_incredible(self._x, noise):
+        if not self._has_stood and is_incredible(self._x, noise):
             # The wheels slid from the start while they were taken for gripping.
             since = min(self._trusted, _DOUBTED)
-            self._x, self._P = start_again(
-                self._robot, noise, self.settings.creep, (self._x, self._P), since
-            )
+            self._x, self._P = start_again(noise, self.settings.creep, (self._x, self._P), since)
             self._mode[:] = 1.0
             self._trusted = 0.0
 
@@ -308,14 +303,9 @@ class SlipOdometry:
         silent = 1e-9 * (tick - self._rims.time) - _AHEAD
         # Encoders are silent: anything may happen.
         lost = (_LOST_SPEED * max(silent, 0.0)) ** 2 * _EACH
-        ground = body.rows @ twist
-        rim = self._rims.speed
         creeps = x[CREEP] * self.settings.creep.shape(self._used) * math.hypot(*self._travel)
         is_sliding = self._probability > SLIDES
-        sliding = np.where(is_sliding, rim - ground, creeps)
-        larger = np.maximum(np.abs(rim), np.abs(rim - sliding))
-        least = np.where(is_sliding, _TURNING, _CREEPING)
-        slip = np.where(larger > least, sliding / np.maximum(larger, least), 0.0)
+        sliding, slip = self._slip(body.rows @ twist, creeps, is_sliding)
         missing, sensors = self._sensors(tick)
         is_due = self.settings.publish_floor and tick % _GRID_NS < self.settings.ticks.period
         return Estimate(
@@ -324,7 +314,7 @@ class SlipOdometry:
             pose_covariance=P[:3, :3] + lost,
             twist=twist,
             twist_covariance=P[VX : WZ + 1, VX : WZ + 1] + lost + self._unseen(),
-            slip=np.minimum(np.maximum(slip, -1.0), 1.0),
+            slip=slip,
             sliding=sliding,
             creeping=creeps,
             probability=self._probability.copy(),
@@ -332,11 +322,31 @@ class SlipOdometry:
             traction_std=self._force_std.copy(),
             available=self._available.interval,
             floor=self.floor.grid() if is_due else None,
-            is_carried=tick < self._carried_until,
+            is_carried=tick < self._lifted.until,
             missing=missing,
             sensors=sensors,
             assumed=self._assumed(missing),
             learnt=self._learnt(),
+        )
+
+    def _slip(
+        self, ground: Array, creeps: Array, is_sliding: NDArray[np.bool_]
+    ) -> tuple[Array, Array]:
+        """How fast the rims turn over the ground [m/s], and the slip ratios.
+
+        With an IMU the twist shows it, of wheels that slide too slowly to be noticed as well.
+        """
+        rim = self._rims.speed
+        if self._is_aided:
+            sliding = self._rims.sliding
+            is_seen = is_sliding | (np.abs(sliding) > np.maximum(_SEEN, 2.0 * self._rims.blur))
+            least = np.full(WHEELS, _TURNING)
+        else:
+            sliding = np.where(is_sliding, rim - ground, creeps)
+            is_seen, least = np.full(WHEELS, True), np.where(is_sliding, _TURNING, _CREEPING)
+        larger = np.maximum(np.abs(rim), np.abs(rim - sliding))
+        return sliding, np.where(
+            is_seen & (larger > least), sliding / np.maximum(larger, least), 0.0
         )
 
     def _unseen(self) -> Array:
@@ -372,9 +382,8 @@ class SlipOdometry:
 
     def _learnt(self) -> tuple[tuple[str, float], ...]:
         x = self._x
-        named = [("creep", x[CREEP]), ("roller_drag", x[DRAG]), ("gyro_bias", x[GYRO])]
+        named = [("creep", x[CREEP]), ("gyro_bias", x[GYRO])]
         named += [("slope_x", x[SLOPE]), ("slope_y", x[SLOPE + 1])]
-        named += [(f"friction_{wheel + 1}", x[FRICTION + wheel]) for wheel in range(WHEELS)]
         return tuple((name, float(value)) for name, value in named)
 
 

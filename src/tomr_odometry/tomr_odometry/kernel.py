@@ -1,8 +1,8 @@
 """One step of the filter, as functions of arrays.
 
-State (22): pose in the odometry frame; twist and its rate in base_link; way of each rim as far as
+State (18): pose in the odometry frame; twist and its rate in base_link; way of each rim as far as
 its contact gave it to the body; biases of accelerometer and gyro; pull of the floor's slope in the
-odometry frame; unknown friction of each wheel; roller drag and creep.
+odometry frame; creep.
 
 An encoder counts its rim's way, always: the measurement is never rejected. What slips is the
 process that ties the rim to the body, d(rim_i) = (row_i v + creep_i) dt + noise, whose noise
@@ -17,17 +17,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tomr_power_model.slides.body import STICKING, ContactBody
+from tomr_power_model.slides.body import ContactBody
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 X, Y, YAW, VX, VY, WZ, AX, AY, AW = range(9)
-RIM, ACCELEROMETER, GYRO, SLOPE, FRICTION, DRAG, CREEP = 9, 12, 14, 15, 17, 20, 21
-SIZE = 22
+RIM, ACCELEROMETER, GYRO, SLOPE, CREEP = 9, 12, 14, 15, 17
+SIZE = 18
 _ONE = np.eye(SIZE)
 _DIAGONAL = np.diag_indices(SIZE)
-FORCE_WHEEL, FORCE, FORCE_VARIANCE, FORCE_SPEED = range(4)  # columns of measured tractions
-RESTING = 0.3  # rad/s, below which dry friction does
+SURE = 1.0 - 1e-6  # probability that counts as one
 TAILS = 2.0  # of the encoders' variance, where sliding is looked for
 
 
@@ -38,8 +38,6 @@ class Noise(NamedTuple):
     accelerometer_bias: float = 0.15  # m/s^2
     gyro_bias: float = 0.015  # rad/s
     slope: float = 0.02  # m/s^2
-    friction: float = 0.8  # N
-    drag: float = 0.08
     creep: float = 0.1
     rate: float = 1.5  # m/s^2, of the body's acceleration
     turn_rate: float = 6.0  # rad/s^2, of its turning
@@ -48,7 +46,9 @@ class Noise(NamedTuple):
     grip_share: float = 5e-4  # of its speed, the same
     doubt: float = 10.0  # factor on both where a wheel slid a moment ago
     doubt_time: float = 0.5  # s, over which that is forgotten
+    learns: float = 0.2  # doubt, beyond which a slide is no time to learn biases in
     slide: float = 0.4  # m/s, of sliding
+    slide_time: float = 0.1  # s, over which sliding stays the same
     slip_rate: float = 0.1  # 1/s, at which wheels lose grip
     grip_rate: float = 3.0  # 1/s, at which they find it again
     way: float = 0.005  # m/s/sqrt(Hz) per m/s of travel, of the pose
@@ -60,12 +60,9 @@ class Noise(NamedTuple):
     walk_bias: float = 2e-3  # m/s^2/sqrt(s)
     walk_gyro: float = 1e-4
     walk_slope: float = 2e-4
-    walk_friction: float = 0.03  # N/sqrt(s)
     accelerometer: float = 0.06  # m/s^2
     gyro: float = 4e-3  # rad/s
-    force: float = 1.5  # N, besides its own noise
-    gate: float = 16.0  # squared normalised innovation of the IMU, beyond which it counts less
-    force_gate: float = 16.0  # the same of forces
+    gate: float = 100.0  # squared normalised innovation of the IMU, beyond which it counts less
     jitter: float = 1e-4  # s, of the encoders' stamps
     rim: float = 3e-5  # m, of a rim besides the quantum
 
@@ -106,8 +103,8 @@ def predict(
         f[RIM : RIM + 3, CREEP] = used * dt
     q = np.zeros(SIZE)
     grip = n.grip**2 + (n.grip_share * (b.rows @ v)) ** 2
-    q[RIM : RIM + 3] = grip * ((1.0 + n.doubt * mode[3]) ** 2 * dt) + mode[:3] * (n.slide * dt) ** 2
-    q[FRICTION : FRICTION + 3] = n.walk_friction**2 * dt
+    slides = mode[:3] * (n.slide**2 * n.slide_time * dt)
+    q[RIM : RIM + 3] = grip * ((1.0 + n.doubt * mode[3]) ** 2 * dt) + slides
     x[RIM : RIM + 3] += b.rows @ step + x[CREEP] * used * dt
     x[VX : WZ + 1] += a * dt
     x[X] += dx
@@ -126,36 +123,37 @@ def predict(
     return P
 
 
-def judge(x: Array, P: Array, n: Noise, mode: Array, rims: Array, dt: float) -> None:
+def judge(x: Array, P: Array, n: Noise, mode: Array, rims: Array, dt: float, slid: Flags) -> None:
     """Bayes' rule on whether each wheel slides; its rim is loosened accordingly.
 
-    rims: ways by the encoders [m] and their variances, (2, 3).
+    rims: ways by the encoders [m] and their variances, (2, 3). slid: wheels known to slide, (3,).
     """
-    wide = (n.slide * dt) ** 2
     if n.slip_rate == 0.0:  # nothing shows it: the wheels are taken for gripping
         mode[:3] = 0.0
         return
+    # A step shows what slides within it; that it goes on as it slid makes steps less than many.
+    wide, loose = (n.slide * dt) ** 2, n.slide**2 * n.slide_time * dt
     apart, variance = (rims[0] - x[RIM : RIM + 3]).tolist(), rims[1].tolist()
     for i, was in enumerate(mode[:3].tolist()):
         k = RIM + i
-        grips = max(float(P[k, k]) - was * wide, 0.0) + TAILS * variance[i]
+        grips = max(float(P[k, k]) - was * loose, 0.0) + TAILS * variance[i]
         slides = grips + wide
         exponent = min(0.5 * apart[i] * apart[i] * (1.0 / grips - 1.0 / slides), 50.0)
         odds = math.sqrt(grips / slides) * math.exp(exponent)
         prior = was * (1.0 - n.grip_rate * dt) + (1.0 - was) * n.slip_rate * dt
         now = prior * odds / (prior * odds + 1.0 - prior)
-        now = min(max(now, 1e-6), 1.0 - 1e-6)
-        P[k, k] += (now - was) * wide
+        now = SURE if slid[i] else min(max(now, 1.0 - SURE), SURE)
+        P[k, k] += (now - was) * loose
         mode[i] = now
 
 
 def correct(
-    x: Array, P: Array, h: Array, innovation: Array, variance: Array, gate: float, held: bool
+    x: Array, P: Array, h: Array, innovation: Array, variance: Array, gate: float, held: int
 ) -> Array:
     """Measurements made at once, (m, SIZE), (m,), (m,); returns the covariance.
 
-    held: biases, friction, drag and creep stay as they are, and so does what is not known of them:
-    without an IMU the wheels show nothing of these.
+    held: states from ACCELEROMETER up to this one stay as they are, and so does what is not known
+    of them.
     """
     ph = P @ h.T
     s = h @ ph
@@ -166,9 +164,9 @@ def correct(
             noise[i] = off * off / gate - own[i]  # an outlier counts less
     s.ravel()[:: len(s) + 1] += noise
     gain = ph / s if len(s) == 1 else np.linalg.solve(s, ph.T).T
-    if held:
+    if held > ACCELEROMETER:
         gain = gain.copy()
-        gain[ACCELEROMETER:] = 0.0
+        gain[ACCELEROMETER:held] = 0.0
         left = _ONE - gain @ h
         P = left @ P @ left.T + (gain * noise) @ gain.T
     else:
@@ -209,46 +207,21 @@ def motion_rows(x: Array, n: Noise, rims: Array, inertial: Array) -> tuple[Array
     return h[:m], innovation[:m], variance[:m]
 
 
-def force_rows(x: Array, b: ContactBody, forces: Array) -> tuple[Array, Array, Array]:
-    """Rows of tractions: wheel, force [N], variance, speed of the wheel [rad/s], (m, 4)."""
-    count = len(forces)
-    h, innovation, variance = np.zeros((count, SIZE)), np.zeros(count), np.zeros(count)
-    v, a, m = x[VX : WZ + 1].copy(), x[AX : AW + 1].copy(), b.mass
-    cx, cy, vx, vy, wz = b.center[0], b.center[1], v[0], v[1], v[2]
-    c, s = math.cos(x[YAW]), math.sin(x[YAW])
-    gx, gy = c * x[SLOPE] + s * x[SLOPE + 1], c * x[SLOPE + 1] - s * x[SLOPE]
-    taken = b.inertia @ a
-    taken[0] -= m * wz * (vy + wz * cx) + m * gx
-    taken[1] += m * wz * (vx - wz * cy) - m * gy
-    taken[2] += m * wz * (cx * vx + cy * vy) - m * (cx * gy - cy * gx)
-    drags = b.along.T @ (np.tanh(b.along @ v / STICKING) * b.load)
-    for k in range(count):
-        wheel = int(forces[k, FORCE_WHEEL])
-        way = b.to_twist[:, wheel].copy()  # the wheel's traction per force on the body
-        dragged = way @ drags
-        sign = math.tanh(forces[k, FORCE_SPEED] / RESTING)
-        expected = way @ taken + x[DRAG] * dragged + sign * x[FRICTION + wheel]
-        h[k, AX : AW + 1] = way @ b.inertia
-        h[k, SLOPE] = -m * (way[0] * c - way[1] * s)
-        h[k, SLOPE + 1] = -m * (way[0] * s + way[1] * c)
-        h[k, VX], h[k, VY] = m * wz * way[1], -m * wz * way[0]
-        h[k, DRAG], h[k, FRICTION + wheel] = dragged, sign
-        innovation[k] = forces[k, FORCE] - expected
-        variance[k] = forces[k, FORCE_VARIANCE]
-    return h, innovation, variance
+def held_of(n: Noise, mode: Array) -> int:
+    """Up to which state nothing is learnt: wheels show nothing of biases where there is no IMU, and
+    a wrong bias while a slide may not have been noticed."""
+    if n.slip_rate == 0.0:
+        return SIZE
+    return CREEP if mode[3] > n.learns else ACCELEROMETER
 
 
 def step(
     x: Array, P: Array, b: ContactBody, n: Noise, mode: Array, used: Array, dt: float,
-    rims: Array, inertial: Array, forces: Array,
+    rims: Array, inertial: Array, slid: Flags,
 ) -> Array:  # fmt: skip
     """From one encoder sample to the next; `x` and `mode` go on in place; the covariance."""
     mode[3] = max(mode[3] * math.exp(-dt / n.doubt_time), mode[0], mode[1], mode[2])
     P = predict(x, P, b, n, mode, used, dt)
-    judge(x, P, n, mode, rims, dt)
+    judge(x, P, n, mode, rims, dt, slid)
     h, innovation, variance = motion_rows(x, n, rims, inertial)
-    P = correct(x, P, h, innovation, variance, n.gate, n.slip_rate == 0.0)
-    if len(forces):
-        h, innovation, variance = force_rows(x, b, forces)
-        P = correct(x, P, h, innovation, variance, n.force_gate, False)
-    return P
+    return correct(x, P, h, innovation, variance, n.gate, held_of(n, mode))

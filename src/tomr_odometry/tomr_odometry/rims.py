@@ -14,6 +14,7 @@ _FROZEN_NS = to_ns(1.0)  # how long encoders that should count may not, and be w
 _FROZEN_COUNTS = 4.0  # that they should have counted
 _COARSEST, _SMALLEST = 2.0 * math.pi / 64, 1e-7  # rad, of the encoders' quantum
 _STANDING_COUNTS = 1.5
+_STANDING = 0.3  # s, after which wheels stand
 _SLOW = 0.02  # s between samples, from which they are looked at for uneven timing
 _UNEVEN_SHARE = 0.05  # of a new sample in the mean
 
@@ -24,16 +25,23 @@ class Rims:
     def __init__(self, radius: Array) -> None:
         self._radius = radius
         self._last: deque[tuple[int, Array]] = deque()
+        self._passed: deque[tuple[int, Array]] = deque()  # m, ways of the ground under each contact
         self._first = np.zeros(len(radius))
         self._quantum = _COARSEST  # rad
         self._turned = np.zeros(len(radius))  # rad, between the last two samples
         self._uneven = 0.0  # m^2
         self._stood = (0, self._first)  # since when, and where
+        self._is_abrupt = False  # no wheel stops within a sample: the encoders may be frozen
 
     @property
     def time(self) -> int:
         """Of the last sample [ns], 0: none yet."""
         return self._last[-1][0] if self._last else 0
+
+    @property
+    def since(self) -> float:
+        """When the samples begin that `speed` is taken over [s]."""
+        return 1e-9 * self._last[0][0]
 
     @property
     def speed(self) -> Array:
@@ -42,9 +50,28 @@ class Rims:
         return (new - old) / max(1e-9 * (last - first), 1e-3) * self._radius
 
     @property
+    def sliding(self) -> Array:
+        """Of each rim over the ground, in the time that its speed is taken over [m/s]."""
+        if len(self._passed) < 2:
+            return np.zeros(len(self._radius))
+        (first, old), (last, new) = self._passed[0], self._passed[-1]
+        return self.speed - (new - old) / max(1e-9 * (last - first), 1e-3)
+
+    @property
+    def blur(self) -> Array:
+        """What counts leave open of the speeds [m/s]."""
+        (first, _), (last, _) = self._last[0], self._last[-1]
+        return self._quantum / max(1e-9 * (last - first), 1e-3) * self._radius
+
+    @property
     def rest(self) -> float:
         """For how long no wheel has turned by more than a count [s]."""
         return 1e-9 * (self.time - self._stood[0])
+
+    @property
+    def stands(self) -> bool:
+        """Whether the wheels stand: for longer than encoders are frozen, if it came abruptly."""
+        return self.rest > (1e-9 * _FROZEN_NS if self._is_abrupt else _STANDING)
 
     def is_frozen(self, time: int, angle: Array) -> bool:
         """Whether encoders repeat themselves although the wheels should have turned on.
@@ -75,7 +102,8 @@ class Rims:
         elapsed, turned = 1e-9 * (time - self.time), angle - self._last[-1][1]
         self._count(turned)
         if np.abs(angle - self._stood[1]).max() > _STANDING_COUNTS * self._quantum:
-            self._stood = (time, angle)
+            self._stood, self._is_abrupt = (time, angle), False
+        self._is_abrupt |= self.is_frozen(time, angle)
         variance = (self._quantum * self._radius) ** 2 / 12.0
         variance = variance + (jitter * turned * self._radius / elapsed) ** 2
         if elapsed > _SLOW:  # by second differences
@@ -87,6 +115,14 @@ class Rims:
         while len(self._last) > 2 and self._last[1][0] <= time - _WINDOW_NS:
             self._last.popleft()
         return np.array([(angle - self._first) * self._radius, variance])
+
+    def passes(self, ground: Array) -> None:
+        """The ground goes by the contacts at so many m/s at the time of the last sample."""
+        time = self.time
+        before, way = self._passed[-1] if self._passed else (time, np.zeros(len(ground)))
+        self._passed.append((time, way + 1e-9 * (time - before) * ground))
+        while len(self._passed) > 2 and self._passed[0][0] < self._last[0][0]:
+            self._passed.popleft()
 
     def _count(self, turned: Array) -> None:
         """Learn the encoders' quantum: ways are multiples of it, and so are their differences."""

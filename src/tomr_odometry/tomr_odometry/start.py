@@ -1,4 +1,4 @@
-"""A robot's numbers for the filter, and the state with which it begins."""
+"""The state with which the filter begins."""
 
 import numpy as np
 
@@ -9,8 +9,6 @@ from tomr_odometry.kernel import (
     AX,
     AY,
     CREEP,
-    DRAG,
-    FRICTION,
     GYRO,
     RIM,
     SIZE,
@@ -22,23 +20,21 @@ from tomr_odometry.kernel import (
     X,
     Y,
 )
-from tomr_power_model.robot import WHEELS, Robot
+from tomr_power_model.robot import WHEELS
 
 _INCREDIBLE = 2.5  # standard deviations of a bias
 
 
-def start(robot: Robot, n: Noise, creep: Creep) -> tuple[Array, Array]:
-    """At rest, at the origin, with what the description says; state and covariance."""
+def start(n: Noise, creep: Creep) -> tuple[Array, Array]:
+    """At rest, at the origin; state and covariance."""
     x, std = np.zeros(SIZE), np.zeros(SIZE)
-    x[DRAG] = robot.everywhere("contact.roller_drag", "coefficient")[0]
     x[CREEP] = creep.mean
     std[VX : WZ + 1] = n.start_twist
     std[[AX, AY]], std[AW] = n.rate, n.turn_rate
     std[ACCELEROMETER : ACCELEROMETER + 2] = n.accelerometer_bias
     std[GYRO] = n.gyro_bias
     std[SLOPE : SLOPE + 2] = n.slope
-    std[FRICTION : FRICTION + WHEELS] = n.friction
-    std[DRAG], std[CREEP] = n.drag, creep.uncertainty or n.creep
+    std[CREEP] = creep.uncertainty or n.creep
     return x, np.diag(std**2)
 
 
@@ -49,13 +45,13 @@ def is_incredible(x: Array, n: Noise) -> bool:
 
 
 def start_again(
-    robot: Robot, n: Noise, creep: Creep, state: tuple[Array, Array], since: float
+    n: Noise, creep: Creep, state: tuple[Array, Array], since: float
 ) -> tuple[Array, Array]:
     """What is left where the wheels misled for some seconds, `since`; state and covariance.
 
     The velocity may be wrong altogether, and with it the way of that time.
     """
-    (was, doubt), (x, P) = state, start(robot, n, creep)
+    (was, doubt), (x, P) = state, start(n, creep)
     speed = float(np.hypot(was[VX], was[VX + 1])) + n.start_twist
     x[:AX] = was[:AX]
     x[RIM : RIM + WHEELS] = was[RIM : RIM + WHEELS]

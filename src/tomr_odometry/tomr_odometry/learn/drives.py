@@ -40,7 +40,7 @@ class _Recorder(SlipOdometry):
         self._nothing: Estimate | None = None
         super().__init__(robot, OdometrySettings(use_imu=False))
 
-    def _advance(self, time: int, dt: float, rims: Array, inertial: Array, forces: Array) -> None:
+    def _advance(self, time: int, dt: float, rims: Array, inertial: Array) -> None:
         self.rows.append((time, rims[0].copy(), self._used.copy()))
 
     def _estimate(self, tick: int) -> Estimate:

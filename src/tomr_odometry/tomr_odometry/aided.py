@@ -1,0 +1,102 @@
+"""Steps of the filter where an IMU shows what the wheels do not."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomr_odometry.estimate import SLIDES
+from tomr_odometry.hindsight import Hindsight, Inputs
+from tomr_odometry.kernel import (
+    ACCELEROMETER,
+    CREEP,
+    SIZE,
+    SLOPE,
+    SURE,
+    VX,
+    VY,
+    WZ,
+    YAW,
+    X,
+    Y,
+    correct,
+    step,
+)
+from tomr_odometry.rims import Rims
+from tomr_power_model.robot import WHEELS
+from tomr_power_model.slides.body import ContactBody
+
+Array = NDArray[np.float64]
+_CALM_TIME = 0.1  # s, over which the IMU is averaged
+_CALM_FORCE, _CALM_TURNING = 0.1, 0.02  # m/s^2, rad/s: no sliding wheel brakes a body that little
+_STANDING = 0.3  # s of both, after which a robot stands whose wheels do
+_STANDS = 0.01  # m/s, rad/s: how surely
+_LONGEST = 5.0  # s, over which a velocity that turns out wrong is taken to have been so at most
+_NONE = np.zeros(WHEELS, dtype=bool)
+
+
+class Aided:
+    """The filter's steps with an IMU, wheels that slid unnoticed, and a robot that stands."""
+
+    def __init__(self, body: ContactBody) -> None:
+        self._body, self._hindsight = body, Hindsight(body)
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._hindsight.clear()
+        self._felt = [0.0, 0.0, 0.0]  # m/s^2, m/s^2, rad/s, less what the robot would feel at rest
+        self._calm = 0.0  # s
+        self._lost = 0.0  # s, since all wheels gripped
+
+    def step(
+        self, x: Array, P: Array, mode: Array, given: Inputs, rims: Rims, *,
+        is_known: bool,
+    ) -> Array:  # fmt: skip
+        """Go on by a step; `x` and `mode` in place; the covariance.
+
+        is_known: the IMU's biases, from a standstill, and that the robot is not carried.
+        """
+        self._hindsight.take(x, P, mode, given)
+        P = step(x, P, self._body, given.noise, mode, given.used, given.dt,
+                 given.rims, given.inertial, _NONE)  # fmt: skip
+        self._feel(x, given)
+        if not is_known:
+            self._hindsight.clear()
+        else:
+            slid = self._hindsight.slid(rims) & (mode[:3] < SLIDES)
+            if slid.any():
+                x[:], P, mode[:] = self._hindsight.again(slid)
+            if rims.stands and self._calm > _STANDING:
+                P = self._stand(x, P, mode)
+        self._lost = self._lost + given.dt if mode[:3].max() > SLIDES else 0.0
+        return P
+
+    def _feel(self, x: Array, given: Inputs) -> None:
+        """Whether the robot neither speeds up nor turns."""
+        fx, fy, turning = given.inertial[[3, 4, 2]].tolist()
+        bias_x, bias_y, drift, sx, sy = x[ACCELEROMETER : SLOPE + 2].tolist()
+        c, s = math.cos(x[YAW]), math.sin(x[YAW])
+        felt = fx - bias_x + c * sx + s * sy, fy - bias_y + c * sy - s * sx, turning - drift
+        if all(map(math.isfinite, felt)):
+            share = 1.0 - math.exp(-given.dt / _CALM_TIME)
+            pairs = zip(self._felt, felt, strict=True)
+            self._felt = [was + share * (new - was) for was, new in pairs]
+        x_force, y_force, rate = self._felt
+        is_calm = math.hypot(x_force, y_force) < _CALM_FORCE and abs(rate) < _CALM_TURNING
+        self._calm = self._calm + given.dt if is_calm else 0.0
+
+    def _stand(self, x: Array, P: Array, mode: Array) -> Array:
+        """Wheels at rest would brake a body that slid on: as nothing does, it stands.
+
+        A velocity that says otherwise was wrong, and so was the way of that time.
+        """
+        speed = math.hypot(x[VX], x[VY])
+        if speed > 3.0 * math.sqrt(P[VX, VX] + P[VY, VY] + _STANDS**2):
+            P = P.copy()
+            for place, off in ((X, self._lost), (Y, self._lost), (VX, 1.0), (VY, 1.0)):
+                P[place, place] += (speed * min(off, _LONGEST)) ** 2
+            self._hindsight.clear()  # it looks back on that velocity
+        mode[:3] = 1.0 - SURE
+        rows, twist = np.eye(SIZE)[VX : WZ + 1], x[VX : WZ + 1]
+        return correct(x, P, rows, -twist, np.full(3, _STANDS**2), math.inf, CREEP)
