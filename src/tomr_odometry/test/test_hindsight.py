@@ -65,6 +65,8 @@ def looked_at(ride: Ride, settings: HindsightSettings | None = None) -> list[Arr
 def test_wheels_that_turn_with_the_ground_slid_at_no_time() -> None:
     assert not np.any(looked_at(Ride(body=1.0, rims=1.0)))
     assert not np.any(looked_at(Ride(body=1.0, rims=1.0, biases=(0.15, 0.01))))
+    # A step of this is 3 cm/s: what is compared is of the same moments.
+    assert not np.any(looked_at(Ride(body=3.0, rims=3.0), HindsightSettings(apart=2.0)))
 
 
 def test_wheels_that_speed_up_without_the_body_are_found_within_moments() -> None:

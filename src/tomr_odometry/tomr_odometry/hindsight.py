@@ -17,7 +17,6 @@ from tomr_odometry.kernel import (
     ACCELEROMETER,
     GYRO,
     SLOPE,
-    SURE,
     VX,
     VY,
     YAW,
@@ -139,7 +138,6 @@ class Hindsight:
         self.clear()
         for one in moments:
             given = one.given
-            mode[:3][slid] = SURE
             self.take(x, P, mode, given)
             P = step(x, P, self._body, given.noise, mode, given.used, given.dt,
                      given.rims, given.inertial, slid)  # fmt: skip
