@@ -35,6 +35,7 @@ class Ride:
 def known() -> tuple[Array, Array, Array]:
     """A filter that stands and knows its biases; state, covariance, modes."""
     x, P = start(NOISE, Creep())
+    P[VX : VX + 3, VX : VX + 3] = 1e-6 * np.eye(3)
     P[ACCELEROMETER : GYRO + 1, ACCELEROMETER : GYRO + 1] = np.diag([1e-5, 1e-5, 1e-7])
     return x, P, np.array([1e-6, 1e-6, 1e-6, 0.0])
 
@@ -49,10 +50,15 @@ def given(step: int, ride: Ride, rims: Rims) -> Inputs:
     return Inputs(time, DT, NOISE, np.zeros(3), ways, felt)
 
 
-def looked_at(ride: Ride, settings: HindsightSettings | None = None) -> list[Array]:
-    """Which wheels slid, by a filter that takes what is left of each moment for the IMU's."""
+def looked_at(
+    ride: Ride, settings: HindsightSettings | None = None, unknown: float | None = None
+) -> list[Array]:
+    """Which wheels slid, by a filter that has the body's velocity and the IMU's biases; or does not
+    know that of the accelerometer, to so many m/s^2."""
     x, P, mode = known()
     x[ACCELEROMETER], x[GYRO] = ride.biases
+    if unknown is not None:
+        x[ACCELEROMETER], P[ACCELEROMETER, ACCELEROMETER] = 0.0, unknown**2
     rims, hindsight, found = Rims(RADIUS), Hindsight(BODY, settings), []
     for step in range(1, ride.steps + 1):
         inputs = given(step, ride, rims)
@@ -66,7 +72,15 @@ def test_wheels_that_turn_with_the_ground_slid_at_no_time() -> None:
     assert not np.any(looked_at(Ride(body=1.0, rims=1.0)))
     assert not np.any(looked_at(Ride(body=1.0, rims=1.0, biases=(0.15, 0.01))))
     # A step of this is 3 cm/s: what is compared is of the same moments.
-    assert not np.any(looked_at(Ride(body=3.0, rims=3.0), HindsightSettings(apart=2.0)))
+    closely = HindsightSettings(apart=2.0)
+    assert not np.any(looked_at(Ride(body=3.0, rims=3.0), closely))
+    assert not np.any(looked_at(Ride(body=1.0, rims=1.0, biases=(0.15, 0.3)), closely))
+
+
+def test_what_a_bias_that_is_not_known_may_have_done_is_no_slide() -> None:
+    ride = Ride(body=1.0, rims=1.0, biases=(0.3, 0.0))  # a tenth of a metre per second in a third
+    assert np.any(looked_at(ride, unknown=1e-3))
+    assert not np.any(looked_at(ride, unknown=0.15))
 
 
 def test_wheels_that_speed_up_without_the_body_are_found_within_moments() -> None:
@@ -169,7 +183,7 @@ def test_a_robot_whose_wheels_rest_and_that_nothing_brakes_stands(steps: int, st
 def test_a_body_that_still_brakes_does_not_stand() -> None:
     x, P, mode = known()
     rims, aided = Rims(RADIUS), Aided(BODY)
-    x[VX], mode[:3] = 0.8, SURE
+    x[VX], P[VX, VX], mode[:3] = 0.8, NOISE.start_twist**2, SURE
     for step in range(1, 80):
         inputs = given(step, Ride(body=-0.3, rims=0.0), rims)
         P = aided.step(x, P, mode, inputs, rims, is_known=True)
