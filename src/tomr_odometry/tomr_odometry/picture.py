@@ -76,8 +76,9 @@ def _draw_slip(over_time: Axes, robot: Robot, items: Sequence[Estimate]) -> None
         over_time.plot(seconds, column, color=color, lw=0.8, label=name)
     lost = [item.is_slipping for item in items]
     over_time.fill_between(
-        seconds, -1.0, 1.0, where=lost, color=PLACE, alpha=0.6, lw=0.0, label="loss of traction"
-    )
+        seconds, 0.0, 1.0, where=lost, color=PLACE, alpha=0.6, lw=0.0, label="loss of traction",
+        transform=over_time.get_xaxis_transform(),
+    )  # fmt: skip
     over_time.set_xlabel("time [s]")
     over_time.set_ylabel("slip ratio")
     over_time.legend(fontsize=7)
