@@ -84,3 +84,13 @@ def test_biases_that_no_imu_has_are_a_start_that_misled(has_stood: bool) -> None
     assert core._P[1, 1] > 99.0
     assert (np.sqrt(core._P[VX, VX]) > 0.4) != has_stood
     assert core._trusted == pytest.approx(2.001 if has_stood else 0.0)
+
+
+def test_an_imu_that_comes_back_looks_back_on_nothing() -> None:
+    core = standing(has_imu=True)
+    assert len(core._aided._hindsight._moments) > 30
+    for sample in range(100, 140):
+        core.encoders(START + 10_000_000 * sample, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        list(core.due())
+    assert not core._is_aided
+    assert not core._aided._hindsight._moments

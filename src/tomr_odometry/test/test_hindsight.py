@@ -171,8 +171,10 @@ def test_a_robot_whose_wheels_rest_and_that_nothing_brakes_stands(steps: int, st
     x, P, mode = known()
     rims, aided = Rims(RADIUS), Aided(BODY)
     x[VX], x[VY], mode[:3], aided._lost = 0.6, 0.3, SURE, 2.0  # an IMU that drifted, say
+    ride = Ride(body=0.0, rims=0.0, biases=(0.3, 0.05))  # these it knows
+    x[ACCELEROMETER], x[GYRO] = ride.biases
     for step in range(1, steps + 1):
-        inputs = given(step, Ride(body=0.0, rims=0.0), rims)
+        inputs = given(step, ride, rims)
         P = aided.step(x, P, mode, inputs, rims, is_known=True)
     assert (math.hypot(x[VX], x[VY]) < 0.02) == stands
     assert (mode[:3].max() < 0.01) == stands

@@ -6,6 +6,8 @@ import pytest
 from tomr_odometry.rims import Rims
 
 RADIUS, COUNT, MS = np.full(3, 0.05), 1e-3, 1_000_000
+BRAKED = [0.0, 3.0, 5.0, *(5 + 20.0 * k - k * k for k in range(11))]  # down to nothing
+FROZEN = [0.0, 3.0, 5.0, *(5 + 20.0 * k for k in range(11))]  # at speed, and no further
 
 
 def taken(counts: list[float], period_ms: int = 10, start: float = 0.0) -> tuple[Rims, np.ndarray]:
@@ -52,13 +54,11 @@ def test_a_wheel_rests_while_it_turns_by_no_more_than_a_count() -> None:
 @pytest.mark.parametrize(
     ("counts", "after"),
     [
-        ([0, 3, 5, *(5 + 20.0 * k - k * k for k in range(11))], 0.3),  # braked down to nothing
-        (
-            [0, 3, 5, *(5 + 20.0 * k for k in range(11))],
-            1.0,
-        ),  # at speed, and then the same again and again
+        (BRAKED, 0.3),
+        (FROZEN, 1.0),
+        ([*FROZEN, 205.0, 205.0, *(300.0 + count for count in BRAKED)], 0.3),
     ],
-    ids=["braked", "frozen"],
+    ids=["braked", "frozen", "frozen before"],
 )
 def test_wheels_stand_after_a_while_and_where_they_stopped_abruptly_later(
     counts: list[float], after: float
