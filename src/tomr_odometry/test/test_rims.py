@@ -81,3 +81,10 @@ def test_a_rim_that_turns_as_the_ground_goes_by_does_not_slide() -> None:
         rims.passes(np.array([0.1, 0.0, -0.2]))
     assert rims.sliding == pytest.approx([0.3, 0.0, 0.2], abs=1e-6)
     assert rims.blur == pytest.approx(rims._quantum * RADIUS / 0.05)
+
+
+def test_encoders_that_are_silent_leave_no_heap_of_samples() -> None:
+    rims, _ = taken([0.0, 3.0, 5.0, 25.0])
+    for _ in range(1000):  # the IMU goes on
+        rims.passes(np.zeros(3))
+    assert len(rims._passed) < 10

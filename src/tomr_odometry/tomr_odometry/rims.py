@@ -119,7 +119,11 @@ class Rims:
     def passes(self, ground: Array) -> None:
         """The ground goes by the contacts at so many m/s at the time of the last sample."""
         time = self.time
-        before, way = self._passed[-1] if self._passed else (time, np.zeros(len(ground)))
+        if not self._passed:
+            self._passed.append((time, np.zeros(len(ground))))
+        before, way = self._passed[-1]
+        if time == before:  # the IMU goes on without the encoders
+            return
         self._passed.append((time, way + 1e-9 * (time - before) * ground))
         while len(self._passed) > 2 and self._passed[0][0] < self._last[0][0]:
             self._passed.popleft()
