@@ -88,7 +88,7 @@ CHANGES: dict[str, tuple[Change, float, float]] = {
     "encoders pause while turning round": (silent("joint_states", 3.6, 4.3), 0.02, 0.2),
     "encoders repeat themselves": (repeating(), 0.02, 0.4),
     "encoders die": (silent("joint_states", 5.0), 0.15, 0.5),
-    "64 counts": (of_64_counts, 0.03, 0.15),
+    "64 counts": (of_64_counts, 0.02, 0.15),
     "power of one wheel": (without(POWER[0]), 0.01, 0.06),
     "no power": (without(*POWER), 0.01, 0.06),
     "no command": (without("cmd_vel"), 0.01, 0.06),

@@ -23,6 +23,7 @@ from tomr_odometry.kernel import (
     step,
 )
 from tomr_odometry.rims import Rims
+from tomr_odometry.start import DOUBTED
 from tomr_power_model.robot import WHEELS
 from tomr_power_model.slides.body import ContactBody
 
@@ -31,7 +32,6 @@ _CALM_TIME = 0.1  # s, over which the IMU is averaged
 _CALM_FORCE, _CALM_TURNING = 0.1, 0.02  # m/s^2, rad/s: no sliding wheel brakes a body that little
 _STANDING = 0.3  # s of both, after which a robot stands whose wheels do
 _STANDS = 0.01  # m/s, rad/s: how surely
-_LONGEST = 5.0  # s, over which a velocity that turns out wrong is taken to have been so at most
 _NONE = np.zeros(WHEELS, dtype=bool)
 
 
@@ -95,7 +95,7 @@ class Aided:
         if speed > 3.0 * math.sqrt(P[VX, VX] + P[VY, VY] + _STANDS**2):
             P = P.copy()
             for place, off in ((X, self._lost), (Y, self._lost), (VX, 1.0), (VY, 1.0)):
-                P[place, place] += (speed * min(off, _LONGEST)) ** 2
+                P[place, place] += (speed * min(off, DOUBTED)) ** 2
             self._hindsight.clear()  # it looks back on that velocity
         mode[:3] = 1.0 - SURE
         rows, twist = np.eye(SIZE)[VX : WZ + 1], x[VX : WZ + 1]

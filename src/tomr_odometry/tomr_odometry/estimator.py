@@ -15,7 +15,7 @@ from tomr_odometry.kernel import AX, CREEP, GYRO, RIM, SLOPE, VX, WZ, YAW, step
 from tomr_odometry.lifted import Lifted
 from tomr_odometry.rims import Rims
 from tomr_odometry.settings import OdometrySettings
-from tomr_odometry.start import is_incredible, start, start_again
+from tomr_odometry.start import DOUBTED, is_incredible, start, start_again
 from tomr_odometry.traction import Traction, Tractions
 from tomr_odometry.unaided import FEWEST_POWERS, Unaided
 from tomr_power_model.drive.sources import PowerReading
@@ -45,7 +45,6 @@ _AHEAD = 0.25  # s, for which the motion of the last encoder sample is taken to 
 _REST = 0.3  # s of standstill, in which an IMU shows its biases
 _LOST_SPEED = 1.0  # m/s, by which a robot without encoders may be off
 _LOST_MOST = 10.0  # s, after which it may be off no further
-_DOUBTED = 5.0  # s, over which a velocity that turns out wrong is taken to have been so at most
 _FASTEST = 30.0  # m/s, of a rim
 _TILTED = 1.5  # m/s^2, of gravity in what a tilted robot feels along the floor
 _CARRIED_SPEED = 1.0  # m/s/sqrt(Hz)
@@ -285,7 +284,7 @@ class SlipOdometry:
         self._trusted += dt
         if not self._has_stood and is_incredible(self._x, noise):
             # The wheels slid from the start while they were taken for gripping.
-            since = min(self._trusted, _DOUBTED)
+            since = min(self._trusted, DOUBTED)
             self._x, self._P = start_again(noise, self.settings.creep, (self._x, self._P), since)
             self._mode[:] = 1.0
             self._trusted = 0.0

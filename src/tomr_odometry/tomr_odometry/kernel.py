@@ -49,7 +49,7 @@ class Noise(NamedTuple):
     learns: float = 0.2  # doubt, beyond which a slide is no time to learn biases in
     slide: float = 0.4  # m/s, of sliding
     slide_time: float = 0.1  # s, over which sliding stays the same
-    slip_rate: float = 0.1  # 1/s, at which wheels lose grip
+    slip_rate: float = 0.05  # 1/s, at which wheels lose grip
     grip_rate: float = 3.0  # 1/s, at which they find it again
     way: float = 0.005  # m/s/sqrt(Hz) per m/s of travel, of the pose
     turn: float = 0.005  # rad/s/sqrt(Hz) per m/s, of the heading

@@ -22,6 +22,7 @@ from tomr_odometry.kernel import (
 )
 from tomr_power_model.robot import WHEELS
 
+DOUBTED = 5.0  # s, over which a velocity that turns out wrong is taken to have been so at most
 _INCREDIBLE = 2.5  # standard deviations of a bias
 
 
