@@ -9,6 +9,7 @@ from tomr_fault_diag.classifier.judges import Opinion
 from tomr_fault_diag.classifier.misfit import MisfitWatch
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import Unseen
+from tomr_fault_diag.classifier.outside import Outside, OutsideWatch
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.classifier.states import (
@@ -42,11 +43,11 @@ def frame(at_ms: int, expected: Three, measured: Three, power: float = 0.0) -> R
 
 
 class Sure:
-    """A judge that is sure of one state, whatever it sees."""
+    """A judge that is sure of one state, whatever it sees; or only thinks so."""
 
-    def __init__(self, state: int) -> None:
+    def __init__(self, state: int, sure: bool = True) -> None:
         self.settings = ClassifierSettings()
-        self.state = state
+        self.state, self.sure = state, sure
         self.cleared = 0
 
     def clear(self) -> None:
@@ -58,7 +59,7 @@ class Sure:
     def judge(
         self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, beside: Beside = ALONE
     ) -> Opinion:
-        return Opinion(np.eye(6)[self.state], sure=True)
+        return Opinion(np.eye(6)[self.state], sure=self.sure)
 
 
 def named(frames: list[ResidualFrame], judge: int = NORMAL) -> list[tuple[int, str]]:
@@ -220,6 +221,30 @@ def test_more_that_the_computer_draws_is_not_unknown() -> None:
 def test_a_named_fault_is_not_called_unknown() -> None:
     far = [frame(t, TURNING, TURNING, power=9.0) for t in range(50, 3000, 50)]
     assert named(far, CONTROL) == [(50, "control system fault")]
+
+
+@pytest.mark.parametrize("power", [9.0, 2.0])
+def test_what_is_far_off_and_merely_looks_like_a_fault_is_unknown(power: float) -> None:
+    classifier, states = FaultClassifier(Sure(CONTROL, sure=False)), []
+    for t in range(50, 3000, 50):
+        diagnosis = classifier.classify(frame(t, TURNING, TURNING, power=power if t > 500 else 0.0))
+        if diagnosis is not None and diagnosis.changed:
+            states.append(diagnosis.state.name)
+    assert states[1:] == (["unknown"] if power > 3.0 else [])
+
+
+class Leans(OutsideWatch):
+    """Somebody leans on the robot, whatever it shows."""
+
+    def take(self, frame: ResidualFrame) -> Outside:
+        return Outside(may_be_push=True)
+
+
+def test_what_somebody_who_leans_explains_is_not_unknown() -> None:
+    far = [frame(t, TURNING, TURNING, power=9.0) for t in range(50, 3000, 50)]
+    classifier = FaultClassifier(Sure(NORMAL), outside=Leans(shipped_robot("reference")))
+    said = [classifier.classify(item) for item in far]
+    assert {item.state.name for item in said if item is not None} == {"normal"}
 
 
 def test_a_short_stray_is_not_unknown() -> None:

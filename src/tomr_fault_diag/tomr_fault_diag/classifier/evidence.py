@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tomr_fault_diag.classifier.belief import DRAGS, ENCODERS, EXTERNAL, HYPOTHESES, OTHER
 from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.misfit import is_far
+from tomr_fault_diag.classifier.outside import NOTHING_ACTS, Outside
 from tomr_fault_diag.classifier.states import SLIP
 from tomr_fault_diag.residuals.frame import SPEEDS, ResidualFrame, measured_speed
 
@@ -34,6 +35,7 @@ class Beside:
     """What is known of a tick beside its residuals."""
 
     contacts: Contacts = NOTHING
+    outside: Outside = NOTHING_ACTS
     borne_out: tuple[int, ...] = ()  # wheels 0..2 whose encoders a gyro bears out
     lasting: Array = field(factory=lambda: np.zeros(HYPOTHESES))  # by small faults that last
 

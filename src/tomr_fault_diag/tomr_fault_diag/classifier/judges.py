@@ -34,6 +34,7 @@ from tomr_fault_diag.classifier.evidence import ALONE, Beside, astray, said_by_f
 from tomr_fault_diag.classifier.features import CHANNELS, WINDOW, channels_of, turning
 from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.observability import Unseen
+from tomr_fault_diag.classifier.outside import Outside
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.states import (
     CONTROL,
@@ -80,6 +81,8 @@ _SLIGHT = 1.0
 # within bands that are the robot's own: it says so much less where neither forces nor a gyro show
 # one.
 _SHAKEN, _DOUBTED = 12, 2.0
+# What is seen to act on the body for seconds is so much likelier than what a window looks like.
+_SHARED, _LOADED = 10.0, 24.0
 _MOST_GATHERED = 24.0  # nats: what ended long ago must not count for long
 GATHERED = 12.0  # nats, that small faults which last have shown, in place of a striking window
 _HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
@@ -113,6 +116,7 @@ class _Weighed:
     said: Array  # by the gyro and the forces
     is_calm: bool  # all lies within bands that are the robot's own
     lasting: Array  # by small faults that last
+    outside: Outside  # what acts on the body
 
 
 class Judge(Protocol):
@@ -180,7 +184,7 @@ class WindowJudge:
         self._slot = slot
         said = said_by_gyro(frame, beside.borne_out) + said_by_forces(frame, beside.contacts)
         is_calm = beside.contacts.calm and bool(self.settings.commissioned)
-        weighed = _Weighed(said, is_calm, beside.lasting)
+        weighed = _Weighed(said, is_calm, beside.lasting, beside.outside)
         for _ in range(count):
             self._opinion = self._step(frame, unseen, weighed)
             # A size is fitted to what is new in a tick, however long it stands for.
@@ -200,7 +204,7 @@ class WindowJudge:
             likelihoods[SLIP] -= _DOUBTED
         if not self._shaken:
             likelihoods = self._with_lasting(likelihoods, weighed.lasting)
-        likelihoods = of_states(likelihoods + said)
+        likelihoods = _with_outside(of_states(likelihoods + said), weighed.outside)
         shares = self._belief.update(likelihoods)
         self._shaken = _SHAKEN if shares[EXTERNAL] > 0.5 else max(self._shaken - 1, 0)
         striking = _ratios(likelihoods)
@@ -296,6 +300,16 @@ class WindowJudge:
             best = self._best
         self._best = best
         return best
+
+
+def _with_outside(likelihoods: Array, outside: Outside) -> Array:
+    """With what acts on the body: a window is short beside the seconds that show it."""
+    found = likelihoods.copy()
+    if outside.push or outside.load:  # all wheels feel it: none is accused
+        found[CONTROLS.start : METERS.stop] -= _SHARED
+    if outside.load:
+        found[LOADED] = likelihoods.max() + _LOADED
+    return found
 
 
 def _ratios(likelihoods: Array) -> Array:

@@ -13,6 +13,7 @@ from tomr_fault_diag.classifier.lasting import LastingWatch
 from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
+from tomr_fault_diag.classifier.outside import NOTHING_ACTS, OutsideWatch
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.severity import Severity, SeverityWatch
 from tomr_fault_diag.classifier.slides import SlideWatch
@@ -80,18 +81,21 @@ class FaultClassifier:
         severity: SeverityWatch | None = None,
         *,
         slides: SlideWatch | None = None,
+        outside: OutsideWatch | None = None,
         lasting: LastingWatch | None = None,
         misfits: MisfitWatch | None = None,
         turning: Array | None = None,
     ) -> None:
         """Without `severity` it is not stated how bad a fault is, nor what has changed slowly;
-        without `slides` residuals alone show a slip, without `lasting` small faults are not
-        looked for; without `misfits` it is not known what a motor draws that is not driven;
-        without `turning`, the yaw rate per wheel speed (3,), a gyro bears no encoder out."""
+        without `slides` residuals alone show a slip, without `outside` a load; without `lasting`
+        small faults are not looked for; without `misfits` it is not known what a motor draws that
+        is not driven; without `turning`, the yaw rate per wheel speed (3,), a gyro bears no
+        encoder out."""
         self._judge = judge
         self._lasting = lasting
         self._severity = severity
         self._slides = slides
+        self._outside = outside
         self._motion = MotionWatch()
         self._misfits = misfits or MisfitWatch()
         self._turning = turning
@@ -110,6 +114,7 @@ class FaultClassifier:
             judge,
             severity,
             slides=SlideWatch(robot),
+            outside=OutsideWatch(robot),
             lasting=LastingWatch(robot) if judge.settings.small_faults else None,
             misfits=MisfitWatch(Motors(robot).idle.tolist()),
             turning=Body.of(robot).to_twist[2],
@@ -134,6 +139,8 @@ class FaultClassifier:
             self._severity.clear()
         if self._slides is not None:
             self._slides.clear()
+        if self._outside is not None:
+            self._outside.clear()
         if self._lasting is not None:
             self._lasting.clear()
         self._stamp = 0
@@ -204,7 +211,10 @@ class FaultClassifier:
         data = self._data.take(frame)
         self._unseen = evolve(self._motion.take(frame), blind=data.blind)
         contacts = NOTHING if self._slides is None else self._slides.take(frame)
+        outside = NOTHING_ACTS if self._outside is None else self._outside.take(frame)
         misfit, self._usable = self._misfits.take(frame, self.settings.low_supply), data.usable
+        if outside.may_be_push:  # who leans on a robot moves what its motors draw, out of all bands
+            misfit = evolve(misfit, unexplained=False)
         if not data.usable:
             self._pause(frame, data)
             return
@@ -219,7 +229,8 @@ class FaultClassifier:
             self._enter(DISOBEYS, frame.stamp_ns, None)
             return
         is_well = self._state is STATES[NORMAL]
-        beside = Beside(contacts, () if self._turning is None else borne_out(frame, self._turning))
+        cleared = () if self._turning is None else borne_out(frame, self._turning)
+        beside = Beside(contacts, outside, cleared)
         if self._lasting is not None:
             beside = evolve(beside, lasting=self._lasting.take(frame, is_well))
         self._opinion = self._judge.judge(frame, elapsed, self._unseen, beside)
@@ -310,7 +321,8 @@ def _called(opinion: Opinion, misfit: Misfit) -> State:
         leading = STATES[NORMAL]  # a fault that begins may look like a push at first
     if misfit.low_supply and (leading in _WELL or not opinion.sure):
         return LOW_SUPPLY
-    return UNKNOWN if leading in _WELL and misfit.unexplained else leading
+    is_named = opinion.sure and leading not in _WELL
+    return UNKNOWN if misfit.unexplained and not is_named else leading
 
 
 def _is_one_fault(state: State, other: State) -> bool:

@@ -1,0 +1,299 @@
+"""What acts on the body from outside, from ticks: hand-made motions of the reference robot."""
+
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from attrs import evolve
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from tomr_fault_diag.classifier.belief import WEAKS
+from tomr_fault_diag.classifier.evidence import Beside
+from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
+from tomr_fault_diag.classifier.motors import Motors
+from tomr_fault_diag.classifier.observability import Unseen
+from tomr_fault_diag.classifier.outside import NOTHING_ACTS, Outside, OutsideWatch
+from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.classifier.stage import FaultClassifier
+from tomr_fault_diag.classifier.states import BURDENED, DEGRADED
+from tomr_fault_diag.residuals.frame import SPEEDS, Residual, ResidualFrame
+from tomr_power_model.robot import Robot, shipped_robot
+from tomr_power_model.slides.body import body_of
+
+Array = NDArray[np.float64]
+# Force [N] and moment [N m] on the body, at a time [s], a twist and an angle to the world [rad].
+Wrench = Callable[[float, Array, float], Array]
+
+ROBOT = shipped_robot("reference")
+MOTORS = Motors(ROBOT)
+BODY, RADIUS = body_of(ROBOT)
+MASS = BODY.mass
+BASE = 1_700_000_000_000_000_000
+MS = 1_000_000
+PERIOD = 0.05  # s
+BAND = 1.0  # W
+LEAST = 0.1  # m/s
+
+# Ahead, to the left, turning on the spot, back: a second and a half each.
+WAYS = [
+    np.array(way) for way in ([0.4, 0.0, 0.0], [0.0, 0.4, 0.0], [0.0, 0.0, 1.0], [-0.4, 0.1, 0.4])
+]
+
+
+def twist_at(time: float) -> Array:
+    return WAYS[int(time / 1.5) % len(WAYS)]
+
+
+def ahead(_: float) -> Array:
+    return WAYS[0]
+
+
+def nothing(_: float, __: Array, ___: float) -> Array:
+    return np.zeros(3)
+
+
+def cart(drag: float, hitch: float) -> Wrench:
+    """Drags so much [N/kg] at a hitch on the x axis [m]."""
+
+    def wrench(_: float, twist: Array, __: float) -> Array:
+        velocity = twist[:2] + twist[2] * np.array([0.0, hitch])
+        force = -drag * MASS * velocity / max(float(np.hypot(*velocity)), 1e-3)
+        return np.array([*force, hitch * force[1]])
+
+    return wrench
+
+
+def fixed(force: float, azimuth: float = 0.5, rise: float = 0.0) -> Wrench:
+    """So much [N/kg] in one direction of the world, from nothing in a time [s]."""
+
+    def wrench(time: float, _: Array, yaw: float) -> Array:
+        size = force * MASS * (min(time / rise, 1.0) if rise else 1.0)
+        return size * np.array([math.cos(azimuth - yaw), math.sin(azimuth - yaw), 0.02])
+
+    return wrench
+
+
+def power(force: Array, speed: Array) -> Array:
+    """Of motors whose contacts hand on so much [N] [W]."""
+    none, one = (MOTORS.forces(np.full(3, amps), speed, np.zeros(3)) for amps in (0.0, 1.0))
+    current = (force - none) / (one - none)
+    return MOTORS.resistance * current**2 + MOTORS.constant * speed * current + MOTORS.idle
+
+
+def frames(
+    wrench: Wrench,
+    seconds: float = 6.0,
+    motion: Callable[[float], Array] = twist_at,
+    more: Array | None = None,
+    turned: int = 0,
+) -> Iterator[ResidualFrame]:
+    """Ticks of wheels that turn as they should; `more`: that each motor draws besides [W];
+    `turned`: by so many thirds of a turn is the robot called otherwise."""
+    random, yaw = np.random.default_rng(3), 0.0
+    for tick in range(round(seconds / PERIOD)):
+        time = tick * PERIOD
+        twist = motion(time)
+        yaw += float(twist[2]) * PERIOD
+        speed = BODY.rows @ twist / RADIUS
+        explained = power(np.zeros(3), speed)
+        shown = power(-(BODY.to_twist.T @ wrench(time, twist, yaw)), speed) - explained
+        shown = shown + 0.1 * BAND * random.standard_normal(3) + (0.0 if more is None else more)
+        rows = (np.roll(item, turned).tolist() for item in (speed, shown, explained))
+        yield frame(tick, *rows)
+
+
+def frame(tick: int, speed: list[float], shown: list[float], power: list[float]) -> ResidualFrame:
+    motors = [Residual(off, BAND, drawn) for off, drawn in zip(shown, power, strict=True)]
+    speeds = [Residual(0.0, 0.5, want, "rad/s") for want in speed]
+    total = Residual(sum(shown), 3.0 * BAND, sum(power))
+    return ResidualFrame(BASE + 50 * tick * MS, (total, *motors, *speeds, *motors))
+
+
+def found(items: Iterator[ResidualFrame], robot: Robot = ROBOT) -> list[Outside]:
+    watch = OutsideWatch(robot)
+    return [watch.take(item) for item in items]
+
+
+def first(items: list[Outside]) -> float:
+    """When a load is first found [s]."""
+    return next((n * PERIOD for n, item in enumerate(items) if item.load), math.inf)
+
+
+@pytest.mark.parametrize("hitch", [0.0, -0.2, -0.35, 0.3])
+def test_what_drags_whichever_way_the_robot_goes_is_a_load(hitch: float) -> None:
+    items = found(frames(cart(0.8, hitch)))
+    assert first(items) < 3.0  # the second direction shows it
+    assert all(item.load for item in items[-20:])
+
+
+def test_straight_ahead_a_cart_may_be_anything() -> None:
+    """A wheel stands; whoever leans does the same, and so does an encoder that shows too little."""
+    items = found(frames(cart(0.8, -0.2), motion=ahead))
+    assert not any(item.load or item.push for item in items)
+    assert any(item.may_be_push for item in items)
+
+
+def test_a_floor_that_drags_a_little_more_is_no_load() -> None:
+    assert first(found(frames(cart(0.25, 0.0)))) == math.inf
+
+
+@pytest.mark.parametrize("rise", [0.0, 3.0])
+def test_who_leans_on_the_robot_is_no_load(rise: float) -> None:
+    items = found(frames(fixed(1.0, rise=rise), seconds=6.0))
+    assert first(items) == math.inf
+    assert sum(item.push for item in items) > 60
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(0.3, 1.0), st.floats(-math.pi, math.pi), st.integers(0, 3))
+def test_nobody_who_leans_is_a_load(force: float, azimuth: float, start: int) -> None:
+    items = found(
+        frames(fixed(force, azimuth), motion=lambda time: twist_at(time + 1.5 * start)),
+    )
+    assert first(items) == math.inf
+
+
+def test_more_than_a_person_pushes_for_seconds_is_a_load() -> None:
+    assert first(found(frames(fixed(2.5)))) < 3.0
+
+
+def test_a_shove_is_neither() -> None:
+    def shove(time: float, twist: Array, yaw: float) -> Array:
+        return fixed(3.0)(time, twist, yaw) if 1.0 <= time < 1.2 else np.zeros(3)
+
+    assert set(found(frames(shove))) == {NOTHING_ACTS}
+
+
+@pytest.mark.parametrize("wheel", [0, 1, 2])
+@pytest.mark.parametrize("watts", [3.0, 12.0])
+def test_what_one_wheel_bears_alone_comes_from_that_wheel(wheel: int, watts: float) -> None:
+    more = np.zeros(3)
+    more[wheel] = watts
+    assert set(found(frames(nothing, more=more))) == {NOTHING_ACTS}
+
+
+def test_a_healthy_robot_shows_nothing() -> None:
+    assert set(found(frames(nothing))) == {NOTHING_ACTS}
+
+
+def test_it_is_over_when_no_motor_shows_it_any_more() -> None:
+    def ends(time: float, twist: Array, yaw: float) -> Array:
+        return cart(0.8, -0.2)(time, twist, yaw) if time < 4.0 else np.zeros(3)
+
+    items = found(frames(ends))
+    assert items[79].load
+    assert items[92] == NOTHING_ACTS
+
+
+@pytest.mark.parametrize("turned", [1, 2])
+def test_which_wheel_is_called_the_first_changes_nothing(turned: int) -> None:
+    """Wheels in another order, of a robot that is the same after a third of a turn."""
+    items = found(frames(cart(0.8, 0.0)))
+    assert found(frames(cart(0.8, 0.0), turned=turned)) == items
+
+
+def test_wheels_that_do_not_follow_show_nothing_of_the_body() -> None:
+    def strays(item: ResidualFrame) -> ResidualFrame:
+        off = evolve(item.residuals[SPEEDS[1]], residual=2.0)  # four bands
+        residuals = list(item.residuals)
+        residuals[SPEEDS[1]] = off
+        return evolve(item, residuals=tuple(residuals))
+
+    assert set(found(strays(item) for item in frames(cart(0.8, -0.2)))) == {NOTHING_ACTS}
+
+
+def test_magnitudes_of_currents_show_no_direction() -> None:
+    unsigned = evolve(ROBOT, measurement=evolve(ROBOT.measurement, signed=False))
+    assert set(found(frames(cart(0.8, -0.2)), unsigned)) == {NOTHING_ACTS}
+
+
+def test_after_a_silence_it_begins_anew() -> None:
+    late = (
+        evolve(item, stamp_ns=item.stamp_ns + (1_000 * MS if n >= 80 else 0))
+        for n, item in enumerate(frames(cart(0.8, -0.2)))
+    )
+    items = found(late)
+    assert items[79].load
+    assert items[80] == NOTHING_ACTS
+
+
+@pytest.mark.parametrize("period", [0.02, 0.1])
+def test_other_rates_find_the_same(period: float) -> None:
+    random = np.random.default_rng(5)
+    watch, when = OutsideWatch(ROBOT), math.inf
+    for tick in range(round(6.0 / period)):
+        twist = twist_at(tick * period)
+        speed = BODY.rows @ twist / RADIUS
+        explained = power(np.zeros(3), speed)
+        shown = power(-(BODY.to_twist.T @ cart(0.8, -0.2)(0.0, twist, 0.0)), speed) - explained
+        shown = shown + 0.1 * BAND * random.standard_normal(3)
+        item = frame(0, speed.tolist(), shown.tolist(), explained.tolist())
+        if watch.take(evolve(item, stamp_ns=BASE + round(tick * period * 1e9))).load:
+            when = min(when, tick * period)
+    assert when < 3.5
+
+
+def turning_on(share: float, wheel: int = 1) -> Iterator[ResidualFrame]:
+    """An encoder shows too little: its wheel turns faster by a share, and the body with it."""
+    for tick, item in enumerate(frames(nothing, motion=lambda time: twist_at(time + 1.5))):
+        twist = twist_at(tick * PERIOD + 1.5)
+        shown = BODY.rows @ twist / RADIUS
+        true = shown.copy()
+        true[wheel] *= 1.0 + share
+        moves = BODY.to_twist @ (RADIUS * true)
+        keeps = MASS * np.array([-moves[2] * moves[1], moves[2] * moves[0], 0.0])
+        force = BODY.to_twist.T @ (
+            keeps - MASS * np.array([-twist[2] * twist[1], twist[2] * twist[0], 0.0])
+        )
+        off = power(force, true) - power(np.zeros(3), shown)
+        off = off + [entry.residual for entry in item.residuals[1:4]]
+        yield frame(tick, shown.tolist(), off.tolist(), power(np.zeros(3), shown).tolist())
+
+
+@pytest.mark.parametrize("share", [0.5, 1.0, 2.2])
+def test_an_encoder_that_shows_too_little_is_no_push(share: float) -> None:
+    """The others feel it as well: what keeps a body on its way that turns on."""
+    items = found(turning_on(share))
+    assert not any(item.load or item.push for item in items)
+
+
+class Looks:
+    """A network that sees one hypothesis far before all others."""
+
+    def __init__(self, hypothesis: int) -> None:
+        self._said = np.full(19, -8.0)
+        self._said[[0, hypothesis]] = -8.0, 0.0
+
+    def log_likelihoods(self, window: Array) -> Array:
+        return self._said.copy()
+
+
+def opinion(outside: Outside) -> Opinion:
+    """After a second in which every window looks like a weak motor."""
+    judge = WindowJudge(Looks(WEAKS.start), ClassifierSettings())  # type: ignore[arg-type]
+    item = next(frames(nothing))
+    for tick in range(40):
+        last = judge.judge(
+            evolve(item, stamp_ns=BASE + 50 * tick * MS), 50 * MS, Unseen(), Beside(outside=outside)
+        )
+    return last
+
+
+def test_what_is_seen_for_seconds_outweighs_a_window() -> None:
+    assert opinion(NOTHING_ACTS).leading == DEGRADED[0]
+    loaded, pushed = opinion(Outside(load=True)), opinion(Outside(push=True))
+    assert (loaded.leading, loaded.sure) == (BURDENED, True)
+    assert pushed.leading.wheel is None  # all wheels feel it, and none is accused
+
+
+def test_a_cart_is_named_and_no_wheel_accused() -> None:
+    classifier = FaultClassifier.around(make_judge(ClassifierSettings()), ROBOT)
+    names = set()
+    for n, item in enumerate(frames(cart(1.2, -0.2), seconds=9.0)):
+        said = classifier.classify(item)
+        if said is not None and n * PERIOD > 4.0:
+            names.add(said.state.name)
+    assert names == {BURDENED.name}
