@@ -244,7 +244,19 @@ def test_what_somebody_who_leans_explains_is_not_unknown() -> None:
     far = [frame(t, TURNING, TURNING, power=9.0) for t in range(50, 3000, 50)]
     classifier = FaultClassifier(Sure(NORMAL), outside=Leans(shipped_robot("reference")))
     said = [classifier.classify(item) for item in far]
-    assert {item.state.name for item in said if item is not None} == {"normal"}
+    names = [item.state.name for item in said if item is not None and item.changed]
+    assert names == ["normal", "pushed"]
+
+
+def test_who_leans_on_a_robot_does_not_mend_it() -> None:
+    judge, states = Sure(CONTROL), []
+    classifier = FaultClassifier(judge, outside=Leans(shipped_robot("reference")))
+    for t in range(50, 4000, 50):
+        judge.state = CONTROL if t < 2000 else NORMAL
+        diagnosis = classifier.classify(frame(t, TURNING, TURNING, power=9.0))
+        if diagnosis is not None and diagnosis.changed:
+            states.append(diagnosis.state.name)
+    assert states == ["control system fault"]
 
 
 def test_a_short_stray_is_not_unknown() -> None:

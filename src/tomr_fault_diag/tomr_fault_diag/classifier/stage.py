@@ -213,8 +213,6 @@ class FaultClassifier:
         contacts = NOTHING if self._slides is None else self._slides.take(frame)
         outside = NOTHING_ACTS if self._outside is None else self._outside.take(frame)
         misfit, self._usable = self._misfits.take(frame, self.settings.low_supply), data.usable
-        if outside.may_be_push:  # who leans on a robot moves what its motors draw, out of all bands
-            misfit = evolve(misfit, unexplained=False)
         if not data.usable:
             self._pause(frame, data)
             return
@@ -235,12 +233,13 @@ class FaultClassifier:
             beside = evolve(beside, lasting=self._lasting.take(frame, is_well))
         self._opinion = self._judge.judge(frame, elapsed, self._unseen, beside)
         if data.enough or self._state not in _QUIET:
-            self._weigh(self._opinion, misfit, frame.stamp_ns)
+            self._weigh(self._opinion, misfit, frame.stamp_ns, outside.may_be_push)
         else:
             self._enter(NOT_ENOUGH, frame.stamp_ns, None)
 
-    def _weigh(self, opinion: Opinion, misfit: Misfit, stamp: int) -> None:
-        """Name what the judge is sure of, or what it does not know."""
+    def _weigh(self, opinion: Opinion, misfit: Misfit, stamp: int, may_be_push: bool) -> None:
+        """Name what the judge is sure of, or what it does not know; `may_be_push`: somebody who
+        leans on the robot explains what is far off."""
         leading = _called(opinion, misfit)
         candidate = STATES[NORMAL] if leading in _WELL else leading
         if not _is_one_fault(candidate, self._candidate):
@@ -250,7 +249,7 @@ class FaultClassifier:
         is_blind = opinion.wheel in [wheel for wheel, _ in self._unseen.blind]
         if leading is UNKNOWN and misfit.unexplained:
             if self._state in _QUIET:
-                self._enter(UNKNOWN, stamp, None)
+                self._enter(PUSHED if may_be_push else UNKNOWN, stamp, None)
         elif leading is LOW_SUPPLY:
             if self._state in _QUIET or self._is_over(stamp):
                 self._enter(LOW_SUPPLY, stamp, None)
