@@ -248,17 +248,6 @@ def test_what_somebody_who_leans_explains_is_not_unknown() -> None:
     assert names == ["normal", "pushed"]
 
 
-def test_who_leans_on_a_robot_does_not_mend_it() -> None:
-    judge, states = Sure(CONTROL), []
-    classifier = FaultClassifier(judge, outside=Leans(shipped_robot("reference")))
-    for t in range(50, 4000, 50):
-        judge.state = CONTROL if t < 2000 else NORMAL
-        diagnosis = classifier.classify(frame(t, TURNING, TURNING, power=9.0))
-        if diagnosis is not None and diagnosis.changed:
-            states.append(diagnosis.state.name)
-    assert states == ["control system fault"]
-
-
 def test_a_short_stray_is_not_unknown() -> None:
     frames = [
         frame(t, TURNING, TURNING, power=9.0 if t % 1000 < 900 else 0.0)
@@ -281,9 +270,13 @@ def test_what_a_judge_took_from_ignored_commands_is_forgotten() -> None:
     assert judge.cleared == before + 1
 
 
-def test_a_fault_that_is_fading_stays_named_and_is_not_called_unknown() -> None:
+@pytest.mark.parametrize("outside", [None, Leans(shipped_robot("reference"))])
+def test_a_fault_that_is_fading_stays_named_and_is_not_called_unknown(
+    outside: OutsideWatch | None,
+) -> None:
+    """Nor does somebody who leans on the robot mend it."""
     judge = Sure(CONTROL)
-    classifier, states = FaultClassifier(judge), []
+    classifier, states = FaultClassifier(judge, outside=outside), []
     for t in range(50, 4000, 50):
         judge.state = CONTROL if t < 2000 else NORMAL
         diagnosis = classifier.classify(frame(t, TURNING, TURNING, power=9.0))
