@@ -136,6 +136,16 @@ def test_straight_ahead_a_cart_may_be_anything() -> None:
     assert any(item.may_be_push for item in items)
 
 
+def test_while_a_wheel_stands_some_force_explains_the_others() -> None:
+    items = found(frames(fixed(2.5), motion=ahead))
+    assert not any(item.load or item.push for item in items)
+
+
+def test_a_motion_that_does_not_change_has_tried_nothing() -> None:
+    items = found(frames(cart(0.8, -0.2), motion=lambda _: np.array([0.3, 0.15, 0.3])))
+    assert not any(item.load for item in items)
+
+
 def test_a_floor_that_drags_a_little_more_is_no_load() -> None:
     assert first(found(frames(cart(0.25, 0.0)))) == math.inf
 
