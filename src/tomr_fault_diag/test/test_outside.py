@@ -37,6 +37,7 @@ PERIOD = 0.05  # s
 BAND = 1.0  # W
 LEAST = 0.1  # m/s
 
+MORE = np.array([0.8, 0.0, 0.0])  # W
 # Ahead, to the left, turning on the spot, back: a second and a half each.
 WAYS = [
     np.array(way) for way in ([0.4, 0.0, 0.0], [0.0, 0.4, 0.0], [0.0, 0.0, 1.0], [-0.4, 0.1, 0.4])
@@ -187,6 +188,12 @@ def test_what_one_wheel_bears_alone_comes_from_that_wheel(wheel: int, watts: flo
 
 def test_a_healthy_robot_shows_nothing() -> None:
     assert set(found(frames(nothing))) == {NOTHING_ACTS}
+
+
+def test_a_clock_that_begins_at_0_shows_nothing_either() -> None:
+    """Of a motor with a residual now and then, as a simulation begins."""
+    early = (evolve(item, stamp_ns=item.stamp_ns - BASE) for item in frames(nothing, more=MORE))
+    assert set(found(early)) == {NOTHING_ACTS}
 
 
 def test_it_is_over_when_no_motor_shows_it_any_more() -> None:
