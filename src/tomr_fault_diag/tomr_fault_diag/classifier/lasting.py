@@ -142,11 +142,10 @@ class LastingWatch:
         speed = np.array([measured_speed(item) for item in _of(frame, SPEEDS)])
         power = np.array([item.modelled for item in derived])
         way = np.where(speed < 0.0, -1.0, 1.0)
-        per_torque, loss = way / motors.constant, np.zeros(WHEELS)
-        if not motors.reports_currents:
-            current = motors.currents(power, speed, way)
-            per_torque = speed + 2.0 * motors.resistance * current / motors.constant
-            loss = motors.resistance * current**2
+        current = motors.currents(power, speed, way)
+        per_torque, loss = motors.per_torque(speed, current), motors.resistance * current**2
+        if motors.reports_currents:
+            per_torque, loss = way * per_torque, np.zeros(WHEELS)
         moves = (np.abs(speed) > MOVES) / np.array([item.band for item in derived])
         effects = np.array([way * per_torque * self._friction, loss, np.abs(power)])
         return _TYPICAL * effects * moves, (per_torque * moves)[:, None] * self._shares

@@ -100,21 +100,15 @@ class Window:
         """Sum of squares that the best force and moment of one direction leave, in the world or in
         the body, steady, growing or ceasing, and its force if steady, else 0 [N/kg]."""
         time = np.linspace(0.0, 1.0, len(self.yaw))
+        # The axes of the world, and those of the body.
+        shares = [self._shares_at(angle) for angle in (self.yaw, np.zeros(len(self.yaw)))]
         steady, growing, ceasing = (
-            [
-                _left(self.shown, self._shares_at(angle) * course[:, None, None])
-                for angle in self._axes
-            ]
+            [_left(self.shown, axes * course[:, None, None]) for axes in shares]
             for course in (np.ones(len(time)), time, 1.0 - time)
         )
         left, size = min(steady, key=lambda fit: fit[0])
         changing = min(fit[0] for fit in (*growing, *ceasing))
         return (left, float(np.hypot(*size[:2]))) if left <= changing else (changing, 0.0)
-
-    @property
-    def _axes(self) -> tuple[Array, Array]:
-        """Angles to the axes of base_link at which a direction stays: of the world's, none."""
-        return self.yaw, np.zeros(len(self.yaw))
 
     def _shares_at(self, angle: Array) -> Array:
         """Shares of forces along axes at an angle to those of base_link, (n, 3, 3)."""

@@ -67,6 +67,13 @@ class Motors:
         self._laws.motor_currents(self._numbers, motion, drawn.tolist(), both, WHEELS)
         return np.array(both).reshape(WHEELS, 2)
 
+    def per_torque(self, speed: Array, current: Array) -> Array:
+        """How what is measured grows with the torque, at wheel speeds and currents [W/(N m)], or
+        [A/(N m)]."""
+        if self.reports_currents:
+            return 1.0 / self.constant
+        return speed + 2.0 * self.resistance * current / self.constant
+
     def noise(self, robot: Robot) -> float:
         """Standard deviation of one measurement, its resolution included [W], or [A]."""
         noise = math.hypot(robot.sensors.current_noise, robot.sensors.current_resolution)

@@ -72,7 +72,7 @@ class OutsideWatch:
     def __init__(self, robot: Robot, settings: OutsideSettings | None = None) -> None:
         self.settings = settings or OutsideSettings()
         self._motors = Motors(robot)
-        self._torques_per = self._motors.mass * self._motors.from_force
+        self._per_newton = self._motors.mass * self._motors.from_force
         turns = np.arange(_DIRECTIONS) * 2.0 * np.pi / _DIRECTIONS
         ring = robot.robot_radius * np.column_stack([np.cos(turns), np.sin(turns)])
         self._hitches = np.concatenate([np.zeros((1, 2)), *(far * ring for far in _PLACES)])
@@ -147,12 +147,9 @@ class OutsideWatch:
             way = np.where(tick.expected < 0.0, -1.0, 1.0)
             other = tick.current - motors.currents(tick.commanded, tick.expected, way)
             more = np.where(np.abs(other) < np.abs(more), other, more)
-        if motors.reports_currents:
-            return motors.constant * more, 1.0 / motors.constant
         least = np.minimum(np.abs(tick.expected_current), np.abs(tick.current))
         current = np.copysign(least, tick.current)
-        slope = tick.speed + 2.0 * motors.resistance * current / motors.constant
-        return motors.constant * more, np.abs(slope)
+        return motors.constant * more, np.abs(motors.per_torque(tick.speed, current))
 
     def _look(self) -> None:
         """Whether the last ticks show something that acts from outside."""
@@ -163,7 +160,7 @@ class OutsideWatch:
             first = int(np.searchsorted(stamps, self._newest - length))
             if len(stamps) - first >= self.settings.ticks:
                 window = Window(
-                    shown[first:], seen[first:], twist[first:], yaw[first:], self._torques_per
+                    shown[first:], seen[first:], twist[first:], yaw[first:], self._per_newton
                 )
                 for place, is_so in enumerate(astuple(self._judge(window))):
                     self._found_at[place] = self._newest if is_so else self._found_at[place]
