@@ -1,12 +1,14 @@
 """Commissioned robots in MuJoCo whose descriptions lack physics: false alarms, faults, delays.
 
     .venv/bin/python bench/commissioned.py --out DIR [--robots 0 1 2 3] [--hours 1] [--drives 96]
+        [--ramps]
 
 Each robot is drawn from three families, every value up to 5 % off its robot.yaml, which besides
 lacks three effects of the vocabulary. It drives the plan of `tomr_commission` twice and a tour that
 is held out, is commissioned on these, and then drives tours with payloads, floors and bumps as in
 bench/diagnosis.py, healthy or with one of the six states' faults, of seeds that nothing else uses.
-Scored as there, with commissioned.yaml. What is done is kept in DIR and not done again.
+With --ramps the healthy tours lead over slopes of up to five degrees most of the time. Scored as
+there, with commissioned.yaml. What is done is kept in DIR and not done again.
 """
 
 import argparse
@@ -28,6 +30,7 @@ from concealed.robots import described as described_robot
 from concealed.robots import description_text
 from diagnosis import Kind, named_by, rebanded, score_faulty, score_healthy
 from diagnosis_report import Outcome, publish, report
+from ramps import over_ramps
 from record import record_mission
 from tqdm import tqdm
 
@@ -141,20 +144,32 @@ def tour(number: int, folder: Path, seed: int, fault: str | None) -> Drive:
     return evolve(chosen, bumps=bumps(believed, random, count, chosen.length))
 
 
-def scored(task: tuple[int, int, str | None, Path]) -> Outcome:
+@frozen
+class Task:
     """One drive of a commissioned robot."""
-    number, seed, fault, folder = task
-    kind, believed = commissioned_kind(folder)
-    chosen = tour(number, folder, seed, fault)
+
+    number: int
+    seed: int
+    fault: str | None  # as `tour`
+    folder: Path
+    ramps: bool = False
+
+
+def scored(task: Task) -> Outcome:
+    """How it is diagnosed."""
+    kind, believed = commissioned_kind(task.folder)
+    chosen = tour(task.number, task.folder, task.seed, task.fault)
+    if task.ramps:
+        chosen = over_ramps(chosen)
     labelled = simulated_drive(chosen)
     named = named_by(kind, rebanded(labelled.frames, kind.bands), believed)
-    if fault is None:
+    if task.fault is None:
         return score_healthy(labelled, named)
     rows = labelled.first - 1 + np.arange(len(labelled.frames))
     return score_faulty(chosen, labelled, healthy_twin(chosen).of_ticks(rows), named)
 
 
-def _outcomes(title: str, tasks: Sequence[tuple[int, int, str | None, Path]]) -> list[Outcome]:
+def _outcomes(title: str, tasks: Sequence[Task]) -> list[Outcome]:
     with ProcessPoolExecutor(os.cpu_count()) as pool:
         found = pool.map(scored, tasks)
         return list(tqdm(found, total=len(tasks), desc=title, unit="drive"))
@@ -169,6 +184,7 @@ def _main(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--hours", type=float, default=1.0, help="healthy, of all robots together")
     parser.add_argument("--drives", type=int, default=96, help="with a fault, of all together")
     parser.add_argument("--skip", type=int, default=0, help="of each robot's drives with a fault")
+    parser.add_argument("--ramps", action="store_true", help="healthy tours lead over ramps")
     parser.add_argument("--json", type=Path, help="write the report to this file as well")
     options = parser.parse_args(arguments)
     folders = {number: options.out / f"robot_{number}" for number in options.robots}
@@ -177,18 +193,19 @@ def _main(arguments: Sequence[str] | None) -> int:
         robots.append(commissioned(number, folder))
         print(json.dumps(robots[-1]), flush=True)
 
-    def tasks(count: int, first: int, fault: str | None) -> list[tuple[int, int, str | None, Path]]:
+    def tasks(count: int, first: int, fault: str | None, ramps: bool = False) -> list[Task]:
         found = []
         for index in range(count):
             number, k = options.robots[index % len(folders)], index // len(folders)
             seed = _FIRST_SEED + _ROBOT * number + first + k
-            found.append((number, seed, fault, folders[number]))
+            found.append(Task(number, seed, fault, folders[number], ramps))
         return found
 
     healthy = math.ceil(options.hours * 3600.0 / _DRIVE_SECONDS)
     sick = _outcomes("faulty", tasks(options.drives, _FAULTY + options.skip, "fault"))
-    well = _outcomes("healthy", tasks(healthy, _HEALTHY, None))
-    publish({"robots": robots, "diagnosis": report(sick, well)}, options.json)
+    well = _outcomes("healthy", tasks(healthy, _HEALTHY, None, options.ramps))
+    if sick or well:
+        publish({"robots": robots, "diagnosis": report(sick, well)}, options.json)
     return 0
 
 

@@ -21,7 +21,6 @@ from tqdm import tqdm
 from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.severity import Severity, SeverityWatch
-from tomr_fault_diag.classifier.slides import SlideWatch
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.classifier.states import DRAGGING, FAULTLESS, MOTOR, STATES
 from tomr_fault_diag.residuals.frame import ResidualFrame
@@ -129,7 +128,7 @@ def driven(task: tuple[str, int, int]) -> Found:
     change, seed, tours = task
     robot = random_drive(shipped_robot("reference"), seed, None).believed
     watch = SeverityWatch(robot)
-    classifier = FaultClassifier(make_judge(ClassifierSettings()), watch, slides=SlideWatch(robot))
+    classifier = FaultClassifier.around(make_judge(ClassifierSettings()), robot, watch)
     alarms: Counter[str] = Counter()
     named, ticks, reported = None, 0, watch.conditions
     for _, frame in _frames(change, seed, tours):

@@ -264,7 +264,7 @@ def test_a_tick_that_lacks_something_says_nothing(
     watch = LastingWatch(ROBOT)
     said = [watch.take(item, True) for item in [*ticks[:60], gone, *ticks[61:]]]
     assert not said[60].any()
-    assert said[-1][DRAGS.start + 1] > 0.0  # it goes on
+    assert max(one[DRAGS.start + 1] for one in said[70:]) > 0.0  # it goes on
 
 
 @pytest.mark.parametrize("channels", [range(1, 10), ENCODERS])
@@ -280,31 +280,70 @@ def test_absurd_numbers_are_survived(channels: range) -> None:
     watch = LastingWatch(ROBOT)
     said = [watch.take(item, True) for item in [*ticks[:40], wild, *ticks[41:]]]
     assert np.isfinite(said).all()
-    assert said[-1][DRAGS.start + 1] > 0.0
+    assert max(one[DRAGS.start + 1] for one in said[70:]) > 0.0
 
 
-def test_currents_show_what_drags() -> None:
-    document = evolve(
+def of_currents(number: int, more: Array, band: float, signed: bool) -> ResidualFrame:
+    """A tick at which motors draw two amperes the way they turn, and so much more."""
+    way = np.sign(speeds(number)) if signed else np.ones(3)
+    items = [
+        Residual(o, band, m, "A")
+        for o, m in zip((way * more).tolist(), (2.0 * way).tolist(), strict=True)
+    ]
+    turning = [Residual(0.0, 0.5, want, "rad/s") for want in speeds(number).tolist()]
+    unknown = Residual(math.nan, math.nan, math.nan, "A", "not measured")
+    return ResidualFrame(BASE + TICK * number, (unknown, *items, *turning, *items))
+
+
+@pytest.mark.parametrize("signed", [True, False])
+def test_currents_show_what_drags_either_way(signed: bool) -> None:
+    robot = evolve(
+        ROBOT, measurement=evolve(ROBOT.measurement, quantity="motor_current", signed=signed)
+    )
+    motors = Motors(robot)
+    drawn = motors.friction(5.0) / motors.constant * [0.0, 1.0, 0.0]
+    ticks = [of_currents(n, drawn, float(drawn[1]) / 0.6, signed) for n in range(4 * SECOND)]
+    for first in (0, 2 * SECOND - 10):  # of the wheels' ways
+        found = gathered(ticks[first:], robot)
+        assert found[DRAGS.start + 1] > 24.0
+        assert found[WEAKS].max() == 0.0
+    watch = LastingWatch(robot)
+    said = [watch.take(tick, True)[DRAGS.start + 1] for tick in ticks]
+    assert min(said[2 * SECOND : 3 * SECOND]) > 6.0  # as soon as the wheels turn the other way
+
+
+def test_a_sensor_of_signed_currents_is_off_either_way() -> None:
+    robot = evolve(
         ROBOT, measurement=evolve(ROBOT.measurement, quantity="motor_current", signed=True)
     )
-    motors = Motors(document)
-    drawn = motors.friction(5.0) / motors.constant
-    band = float(drawn[1]) / 0.6
+    more = np.array([0.0, 0.0, 0.6])
+    ticks = [of_currents(n, more, 1.0, signed=True) for n in range(4 * SECOND)]
+    watch = LastingWatch(robot)
+    said = [watch.take(tick, True)[METERS.start + 2] for tick in ticks]
+    assert min(said[2 * SECOND : 3 * SECOND]) > 6.0
 
-    def tick(number: int) -> ResidualFrame:
-        way = np.sign(speeds(number))
-        current = 2.0 * way
-        off = np.where(np.arange(3) == 1, drawn, 0.0) * way
-        items = [
-            Residual(o, band, m, "A") for o, m in zip(off.tolist(), current.tolist(), strict=True)
-        ]
-        turning = [Residual(0.0, 0.5, want, "rad/s") for want in speeds(number).tolist()]
-        unknown = Residual(math.nan, math.nan, math.nan, "A", "not measured")
-        return ResidualFrame(BASE + TICK * number, (unknown, *items, *turning, *items))
 
-    found = gathered([tick(number) for number in range(4 * SECOND)], document)
-    assert found[DRAGS.start + 1] > 24.0
-    assert found[WEAKS].max() == 0.0
+def uphill(tick: int, turning: Array, azimuth: float) -> ResidualFrame:
+    """Straight ahead with wheels that turn so fast [rad/s], where a slope pulls with 0.25 N/kg."""
+    current = 2.0 * np.sign(turning)
+    power = WHEELS.resistance * current**2 + WHEELS.constant * turning * current + WHEELS.idle
+    along = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+    torque = 0.25 * WHEELS.mass * (WHEELS.from_force @ along)
+    shown = (turning + 2.0 * WHEELS.resistance * current / WHEELS.constant) * torque + noise(tick)
+    motors = [Residual(o, 2.0, m) for o, m in zip(shown.tolist(), power.tolist(), strict=True)]
+    speeds = [Residual(0.0, 0.5, want, "rad/s") for want in turning.tolist()]
+    return ResidualFrame(
+        BASE + TICK * tick,
+        (Residual(float(shown.sum()), 3.0 * BAND, 30.0), *motors, *speeds, *motors),
+    )
+
+
+@pytest.mark.parametrize("azimuth", np.arange(0.0, 6.2, 0.4))
+def test_a_slope_is_no_fault_of_the_wheel_that_bears_most_of_it(azimuth: float) -> None:
+    """One wheel stands; of the two that turn a slope across the other's way loads one alone."""
+    turning = np.array([-8.0, 8.0, 0.0])
+    found = gathered([uphill(t, turning, azimuth) for t in range(4 * SECOND)])
+    assert found[DRAGS.start : WEAKS.stop].max() < 12.0
 
 
 def test_it_is_looked_for_where_that_is_asked_for_alone() -> None:

@@ -2,22 +2,24 @@
 
 import math
 from collections.abc import Callable
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 from attrs import evolve
 from numpy.typing import NDArray
 
-from tomr_fault_diag.classifier.belief import DRAGS, ENCODERS, EXTERNAL, OTHER
+from tomr_fault_diag.classifier.belief import DRAGS, ENCODERS, EXTERNAL, LOADED, OTHER
 from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.evidence import Beside, said_by_forces
-from tomr_fault_diag.classifier.judges import WindowJudge, make_judge
+from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import Unseen
+from tomr_fault_diag.classifier.outside import NOTHING_ACTS, Outside
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.slides import SlideWatch
 from tomr_fault_diag.classifier.stage import FaultClassifier
-from tomr_fault_diag.classifier.states import SLIP
+from tomr_fault_diag.classifier.states import NORMAL, SLIP, STATES
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_power_model.robot import shipped_robot
 from tomr_power_model.slides.body import body_of
@@ -258,6 +260,29 @@ def test_what_forces_say_by_hand() -> None:
     assert newest(Contacts(0.9), off=1.0).tolist() == newest(NOTHING, off=1.0).tolist()
 
 
+def newest_beside(slides: float, outside: Outside) -> Array:
+    """What a second of frames says of the states, with what is seen to act on the body."""
+    judge = make_judge(ClassifierSettings())
+    assert isinstance(judge, WindowJudge)
+    still = np.zeros(3)
+    for tick in range(20):
+        item = frame(tick, np.array([3.0, -8.0, 5.0]), still, 4.0 + still)
+        judge.judge(item, 50 * MS, Unseen(), Beside(Contacts(slides), outside))
+    return judge._recent[-1]
+
+
+def test_what_a_slope_explains_is_neither_a_load_nor_a_slip_of_wheels_that_grip() -> None:
+    plain = newest_beside(0.0, NOTHING_ACTS)
+    pulled = Outside(may_be_push=True)
+    said = newest_beside(0.0, pulled) - plain
+    assert said[[SLIP, LOADED]] == pytest.approx(-10.0)
+    assert np.delete(said, [SLIP, LOADED]) == pytest.approx(0.0)
+    for slides in (0.2, math.nan):
+        said = newest_beside(slides, pulled) - newest_beside(slides, NOTHING_ACTS)
+        assert said[LOADED] == pytest.approx(-10.0)
+        assert np.delete(said, LOADED) == pytest.approx(0.0)
+
+
 def borne(wheel: int, share: float, begin: float, end: float) -> Forces:
     """One wheel pushes beyond rolling, by a share of the robot's mass [N/kg]."""
 
@@ -292,6 +317,49 @@ def test_a_wheel_that_bears_a_force_alone_is_known_after_a_fifth_of_a_second(whe
 )
 def test_what_may_come_from_outside_no_wheel_bears_alone(forces: Forces) -> None:
     assert set(lone(frames(forces))) == {None}
+
+
+def first_force(forces: Forces) -> float:
+    """When a force on the body is first known to explain all [s], 9 if never."""
+    watch = SlideWatch(ROBOT)
+    found = [watch.take(item).force for item in frames(forces, 6.0)]
+    return 0.05 * (1 + found.index(True)) if any(found) else 9.0
+
+
+@pytest.mark.parametrize("azimuth", [0.6, 2.2, 4.0])
+def test_a_slope_is_known_within_two_seconds(azimuth: float) -> None:
+    pull = 0.6 * BODY.mass * np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+    assert 2.4 < first_force(pushed(pull, 2.2, 9.0)) < 4.2
+
+
+@pytest.mark.parametrize(
+    "forces",
+    [
+        pytest.param(rolling, id="nothing"),
+        pytest.param(pushed(BODY.mass * np.array([2.0, 1.0, 0.1]), 2.2, 2.35), id="a shove"),
+        pytest.param(pushed(BODY.mass * np.array([0.1, 0.05, 0.0]), 2.2, 9.0), id="hardly one"),
+        pytest.param(pushed(BODY.mass * np.array([0.0, 0.0, 0.5]), 2.2, 9.0), id="a moment"),
+        pytest.param(borne(1, 0.8, 2.2, 9.0), id="one wheel"),
+    ],
+)
+def test_nothing_else_is_a_slope(forces: Forces) -> None:
+    assert first_force(forces) == 9.0
+
+
+def test_a_slide_is_no_slope() -> None:
+    assert first_force(Slippery()) == 9.0
+
+
+@pytest.mark.parametrize(("force", "called"), [(True, "pushed"), (False, "unknown")])
+def test_what_is_far_off_on_a_slope_is_not_unknown(force: bool, called: str) -> None:
+    contacts = Mock(spec=SlideWatch)
+    contacts.take.return_value = Contacts(0.0, force=force)
+    judge = Mock(spec=WindowJudge, settings=ClassifierSettings())
+    judge.judge.return_value = Opinion(np.eye(18)[0], True, None, STATES[NORMAL])
+    classifier = FaultClassifier(judge, slides=contacts)
+    far = pushed(BODY.mass * np.array([0.7, 0.5, 0.0]), 2.2, 9.0)
+    said = [classifier.classify(item) for item in frames(far, 6.0)]
+    assert {one.state.name for one in said if one is not None} == {"normal", called}
 
 
 def test_wheels_that_take_turns_bear_nothing_for_long() -> None:

@@ -31,13 +31,14 @@ class Contacts:
 
     `slides`: how likely a wheel does, NaN where that is not known; `lone`: the wheel 0..2 that
     alone bears more, and for longer, than any push from outside; `unmoved`: the one that alone
-    bears more and shows no motion in two ticks; `calm`: for long nothing has left its band that a
-    slide would move.
+    bears more and shows no motion in two ticks; `force`: one on the body that stays, as on a slope,
+    explains what all hand on; `calm`: for long nothing has left its band that a slide would move.
     """
 
     slides: float = math.nan
     lone: int | None = None
     unmoved: int | None = None
+    force: bool = False
     calm: bool = False
 
 
@@ -58,8 +59,9 @@ class LoneWheelWatch:
         self._since = 0  # ns, when it began to bear a force alone ...
         self._unmoved_since: int | None = None  # ... and to stand, in all ticks since
 
-    def take(self, tick: Tick, slides: float) -> Contacts:
-        """Which wheels bear a force alone, beside how likely one slides."""
+    def take(self, tick: Tick, slides: float, force: bool = False) -> Contacts:
+        """Which wheels bear a force alone, beside how likely one slides, and whether a force on the
+        body explains all."""
         wheel, now = _alone(tick), tick.stamp_ns
         if wheel is None or wheel != self._wheel:
             self._wheel, self._since, self._unmoved_since = wheel, now, None
@@ -69,7 +71,8 @@ class LoneWheelWatch:
             self._unmoved_since = now
         stopped = self._unmoved_since is not None and now - self._unmoved_since >= _STOPPED
         is_lone = now - self._since >= _LONGER
-        return Contacts(slides, wheel if is_lone else None, wheel if stopped else None)
+        lone, unmoved = wheel if is_lone else None, wheel if stopped else None
+        return Contacts(slides, lone, unmoved, force)
 
     def _stands(self, tick: Tick, wheel: int) -> bool:
         """Whether a wheel shows no motion where it should turn plainly."""

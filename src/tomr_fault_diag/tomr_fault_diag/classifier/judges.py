@@ -30,6 +30,7 @@ from tomr_fault_diag.classifier.belief import (
     named_of,
     of_states,
 )
+from tomr_fault_diag.classifier.contacts import Contacts
 from tomr_fault_diag.classifier.evidence import ALONE, Beside, astray, said_by_forces, said_by_gyro
 from tomr_fault_diag.classifier.features import CHANNELS, WINDOW, channels_of, turning
 from tomr_fault_diag.classifier.network import Network
@@ -83,6 +84,7 @@ _SLIGHT = 1.0
 _SHAKEN, _DOUBTED = 12, 2.0
 # What is seen to act on the body for seconds is so much likelier than what a window looks like.
 _SHARED, _LOADED = 10.0, 24.0
+_GRIPS = 0.1  # likelihood of a slide
 _MOST_GATHERED = 24.0  # nats: what ended long ago must not count for long
 GATHERED = 12.0  # nats, that small faults which last have shown, in place of a striking window
 _HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
@@ -117,6 +119,7 @@ class _Weighed:
     is_calm: bool  # all lies within bands that are the robot's own
     lasting: Array  # by small faults that last
     outside: Outside  # what acts on the body
+    contacts: Contacts  # and what their forces show
 
 
 class Judge(Protocol):
@@ -184,7 +187,7 @@ class WindowJudge:
         self._slot = slot
         said = said_by_gyro(frame, beside.borne_out) + said_by_forces(frame, beside.contacts)
         is_calm = beside.contacts.calm and bool(self.settings.commissioned)
-        weighed = _Weighed(said, is_calm, beside.lasting, beside.outside)
+        weighed = _Weighed(said, is_calm, beside.lasting, beside.outside, beside.contacts)
         for _ in range(count):
             self._opinion = self._step(frame, unseen, weighed)
             # A size is fitted to what is new in a tick, however long it stands for.
@@ -204,7 +207,7 @@ class WindowJudge:
             likelihoods[SLIP] -= _DOUBTED
         if not self._shaken:
             likelihoods = self._with_lasting(likelihoods, weighed.lasting)
-        likelihoods = _with_outside(of_states(likelihoods + said), weighed.outside)
+        likelihoods = _with_outside(of_states(likelihoods + said), weighed)
         shares = self._belief.update(likelihoods)
         self._shaken = _SHAKEN if shares[EXTERNAL] > 0.5 else max(self._shaken - 1, 0)
         striking = _ratios(likelihoods)
@@ -302,11 +305,15 @@ class WindowJudge:
         return best
 
 
-def _with_outside(likelihoods: Array, outside: Outside) -> Array:
+def _with_outside(likelihoods: Array, weighed: _Weighed) -> Array:
     """With what acts on the body: a window is short beside the seconds that show it."""
-    found = likelihoods.copy()
+    found, outside = likelihoods.copy(), weighed.outside
     if outside.push or outside.load:  # all wheels feel it: none is accused
         found[CONTROLS.start : METERS.stop] -= _SHARED
+    if outside.may_be_push:
+        found[LOADED] -= _SHARED
+        if weighed.contacts.slides < _GRIPS:  # nor where it is NaN
+            found[SLIP] -= _SHARED
     if outside.load:
         found[LOADED] = likelihoods.max() + _LOADED
     return found

@@ -11,7 +11,7 @@ of the axle's friction tau, a winding's loss and the power shown (tau / k and i 
 measured), and how much better than nothing it predicts the next tick is evidence, which the belief
 gathers. No more counts than is left
 
-- by a force on the body, which is shared out among the wheels,
+- by a force on the body, which is shared out among the wheels, sudden, or of a slope,
 - by the total power, which tells a motor that draws more from a sensor that shows more,
 - of what the other wheels show as well, as on a carpet, and of what came within minutes, as heat.
 """
@@ -21,6 +21,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.belief import DRAGS, HYPOTHESES, METERS, WEAKS
+from tomr_fault_diag.classifier.forces import SteadyForce, by_sudden_force
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.severity.tick import MOVES
 from tomr_fault_diag.residuals.frame import (
@@ -77,6 +78,8 @@ class LastingSettings:
     little: float = 0.08  # bands by which a healthy robot's residuals may lie off nothing
     clip: float = 2.0  # bands: what is larger is the network's
     forces: tuple[float, ...] = (0.1, 0.3, 1.0)  # N/kg, deviations of a force on the body
+    steady: float = 1.0  # N/kg, deviation of one that stays
+    alike: float = 0.5  # by which a fault and such a force explain the same
     lever: float = 0.3  # of the robot's radius, at which it acts
     worth: float = 6.0  # that a tick counts: most robots scatter less
     most: float = 2.0  # that it says
@@ -94,6 +97,8 @@ class LastingWatch:
         self._friction = motors.friction(_SPEED)
         lever = self.settings.lever * robot.robot_radius
         self._shares = motors.mass * motors.from_force * np.array([1.0, 1.0, lever])
+        s = self.settings
+        self._steady = SteadyForce(s.memory, s.steady, s.scatter)
         self.clear()
 
     def clear(self) -> None:
@@ -101,6 +106,7 @@ class LastingWatch:
         self._newest = 0  # ns
         self._resumes = 0  # ns
         self._said = np.zeros(HYPOTHESES)
+        self._steady.clear()
         # Sums of phi^2 and phi r, (3, 3): faults and wheels; and of all faults at each wheel.
         self._squares = np.zeros((_COUNT, WHEELS))
         self._products = np.zeros((_COUNT, WHEELS))
@@ -129,7 +135,9 @@ class LastingWatch:
         sudden = shown - self._came_slowly(effects)
         if is_well:
             self._learn_slowly(shown, effects, elapsed)
-        found = self._predicted(sudden, effects, shared, frame)
+        turning = float(self._motors.to_twist[2] @ [measured_speed(i) for i in _of(frame, SPEEDS)])
+        steady = self._steady.take(sudden, shared, elapsed, turning)
+        found = self._predicted(sudden, effects, shared, steady, frame)
         self._learn(sudden, effects, elapsed)
         for fault, row in zip(FAULTS, found, strict=True):
             self._said[fault.hypotheses] = self.settings.worth * row
@@ -145,13 +153,15 @@ class LastingWatch:
         current = motors.currents(power, speed, way)
         per_torque, loss = motors.per_torque(speed, current), motors.resistance * current**2
         if motors.reports_currents:
-            per_torque, loss = way * per_torque, np.zeros(WHEELS)
+            loss = np.zeros(WHEELS)
+            if not motors.reports_signs:
+                per_torque = way * per_torque
         moves = (np.abs(speed) > MOVES) / np.array([item.band for item in derived])
-        effects = np.array([way * per_torque * self._friction, loss, np.abs(power)])
+        effects = np.array([way * per_torque * self._friction, loss, power])
         return _TYPICAL * effects * moves, (per_torque * moves)[:, None] * self._shares
 
     def _predicted(
-        self, sudden: Array, effects: Array, shared: Array, frame: ResidualFrame
+        self, sudden: Array, effects: Array, shared: Array, steady: float, frame: ResidualFrame
     ) -> Array:
         """How much better each fault predicts a tick than nothing does, or a force on the body,
         and what the total power leaves of it, (3, 3)."""
@@ -161,7 +171,10 @@ class LastingWatch:
         mean = size * effects
         little = np.maximum(_NEGLIGIBLE / _TYPICAL * np.abs(effects), s.little)
         found = _better(sudden, np.clip(mean, -little, little), mean, s.scatter)
-        found = np.minimum(found - _by_force(sudden, shared, s), s.most)
+        found -= by_sudden_force(sudden, shared, s.forces, s.scatter)
+        beyond = _better(sudden, np.zeros(1), mean, s.scatter) - steady
+        beyond = np.sign(beyond) * np.maximum(np.abs(beyond) - s.alike, 0.0)
+        found = np.minimum(np.minimum(found, beyond), s.most)
         return np.maximum(found + self._against(mean, frame), s.least)
 
     def _against(self, mean: Array, frame: ResidualFrame) -> Array:
@@ -223,17 +236,3 @@ def _beyond_others(size: Array) -> Array:
 def _better(shown: Array, nothing: Array, mean: Array, scatter: float) -> Array:
     """Log-likelihood of one mean over that of another."""
     return np.asarray(((shown - nothing) ** 2 - (shown - mean) ** 2) / (2.0 * scatter**2))
-
-
-def _by_force(shown: Array, shared: Array, s: LastingSettings) -> float:
-    """Log-likelihood of a force on the body over none, as strong as explains most; at least 0.
-
-    `shared`: what forces along and across and a moment do to the wheels, (3, 3).
-    """
-    variances, ways = np.linalg.eigh(shared @ shared.T)
-    seen = (ways.T @ shown) ** 2 / s.scatter**2
-    most = 0.0
-    for force in s.forces:
-        ratio = 1.0 + force**2 * np.maximum(variances, 0.0) / s.scatter**2
-        most = max(most, 0.5 * float(np.sum(seen * (1.0 - 1.0 / ratio) - np.log(ratio))))
-    return most

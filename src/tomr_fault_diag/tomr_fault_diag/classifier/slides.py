@@ -25,7 +25,7 @@ from tomr_fault_diag.residuals.frame import BAND_SIGMAS, ENCODERS, Residual, Res
 from tomr_power_model.model.ticks import NANOSECONDS, to_ns
 from tomr_power_model.robot import Robot
 from tomr_power_model.slides.body import body_of, rolling_forces
-from tomr_power_model.slides.particles import Pair, Particles, ParticleSettings
+from tomr_power_model.slides.particles import Pair, Particles, ParticleSettings, Pull
 
 Array = NDArray[np.float64]
 
@@ -33,9 +33,14 @@ _SLOT = to_ns(0.05)  # of faster ticks the first in each is taken
 _LONGEST = to_ns(0.11)  # between two ticks that show an acceleration
 _BEFORE = to_ns(1.0)  # with which particles begin, before the first hint of a slide
 _CALM = to_ns(2.0)  # without one, and they rest
+_RAMPS = 0.1  # 1/s, at which it comes to a slope, or to its end
 _SHOVED = 1.0  # 1/s, at which somebody may shove a robot that shows something
 _POWER_SHARE = 0.01  # of a measured power that is not known
 _LEAST_SLOPE = 2.0  # W/A
+_GRIPS = 0.1  # likelihood of a slide
+_STEEP = 0.2  # N/kg
+_PLAIN = 3.0  # standard deviations of a force that is there
+_OFF = 1.2  # standard deviations of what it leaves
 _LEAST_YAW = 0.02  # rad/s, standard deviation of a gyro beside the wheels
 
 
@@ -47,7 +52,7 @@ class SlideWatch:
         self._body, self._radius = body_of(robot)
         dry = np.array(robot.everywhere("friction.coulomb", "torque")) / self._radius
         self._drag = robot.everywhere("contact.roller_drag", "coefficient")[0]
-        settings = ParticleSettings(shoved=_SHOVED)
+        settings = ParticleSettings(ramps=_RAMPS, shoved=_SHOVED)
         self._particles = Particles(self._body, dry, self._drag, settings)
         sensors = robot.sensors
         quantum = sensors.encoder_resolution * NANOSECONDS / _SLOT
@@ -112,7 +117,9 @@ class SlideWatch:
                 std = max(yaw.band / BAND_SIGMAS, _LEAST_YAW)
                 self._particles.turns(yaw.modelled + yaw.residual, std)
             self._particles.step((tick.stamp_ns - last.stamp_ns) / NANOSECONDS, rims)
-            return self._lone.take(tick, self._particles.slides(rims).any_probability)
+            slides = self._particles.slides(rims).any_probability
+            force = slides < _GRIPS and _is_plain(self._particles.pull())
+            return self._lone.take(tick, slides, force)
 
     def _weigh(self, tick: Tick, rims: Array) -> None:
         """Hand on what the powers show of the contacts."""
@@ -153,3 +160,8 @@ def _is_hint(frame: ResidualFrame) -> bool:
 
 def _is_outside(item: Residual) -> bool:
     return abs(item.residual) > item.band  # false where either is NaN
+
+
+def _is_plain(pull: Pull) -> bool:
+    """Whether a force stays that is known well, and explains what all contacts hand on."""
+    return float(np.hypot(*pull.mean)) > max(_STEEP, _PLAIN * pull.std) and pull.off < _OFF

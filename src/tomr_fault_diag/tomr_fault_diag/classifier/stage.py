@@ -212,6 +212,8 @@ class FaultClassifier:
         self._unseen = evolve(self._motion.take(frame), blind=data.blind)
         contacts = NOTHING if self._slides is None else self._slides.take(frame)
         outside = NOTHING_ACTS if self._outside is None else self._outside.take(frame)
+        if contacts.force:
+            outside = evolve(outside, may_be_push=True)
         misfit, self._usable = self._misfits.take(frame, self.settings.low_supply), data.usable
         if not data.usable:
             self._pause(frame, data)

@@ -257,3 +257,32 @@ def test_shoves_come_and_go() -> None:
     particles._slope[:], particles._drag[:] = 0.0, 0.0
     assert particles._wrench()[:, :2] == pytest.approx(particles._shove)
     assert not Particles(BODY, FRICTION, 0.0)._shove.any()
+
+
+def test_ramps_come_and_go() -> None:
+    """One in a second, for ten seconds, steep and less steep; without them a slope stays."""
+    settings = ParticleSettings(ramps=1.0, slope=0.5, walk_slope=0.0, regain=0.0)
+    sloping, level = (
+        Particles(BODY, FRICTION, 0.0, settings),
+        Particles(BODY, FRICTION, 0.0, settings._replace(ramps=0.0)),
+    )
+    for particles in (sloping, level):
+        particles._slope[:] = [3.0, 0.0]
+        for _ in range(500):
+            particles.step(STEP, np.zeros(3))
+    assert (level._slope == [3.0, 0.0]).all()
+    changed = sloping._slope[:, 0] != 3.0
+    assert changed.mean() > 0.99
+    assert sloping._slope[changed].std() == pytest.approx(0.5, rel=0.15)
+
+
+def test_what_pulls_by_hand() -> None:
+    particles = Particles(BODY, FRICTION, 0.0)
+    particles._weight[:] = 0.0
+    particles._weight[:2] = [0.25, 0.75]
+    particles._slope[:2] = [[0.4, 0.2], [0.8, 0.2]]
+    particles._off[:2] = [[0.0, 2.0, 1.0], [0.0, 0.0, 1.0]]
+    pull = particles.pull()
+    assert pull.mean == pytest.approx([0.7, 0.2])
+    assert pull.std == pytest.approx(0.4 * np.sqrt(0.25 * 0.75))
+    assert pull.off == pytest.approx(1.0)

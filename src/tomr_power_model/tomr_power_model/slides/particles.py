@@ -54,6 +54,7 @@ class ParticleSettings(NamedTuple):
     drag: float = 0.3  # of the rollers' drag
     dragging: float = 0.2  # share of floors on which rollers drag by anything up to
     drag_most: float = 0.4
+    ramps: float = 0.0  # 1/s, at which a robot comes to a slope, or to its end
     shoved: float = 0.0  # 1/s, at which somebody shoves the robot
     shove: float = 1.5  # N per kg of the robot, standard deviation of each direction
     shove_ends: float = 6.0  # 1/s
@@ -76,6 +77,15 @@ class Slides:
     force: Array  # of each contact [N]
     probability: Array  # that each wheel slides
     any_probability: float  # that any wheel does
+
+
+@frozen
+class Pull:
+    """A force on the body that stays, of a slope or of whatever pulls."""
+
+    mean: Array  # along the axes of the world [N/kg], (2,)
+    std: float  # of the less certain of the two [N/kg]
+    off: float  # standard deviations by which forces have been off of late, at the worst wheel
 
 
 class Particles:
@@ -160,6 +170,15 @@ class Particles:
             any_probability=float(self._weight @ sliding.any(axis=1)),
         )
 
+    def pull(self) -> Pull:
+        """What they say of the force that stays."""
+        mean = self._weight @ self._slope
+        return Pull(
+            mean=mean,
+            std=float(np.sqrt((self._weight @ (self._slope - mean) ** 2).max())),
+            off=float(np.sqrt((self._weight @ self._off**2).max())),
+        )
+
     def _change(self, dt: float, rims: Array) -> None:
         """Floors change, and wheels find their grip again."""
         s, random, n = self._set, self._random, self._set.particles
@@ -181,6 +200,9 @@ class Particles:
             self._shove[random.random(n) < s.shove_ends * dt] = 0.0
             hit = np.flatnonzero(random.random(n) < s.shoved * dt)
             self._shove[hit] = s.shove * self._body.mass * random.standard_normal((len(hit), 2))
+        if s.ramps:
+            onto = np.flatnonzero(random.random(n) < s.ramps * dt)
+            self._slope[onto] = s.slope * random.standard_normal((len(onto), 2))
         self._traction *= np.exp(s.wander * math.sqrt(dt) * random.standard_normal(n))
         np.clip(self._traction, 0.5 * s.least, 1.2 * s.most, out=self._traction)
         self._slope += s.walk_slope * math.sqrt(dt) * random.standard_normal((n, 2))
