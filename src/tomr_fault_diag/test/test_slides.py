@@ -15,7 +15,7 @@ from tomr_fault_diag.classifier.evidence import Beside, said_by_forces
 from tomr_fault_diag.classifier.judges import Opinion, WindowJudge, make_judge
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import Unseen
-from tomr_fault_diag.classifier.outside import NOTHING_ACTS, Outside
+from tomr_fault_diag.classifier.outside import NOTHING_ACTS, Outside, OutsideWatch
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.slides import SlideWatch
 from tomr_fault_diag.classifier.stage import FaultClassifier
@@ -346,8 +346,37 @@ def test_nothing_else_is_a_slope(forces: Forces) -> None:
     assert first_force(forces) == 9.0
 
 
+def test_a_slope_is_known_for_half_a_second_more_where_the_motion_changes() -> None:
+    watch = SlideWatch(ROBOT)
+    items = frames(pushed(0.6 * BODY.mass * np.array([math.cos(0.6), math.sin(0.6), 0.0]), 2.2, 9))
+    seen = [watch.take(item).force for item in items]
+    assert seen[-1]
+    watch._particles._slope[:] = 0.0  # as if there were none any more
+    watch._particles._set = watch._particles._set._replace(ramps=0.0, regain=0.0)
+    later = [
+        watch.take(evolve(items[-1], stamp_ns=items[-1].stamp_ns + 50 * tick * MS)).force
+        for tick in range(1, 15)
+    ]
+    assert later == [True] * 10 + [False] * 4
+
+
 def test_a_slide_is_no_slope() -> None:
     assert first_force(Slippery()) == 9.0
+
+
+def test_what_drags_is_no_load_where_a_slope_explains_it() -> None:
+    contacts, outside = Mock(spec=SlideWatch), Mock(spec=OutsideWatch)
+    judge = Mock(spec=WindowJudge, settings=ClassifierSettings())
+    judge.judge.return_value = Opinion(np.eye(18)[0], True, None, STATES[NORMAL])
+    outside.take.return_value = Outside(load=True)
+    classifier = FaultClassifier(judge, slides=contacts, outside=outside)
+    for force in (True, False):
+        contacts.take.return_value = Contacts(0.0, force=force)
+        for item in frames(rolling, 6.0):
+            classifier.classify(item)
+        beside = judge.judge.call_args.args[3]
+        assert beside.outside == Outside(load=not force, may_be_push=force)
+        classifier.clear()
 
 
 @pytest.mark.parametrize(("force", "called"), [(True, "pushed"), (False, "unknown")])

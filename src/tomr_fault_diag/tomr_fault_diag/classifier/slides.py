@@ -39,6 +39,8 @@ _POWER_SHARE = 0.01  # of a measured power that is not known
 _LEAST_SLOPE = 2.0  # W/A
 _GRIPS = 0.1  # likelihood of a slide
 _STEEP = 0.2  # N/kg
+_HOLDS = to_ns(0.5)  # where the motion changes
+_NEVER = -to_ns(3600.0)  # before any stamp
 _PLAIN = 3.0  # standard deviations of a force that is there
 _OFF = 1.2  # standard deviations of what it leaves
 _LEAST_YAW = 0.02  # rad/s, standard deviation of a gyro beside the wheels
@@ -71,6 +73,7 @@ class SlideWatch:
     def _rest(self) -> None:
         self._awake_until = 0  # ns
         self._last: Tick | None = None
+        self._pulled_at = _NEVER  # ns, when a force last explained what all contacts hand on
         self._found = Contacts(0.0, calm=True)
         self._lone.clear()
 
@@ -118,8 +121,9 @@ class SlideWatch:
                 self._particles.turns(yaw.modelled + yaw.residual, std)
             self._particles.step((tick.stamp_ns - last.stamp_ns) / NANOSECONDS, rims)
             slides = self._particles.slides(rims).any_probability
-            force = slides < _GRIPS and _is_plain(self._particles.pull())
-            return self._lone.take(tick, slides, force)
+            if slides < _GRIPS and _is_plain(self._particles.pull()):
+                self._pulled_at = tick.stamp_ns
+            return self._lone.take(tick, slides, tick.stamp_ns - self._pulled_at <= _HOLDS)
 
     def _weigh(self, tick: Tick, rims: Array) -> None:
         """Hand on what the powers show of the contacts."""

@@ -213,7 +213,7 @@ class FaultClassifier:
         contacts = NOTHING if self._slides is None else self._slides.take(frame)
         outside = NOTHING_ACTS if self._outside is None else self._outside.take(frame)
         if contacts.force:
-            outside = evolve(outside, may_be_push=True)
+            outside = evolve(outside, load=False, may_be_push=True)
         misfit, self._usable = self._misfits.take(frame, self.settings.low_supply), data.usable
         if not data.usable:
             self._pause(frame, data)

@@ -282,7 +282,24 @@ def test_what_pulls_by_hand() -> None:
     particles._weight[:2] = [0.25, 0.75]
     particles._slope[:2] = [[0.4, 0.2], [0.8, 0.2]]
     particles._off[:2] = [[0.0, 2.0, 1.0], [0.0, 0.0, 1.0]]
+    assert particles.pull().off == 0.0  # no force is known
+    particles._is_heard[:] = [True, False, True]
     pull = particles.pull()
     assert pull.mean == pytest.approx([0.7, 0.2])
     assert pull.std == pytest.approx(0.4 * np.sqrt(0.25 * 0.75))
     assert pull.off == pytest.approx(1.0)
+    particles._is_heard[1] = True
+    assert particles.pull().off == pytest.approx(1.0)
+    particles._off[0, 1] = 4.0
+    assert particles.pull().off == pytest.approx(2.0)
+
+
+def test_wheels_are_heard_whose_power_was_measured_in_the_last_step() -> None:
+    particles = Particles(BODY, FRICTION, 0.0)
+    heard = []
+    for wheels in ([0, 2], [1], []):
+        for wheel in wheels:
+            particles.take(wheel, either(0.0))
+        particles.step(STEP, np.zeros(3))
+        heard.append(particles._is_heard.tolist())
+    assert heard == [[True, False, True], [False, True, False], [False] * 3]

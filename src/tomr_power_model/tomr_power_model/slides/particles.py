@@ -85,7 +85,8 @@ class Pull:
 
     mean: Array  # along the axes of the world [N/kg], (2,)
     std: float  # of the less certain of the two [N/kg]
-    off: float  # standard deviations by which forces have been off of late, at the worst wheel
+    off: float  # standard deviations by which forces have been off of late, at the worst wheel of
+    # those whose forces are known
 
 
 class Particles:
@@ -124,6 +125,7 @@ class Particles:
         self._shove = np.zeros((n, 2))  # N, on the body
         self._force = np.zeros((n, WHEELS))
         self._off = np.zeros((n, WHEELS))  # standard deviations, averaged
+        self._is_heard = np.zeros(WHEELS, dtype=bool)  # in the last step
         self._weight = np.full(n, 1.0 / n)
         self._readings: list[tuple[int, Pair]] = []
         self._turning: tuple[float, float] | None = None
@@ -176,7 +178,7 @@ class Particles:
         return Pull(
             mean=mean,
             std=float(np.sqrt((self._weight @ (self._slope - mean) ** 2).max())),
-            off=float(np.sqrt((self._weight @ self._off**2).max())),
+            off=float(np.sqrt((self._weight @ self._off**2)[self._is_heard].max(initial=0.0))),
         )
 
     def _change(self, dt: float, rims: Array) -> None:
@@ -259,6 +261,7 @@ class Particles:
         for i in range(WHEELS):
             expected = self._force[:, i] + self._friction[:, i] * turning[i]
             apart = [self._apart(i, one, expected) for wheel, one in self._readings if wheel == i]
+            self._is_heard[i] = bool(apart)
             if apart:  # as much evidence in a time, however often power is measured
                 off = np.mean(apart, axis=0)
                 self._off[:, i] += share * (off - self._off[:, i])
