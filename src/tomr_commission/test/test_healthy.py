@@ -27,8 +27,8 @@ def test_small_faults_are_looked_for_where_healthy_driving_shows_none(healthy: O
 def test_small_faults_are_not_looked_for_where_healthy_driving_looks_like_one(
     healthy: Observed,
 ) -> None:
-    """As of a robot one of whose motors draws a fifth less at times, for no fault."""
-    strange = injected(healthy, SCALED, -0.2, 1)
+    """As of a robot one of whose motors draws three tenths less at times, for no fault."""
+    strange = injected(healthy, SCALED, -0.3, 1)
     bands = BandSettings(power=2.0)
     found = judged([strange, healthy], bands, SETTINGS, ROBOT, BLOCK)
     assert found.gathered > 6.0

@@ -268,19 +268,24 @@ def test_a_tick_that_lacks_something_says_nothing(
 
 
 @pytest.mark.parametrize("channels", [range(1, 10), ENCODERS])
-def test_absurd_numbers_are_survived(channels: range) -> None:
+@pytest.mark.parametrize("exponent", [4, 8, 14, 32, 100, 300])
+@pytest.mark.parametrize(("base", "fields"), [(10.0, ("residual", "modelled")), (0.1, ("band",))])
+def test_absurd_numbers_are_survived(
+    channels: range, exponent: int, base: float, fields: tuple[str, ...]
+) -> None:
     ticks = drag(0.5)
+    value = dict.fromkeys(fields, base**exponent)
     wild = evolve(
         ticks[40],
         residuals=tuple(
-            evolve(item, residual=1e300, modelled=1e300) if index in channels else item
+            evolve(item, **value) if index in channels else item
             for index, item in enumerate(ticks[40].residuals)
         ),
     )
     watch = LastingWatch(ROBOT)
     said = [watch.take(item, True) for item in [*ticks[:40], wild, *ticks[41:]]]
     assert np.isfinite(said).all()
-    assert max(one[DRAGS.start + 1] for one in said[70:]) > 0.0
+    assert max(one[DRAGS.start + 1] for one in said[50:]) > 0.0
 
 
 def of_currents(number: int, more: Array, band: float, signed: bool) -> ResidualFrame:

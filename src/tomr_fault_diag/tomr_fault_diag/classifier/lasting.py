@@ -62,6 +62,7 @@ _SIGNED = np.array([fault.is_signed for fault in FAULTS])[:, None]
 _IN_TOTAL = np.array([1.0 if fault.in_total else -1.0 for fault in FAULTS])[:, None]
 _OTHERS = np.array([[1, 2], [0, 2], [0, 1]])  # wheels beside each
 _SPEED = 5.0  # rad/s, at which an axle's friction is taken
+_BEYOND = 1e3  # bands, that no fault or force of a typical size is
 _SLOT = to_ns(0.05)  # of faster ticks the first in each is taken
 
 
@@ -130,8 +131,9 @@ class LastingWatch:
         with np.errstate(over="ignore", invalid="ignore"):
             effects, shared = self._effects(frame)
         shown = _shown(frame, self.settings.clip)
-        if not all(np.isfinite(part).all() for part in (shown, effects, shared)):
-            return self._said  # something is not known, or beyond all numbers
+        # False where something is not known.
+        if not all((np.abs(part) < _BEYOND).all() for part in (shown, effects, shared)):
+            return self._said
         sudden = shown - self._came_slowly(effects)
         if is_well:
             self._learn_slowly(shown, effects, elapsed)
