@@ -17,12 +17,13 @@ from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.outside import NOTHING_ACTS, Outside, OutsideWatch
 from tomr_fault_diag.classifier.settings import ClassifierSettings
-from tomr_fault_diag.classifier.slides import SlideWatch
+from tomr_fault_diag.classifier.slides import SlideWatch, _is_plain
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.classifier.states import NORMAL, SLIP, STATES
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_power_model.robot import shipped_robot
 from tomr_power_model.slides.body import body_of
+from tomr_power_model.slides.particles import Pull
 
 Array = NDArray[np.float64]
 Twist = Callable[[float], Array]  # of the rims as if they rolled, at a time [s]
@@ -358,6 +359,22 @@ def test_a_slope_is_known_for_half_a_second_more_where_the_motion_changes() -> N
         for tick in range(1, 15)
     ]
     assert later == [True] * 10 + [False] * 4
+
+
+@pytest.mark.parametrize(
+    ("mean", "std", "off", "plain"),
+    [
+        ((0.3, 0.4), 0.16, 1.1, True),
+        ((0.3, 0.4), 0.17, 1.1, False),  # three standard deviations
+        ((0.3, 0.4), 0.16, 1.3, False),  # a wheel's force is another
+        ((0.12, 0.12), 0.01, 0.0, False),  # hardly any
+        ((math.nan, 0.4), 0.16, 1.1, False),
+    ],
+)
+def test_which_force_is_plain(
+    mean: tuple[float, float], std: float, off: float, plain: bool
+) -> None:
+    assert _is_plain(Pull(np.array(mean), std, off)) is plain
 
 
 def test_a_slide_is_no_slope() -> None:
