@@ -90,3 +90,9 @@ def test_what_was_long_ago_is_forgotten() -> None:
     assert force.take(shown, SHARED, TICK, 0.0) < 0.1 * none_to(shown)
     force.clear()
     assert force.take(shown, SHARED, TICK, 0.0) == 0.0
+
+
+def test_the_first_stamp_is_no_time_to_turn_in() -> None:
+    force = watch()
+    force.take(np.zeros(3), SHARED, 1_700_000_000 * 1_000_000_000, 0.5)
+    assert abs(force._yaw) <= 0.5  # of what came before nothing is known but that

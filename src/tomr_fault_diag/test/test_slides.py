@@ -23,7 +23,7 @@ from tomr_fault_diag.classifier.states import NORMAL, SLIP, STATES
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_power_model.robot import shipped_robot
 from tomr_power_model.slides.body import body_of
-from tomr_power_model.slides.particles import Pull
+from tomr_power_model.slides.particles import Pull, Slides
 
 Array = NDArray[np.float64]
 Twist = Callable[[float], Array]  # of the rims as if they rolled, at a time [s]
@@ -375,6 +375,27 @@ def test_which_force_is_plain(
     mean: tuple[float, float], std: float, off: float, plain: bool
 ) -> None:
     assert _is_plain(Pull(np.array(mean), std, off)) is plain
+
+
+@pytest.mark.parametrize(("slides", "force"), [(0.05, True), (0.5, False)])
+def test_while_a_wheel_may_slide_no_force_explains_all(
+    monkeypatch: pytest.MonkeyPatch, slides: float, force: bool
+) -> None:
+    watch, still = SlideWatch(ROBOT), np.zeros(3)
+    said = Slides(still, np.eye(3), still, still, slides)
+    monkeypatch.setattr(watch._particles, "slides", lambda rims: said)
+    monkeypatch.setattr(watch._particles, "pull", lambda: Pull(np.array([0.6, 0.0]), 0.1, 0.5))
+    awake = frames(pushed(BODY.mass * np.array([0.4, 0.3, 0.0]), 0.0, 9.0), 1.0)
+    assert [watch.take(item).force for item in awake][-1] == force
+
+
+def test_a_clock_that_begins_at_0_shows_no_slope() -> None:
+    watch = SlideWatch(ROBOT)
+    awake = frames(pushed(BODY.mass * np.array([0.4, 0.3, 0.0]), 0.0, 9.0), 0.4)
+    items = [evolve(item, stamp_ns=item.stamp_ns - BASE) for item in awake]
+    found = [watch.take(item) for item in items]
+    assert not found[-1].calm
+    assert not any(one.force for one in found)
 
 
 def test_a_slide_is_no_slope() -> None:

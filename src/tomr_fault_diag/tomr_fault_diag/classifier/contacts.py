@@ -17,6 +17,7 @@ from tomr_power_model.model.ticks import to_ns
 
 Array = NDArray[np.float64]
 
+_GRIPS = 0.1  # likelihood of a slide
 _MORE = 1.0  # N/kg: as much as somebody who leans on the robot
 _ALONE = 0.4  # of the largest force that another wheel may bear
 _LONGER = to_ns(0.2)  # than a shove takes
@@ -41,6 +42,11 @@ class Contacts:
     force: bool = False
     calm: bool = False
 
+    @property
+    def grips(self) -> bool:
+        """Whether no wheel slides, as far as is known."""
+        return self.slides < _GRIPS  # nor where it is NaN
+
 
 NOTHING = Contacts()  # is known
 
@@ -59,9 +65,8 @@ class LoneWheelWatch:
         self._since = 0  # ns, when it began to bear a force alone ...
         self._unmoved_since: int | None = None  # ... and to stand, in all ticks since
 
-    def take(self, tick: Tick, slides: float, force: bool = False) -> Contacts:
-        """Which wheels bear a force alone, beside how likely one slides, and whether a force on the
-        body explains all."""
+    def take(self, tick: Tick, slides: float) -> Contacts:
+        """Which wheels bear a force alone, beside how likely one slides."""
         wheel, now = _alone(tick), tick.stamp_ns
         if wheel is None or wheel != self._wheel:
             self._wheel, self._since, self._unmoved_since = wheel, now, None
@@ -71,8 +76,7 @@ class LoneWheelWatch:
             self._unmoved_since = now
         stopped = self._unmoved_since is not None and now - self._unmoved_since >= _STOPPED
         is_lone = now - self._since >= _LONGER
-        lone, unmoved = wheel if is_lone else None, wheel if stopped else None
-        return Contacts(slides, lone, unmoved, force)
+        return Contacts(slides, wheel if is_lone else None, wheel if stopped else None)
 
     def _stands(self, tick: Tick, wheel: int) -> bool:
         """Whether a wheel shows no motion where it should turn plainly."""

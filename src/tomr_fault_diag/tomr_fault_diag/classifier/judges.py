@@ -30,12 +30,10 @@ from tomr_fault_diag.classifier.belief import (
     named_of,
     of_states,
 )
-from tomr_fault_diag.classifier.contacts import Contacts
 from tomr_fault_diag.classifier.evidence import ALONE, Beside, astray, said_by_forces, said_by_gyro
 from tomr_fault_diag.classifier.features import CHANNELS, WINDOW, channels_of, turning
 from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.observability import Unseen
-from tomr_fault_diag.classifier.outside import Outside
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.states import (
     CONTROL,
@@ -84,7 +82,6 @@ _SLIGHT = 1.0
 _SHAKEN, _DOUBTED = 12, 2.0
 # What is seen to act on the body for seconds is so much likelier than what a window looks like.
 _SHARED, _LOADED = 10.0, 24.0
-_GRIPS = 0.1  # likelihood of a slide
 _MOST_GATHERED = 24.0  # nats: what ended long ago must not count for long
 GATHERED = 12.0  # nats, that small faults which last have shown, in place of a striking window
 _HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
@@ -109,17 +106,6 @@ class Opinion:
     def leading(self) -> State:
         """The state that leads."""
         return self.state or NAMED[int(np.argmax(self.probabilities))]
-
-
-@frozen
-class _Weighed:
-    """What counts in a tick beside what the network makes of it: log-likelihoods (19,)."""
-
-    said: Array  # by the gyro and the forces
-    is_calm: bool  # all lies within bands that are the robot's own
-    lasting: Array  # by small faults that last
-    outside: Outside  # what acts on the body
-    contacts: Contacts  # and what their forces show
 
 
 class Judge(Protocol):
@@ -186,28 +172,26 @@ class WindowJudge:
         count = 1 if self._slot is None else slot - self._slot
         self._slot = slot
         said = said_by_gyro(frame, beside.borne_out) + said_by_forces(frame, beside.contacts)
-        is_calm = beside.contacts.calm and bool(self.settings.commissioned)
-        weighed = _Weighed(said, is_calm, beside.lasting, beside.outside, beside.contacts)
         for _ in range(count):
-            self._opinion = self._step(frame, unseen, weighed)
+            self._opinion = self._step(frame, unseen, said, beside)
             # A size is fitted to what is new in a tick, however long it stands for.
-            weighed = evolve(weighed, lasting=np.zeros(HYPOTHESES))
+            beside = evolve(beside, lasting=np.zeros(HYPOTHESES))
         return self._opinion
 
-    def _step(self, frame: ResidualFrame, unseen: Unseen, weighed: _Weighed) -> Opinion:
-        """Opinion after one more tick of the network."""
-        said = weighed.said
+    def _step(self, frame: ResidualFrame, unseen: Unseen, said: Array, beside: Beside) -> Opinion:
+        """Opinion after one more tick of the network; `said` by the gyro and the forces."""
         self._window[:-1] = self._window[1:]
         self._window[-1] = channels_of(frame)
         self._lacking = max(self._lacking - 1, 0)
         if self._lacking:
             return self._opinion
         likelihoods = self._seen(frame, unseen)
-        if (self._shaken or weighed.is_calm) and said[SLIP] <= 0.0:
+        is_calm = beside.contacts.calm and bool(self.settings.commissioned)  # within its own bands
+        if (self._shaken or is_calm) and said[SLIP] <= 0.0:
             likelihoods[SLIP] -= _DOUBTED
         if not self._shaken:
-            likelihoods = self._with_lasting(likelihoods, weighed.lasting)
-        likelihoods = _with_outside(of_states(likelihoods + said), weighed)
+            likelihoods = self._with_lasting(likelihoods, beside.lasting)
+        likelihoods = _with_outside(of_states(likelihoods + said), beside)
         shares = self._belief.update(likelihoods)
         self._shaken = _SHAKEN if shares[EXTERNAL] > 0.5 else max(self._shaken - 1, 0)
         striking = _ratios(likelihoods)
@@ -305,14 +289,14 @@ class WindowJudge:
         return best
 
 
-def _with_outside(likelihoods: Array, weighed: _Weighed) -> Array:
+def _with_outside(likelihoods: Array, beside: Beside) -> Array:
     """With what acts on the body: a window is short beside the seconds that show it."""
-    found, outside = likelihoods.copy(), weighed.outside
+    found, outside = likelihoods.copy(), beside.outside
     if outside.push or outside.load:  # all wheels feel it: none is accused
         found[CONTROLS.start : METERS.stop] -= _SHARED
     if outside.may_be_push:
         found[LOADED] -= _SHARED
-        if weighed.contacts.slides < _GRIPS:  # nor where it is NaN
+        if beside.contacts.grips:
             found[SLIP] -= _SHARED
     if outside.load:
         found[LOADED] = likelihoods.max() + _LOADED

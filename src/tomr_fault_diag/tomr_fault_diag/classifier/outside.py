@@ -21,7 +21,7 @@ from tomr_fault_diag.classifier.laws import Window
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.severity.tick import MOVES, Tick
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, ResidualFrame
-from tomr_power_model.model.ticks import NANOSECONDS, to_ns
+from tomr_power_model.model.ticks import NANOSECONDS, NEVER, to_ns
 from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -30,7 +30,6 @@ _SLOT = to_ns(0.05)  # of faster ticks the first in each is taken
 _DIRECTIONS = 8  # in which a hitch may lie ...
 _PLACES = (1.0, 2.0)  # ... so many radii of the robot from its centre, or there
 _MOST = 20.0  # bands of one motor that count
-_NEVER = -to_ns(3600.0)  # before any stamp: a simulated clock begins at 0
 
 
 @frozen
@@ -83,16 +82,16 @@ class OutsideWatch:
     def clear(self) -> None:
         """Forget all."""
         self._newest = 0  # ns
-        self._shown_at = _NEVER  # ns, when some motor last showed something
-        self._looked_at = _NEVER  # ns
-        self._found_at = [_NEVER] * 3  # ns, when each of what may be found last was
+        self._shown_at = NEVER  # ns, when some motor last showed something
+        self._looked_at = NEVER  # ns
+        self._found_at = [NEVER] * 3  # ns, when each of what may be found last was
         self._yaw = 0.0  # rad
         self._ticks: deque[tuple[int, Array, Array, Array, float]] = deque()
         self._found = NOTHING_ACTS
 
     def _forget(self) -> None:
         self._ticks.clear()
-        self._found_at, self._found = [_NEVER] * 3, NOTHING_ACTS
+        self._found_at, self._found = [NEVER] * 3, NOTHING_ACTS
 
     def take(self, frame: ResidualFrame) -> Outside:
         """Take a tick."""

@@ -16,13 +16,14 @@ a decision, so they rest until something lies outside, and then begin with the l
 from collections import deque
 
 import numpy as np
+from attrs import evolve
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.contacts import NOTHING, Contacts, LoneWheelWatch
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.severity.tick import MOVES, Tick
 from tomr_fault_diag.residuals.frame import BAND_SIGMAS, ENCODERS, Residual, ResidualFrame
-from tomr_power_model.model.ticks import NANOSECONDS, to_ns
+from tomr_power_model.model.ticks import NANOSECONDS, NEVER, to_ns
 from tomr_power_model.robot import Robot
 from tomr_power_model.slides.body import body_of, rolling_forces
 from tomr_power_model.slides.particles import Pair, Particles, ParticleSettings, Pull
@@ -37,10 +38,8 @@ _RAMPS = 0.1  # 1/s, at which it comes to a slope, or to its end
 _SHOVED = 1.0  # 1/s, at which somebody may shove a robot that shows something
 _POWER_SHARE = 0.01  # of a measured power that is not known
 _LEAST_SLOPE = 2.0  # W/A
-_GRIPS = 0.1  # likelihood of a slide
 _STEEP = 0.2  # N/kg
 _HOLDS = to_ns(0.5)  # where the motion changes
-_NEVER = -to_ns(3600.0)  # before any stamp
 _PLAIN = 3.0  # standard deviations of a force that is there
 _OFF = 1.2  # standard deviations of what it leaves
 _LEAST_YAW = 0.02  # rad/s, standard deviation of a gyro beside the wheels
@@ -73,7 +72,7 @@ class SlideWatch:
     def _rest(self) -> None:
         self._awake_until = 0  # ns
         self._last: Tick | None = None
-        self._pulled_at = _NEVER  # ns, when a force last explained what all contacts hand on
+        self._pulled_at = NEVER  # ns, when a force last explained what all contacts hand on
         self._found = Contacts(0.0, calm=True)
         self._lone.clear()
 
@@ -120,10 +119,10 @@ class SlideWatch:
                 std = max(yaw.band / BAND_SIGMAS, _LEAST_YAW)
                 self._particles.turns(yaw.modelled + yaw.residual, std)
             self._particles.step((tick.stamp_ns - last.stamp_ns) / NANOSECONDS, rims)
-            slides = self._particles.slides(rims).any_probability
-            if slides < _GRIPS and _is_plain(self._particles.pull()):
+            found = self._lone.take(tick, self._particles.slides(rims).any_probability)
+            if found.grips and _is_plain(self._particles.pull()):
                 self._pulled_at = tick.stamp_ns
-            return self._lone.take(tick, slides, tick.stamp_ns - self._pulled_at <= _HOLDS)
+            return evolve(found, force=tick.stamp_ns - self._pulled_at <= _HOLDS)
 
     def _weigh(self, tick: Tick, rims: Array) -> None:
         """Hand on what the powers show of the contacts."""

@@ -17,6 +17,7 @@ from typing import TypeVar
 from attrs import frozen
 
 NANOSECONDS = 1_000_000_000
+NEVER = -3600 * NANOSECONDS  # before any stamp: a simulated clock begins at 0
 
 
 def to_ns(seconds: float) -> int:
