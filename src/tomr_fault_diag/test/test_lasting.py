@@ -1,7 +1,9 @@
 """Small faults that last, from ticks: hand-made motions of the reference robot and their powers."""
 
+import copy
 import math
 from typing import cast
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -10,8 +12,9 @@ from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.belief import DRAGS, HYPOTHESES, METERS, WEAKS
 from tomr_fault_diag.classifier.evidence import Beside
+from tomr_fault_diag.classifier.forces import SteadyForce
 from tomr_fault_diag.classifier.judges import GATHERED, WindowJudge
-from tomr_fault_diag.classifier.lasting import LastingWatch, _beyond_others
+from tomr_fault_diag.classifier.lasting import LastingSettings, LastingWatch, _beyond_others
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
@@ -349,6 +352,24 @@ def test_a_slope_is_no_fault_of_the_wheel_that_bears_most_of_it(azimuth: float) 
     turning = np.array([-8.0, 8.0, 0.0])
     found = gathered([uphill(t, turning, azimuth) for t in range(4 * SECOND)])
     assert found[DRAGS.start : WEAKS.stop].max() < 12.0
+
+
+def test_where_a_force_explains_the_same_there_is_no_evidence_either_way() -> None:
+    """As far as it explains less than the fault does, more counts for the fault."""
+    watch, ticks = LastingWatch(ROBOT), drag(0.5)
+    for item in ticks[:76]:
+        watch.take(item, True)
+    explained, said = np.arange(0.0, 9.0, 0.05), []
+    for steady in explained:
+        again = copy.deepcopy(watch)
+        again._steady = Mock(spec=SteadyForce)
+        again._steady.take.return_value = float(steady)
+        said.append(again.take(ticks[76], True)[DRAGS.start + 1])
+    found = np.array(said)
+    assert found[0] > 6.0
+    assert (np.diff(found) <= 0.0).all()
+    assert found[-1] < 0.0
+    assert 0.05 * np.sum(found == 0.0) == pytest.approx(2.0 * LastingSettings().alike, abs=0.06)
 
 
 def test_it_is_looked_for_where_that_is_asked_for_alone() -> None:

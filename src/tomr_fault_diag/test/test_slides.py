@@ -333,6 +333,13 @@ def test_a_slope_is_known_within_two_seconds(azimuth: float) -> None:
     assert 2.4 < first_force(pushed(pull, 2.2, 9.0)) < 4.2
 
 
+@pytest.mark.parametrize("azimuth", [1.4, 2.2, 4.0])
+def test_robots_come_to_ramps(azimuth: float) -> None:
+    """A gentle one is known within 1.2 s: there are always some particles that have come to it."""
+    pull = 0.3 * BODY.mass * np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+    assert first_force(pushed(pull, 2.2, 9.0)) < 3.4
+
+
 @pytest.mark.parametrize(
     "forces",
     [
