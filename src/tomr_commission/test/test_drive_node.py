@@ -65,7 +65,8 @@ def test_it_drives_and_records(bridge: object, spawn: Callable, command: list[st
     first = speeds[speeds > 0.0][0]
     assert first == pytest.approx(0.09)  # slowly
     assert not seen.command[-5:].any()  # commanded to stand
-    assert len(seen.command_time) > 100
+    # Twice within command_timeout, however slow the machine.
+    assert np.median(np.diff(seen.command_time)) < 0.25
     with open_recording(Path(command[5])) as recording:
         assert {"/imu/data", "/odom", "/motor_voltage"} <= {*recording.topics}
 
