@@ -15,6 +15,7 @@ WINDOW = Window(
     # 3 N/kg at a hitch at (0, 1): its moment ahead is -3 N m/kg.
     shown=np.array([[3.0, 0.0, -3.0], [0.0, 6.0, 0.0]]),
     seen=np.array([[1.0, 1.0, 1.0], [2.0, 2.0, 2.0]]),
+    powers=np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 1.0]]),
     twist=np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
     yaw=np.zeros(2),
     torques=np.eye(3),
@@ -55,6 +56,13 @@ def test_torques_that_are_constant() -> None:
     # 3 / 5 N m of motors 1 and 3, which leaves 9 - 9 / 5; 12 / 5 of 2, which leaves 36 - 144 / 5.
     assert WINDOW.left_by_torques() == pytest.approx(7.2 + 7.2 + 7.2, abs=0.01)
     assert shows((3.0, 0.0, -1.0), (6.0, 0.0, -2.0)).left_by_torques() == pytest.approx(0, abs=0.01)
+
+
+def test_a_power_that_is_constant() -> None:
+    # (3 - 3 - 6) / 6 W, which leaves 54 - 6.
+    assert WINDOW.left_by_power() == pytest.approx(48.0, abs=0.01)
+    braking = shows((2.0, 2.0, 2.0), (2.0, -2.0, 2.0))
+    assert braking.left_by_power() == pytest.approx(0.0, abs=0.01)
 
 
 def test_a_wheel_that_bears_all_alone() -> None:

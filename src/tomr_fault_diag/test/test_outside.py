@@ -132,6 +132,12 @@ def test_what_drags_whichever_way_the_robot_goes_is_a_load(hitch: float) -> None
     assert all(item.load for item in items[-20:])
 
 
+@pytest.mark.parametrize("more", [1.0, 1.5, 3.0])
+def test_drivers_that_draw_more_tow_nothing(more: float) -> None:
+    """A constant power is lost whichever way the robot goes, as a cart's drag is."""
+    assert not any(item.load for item in found(frames(nothing, 12.0, more=np.full(3, more))))
+
+
 def test_straight_ahead_a_cart_may_be_anything() -> None:
     """A wheel stands; whoever leans does the same, and so does an encoder that shows too little."""
     items = found(frames(cart(0.8, -0.2), motion=ahead))

@@ -24,6 +24,7 @@ class Window:
 
     shown: Array  # torques beyond what is expected, in bands, (n, 3)
     seen: Array  # bands per N m, 0 of a wheel that stands, (n, 3)
+    powers: Array  # the same per W, negative where a power brakes, (n, 3)
     twist: Array  # m/s, m/s and rad/s, (n, 3)
     yaw: Array  # since some instant [rad], (n,)
     torques: Array  # of 1 N/kg along x and y of base_link and 1 N m/kg [N m], (3, 3)
@@ -50,6 +51,11 @@ class Window:
         return self.sum_of_squares - float(
             ((self.seen * self.shown).sum(axis=0)) ** 2 @ (1.0 / squares)
         )
+
+    def left_by_power(self) -> float:
+        """Sum of squares that a constant power leaves, the same of every driver."""
+        explained = float((self.powers * self.shown).sum())
+        return self.sum_of_squares - explained**2 / (float((self.powers**2).sum()) + _RIDGE)
 
     def left_by_encoder(self, to_twist: Array) -> float:
         """Least sum of squares that one wheel leaves which explains all of its own, and what the

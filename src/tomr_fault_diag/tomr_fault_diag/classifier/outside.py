@@ -86,7 +86,7 @@ class OutsideWatch:
         self._looked_at = NEVER  # ns
         self._found_at = [NEVER] * 3  # ns, when each of what may be found last was
         self._yaw = 0.0  # rad
-        self._ticks: deque[tuple[int, Array, Array, Array, float]] = deque()
+        self._ticks: deque[tuple[int, Array, Array, Array, Array, float]] = deque()
         self._found = NOTHING_ACTS
 
     def _forget(self) -> None:
@@ -127,10 +127,11 @@ class OutsideWatch:
             return
         shown, per_torque = self._torques(tick, follows=off < 1.0)
         bands = np.array([frame.residuals[k].band for k in ENCODERS])
-        seen = np.where(np.abs(tick.speed) > MOVES, per_torque / bands, 0.0)
+        powers = np.where(np.abs(tick.speed) > MOVES, np.sign(per_torque) / bands, 0.0)
+        seen = per_torque * powers
         shown = np.clip(seen * shown, -_MOST, _MOST)
         if np.isfinite(shown).all() and np.isfinite(seen).all():
-            self._ticks.append((frame.stamp_ns, shown, seen, twist, self._yaw))
+            self._ticks.append((frame.stamp_ns, shown, seen, powers, twist, self._yaw))
         while self._ticks and self._ticks[0][0] < frame.stamp_ns - self.settings.windows[-1]:
             self._ticks.popleft()
 
@@ -148,19 +149,15 @@ class OutsideWatch:
             more = np.where(np.abs(other) < np.abs(more), other, more)
         least = np.minimum(np.abs(tick.expected_current), np.abs(tick.current))
         current = np.copysign(least, tick.current)
-        return motors.constant * more, np.abs(motors.per_torque(tick.speed, current))
+        return motors.constant * more, motors.per_torque(tick.speed, current)
 
     def _look(self) -> None:
         """Whether the last ticks show something that acts from outside."""
-        stamps, shown, seen, twist, yaw = (
-            np.array(column) for column in zip(*self._ticks, strict=True)
-        )
+        stamps, *columns = (np.array(column) for column in zip(*self._ticks, strict=True))
         for length in self.settings.windows:
             first = int(np.searchsorted(stamps, self._newest - length))
             if len(stamps) - first >= self.settings.ticks:
-                window = Window(
-                    shown[first:], seen[first:], twist[first:], yaw[first:], self._per_newton
-                )
+                window = Window(*(column[first:] for column in columns), self._per_newton)
                 for place, is_so in enumerate(astuple(self._judge(window))):
                     self._found_at[place] = self._newest if is_so else self._found_at[place]
             if first == 0:
@@ -172,6 +169,7 @@ class OutsideWatch:
         if total < s.mean_square * len(window.shown):
             return NOTHING_ACTS
         lone, torques = window.left_by_encoder(self._motors.to_twist), window.left_by_torques()
+        drivers = window.left_by_power()
 
         def explains(left: float, *others: float) -> bool:
             return left < s.fit * total and all(
@@ -180,7 +178,7 @@ class OutsideWatch:
 
         pushed, force = window.left_by_push()
         dragged, drag = window.left_by_drag(self._hitches)
-        if drag > s.drag and explains(dragged, lone, torques, pushed):
+        if drag > s.drag and explains(dragged, lone, torques, drivers, pushed):
             return Outside(load=True)
         may_be = explains(pushed, lone)
         # Where a wheel stands two residuals are left, which some force always explains.
