@@ -192,6 +192,9 @@ class WindowJudge:
         if not self._shaken:
             likelihoods = self._with_lasting(likelihoods, beside.lasting)
         likelihoods = _with_outside(of_states(likelihoods + said), beside)
+        if beside.contacts.force and self._best in _GROUPS[0]:
+            # What a slope explains accuses no wheel; one that is accused already stays so.
+            likelihoods[CONTROLS.start : WEAKS.stop] -= _SHARED
         shares = self._belief.update(likelihoods)
         self._shaken = _SHAKEN if shares[EXTERNAL] > 0.5 else max(self._shaken - 1, 0)
         striking = _ratios(likelihoods)
