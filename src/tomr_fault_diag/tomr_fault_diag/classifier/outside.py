@@ -157,7 +157,8 @@ class OutsideWatch:
         for length in self.settings.windows:
             first = int(np.searchsorted(stamps, self._newest - length))
             if len(stamps) - first >= self.settings.ticks:
-                window = Window(*(column[first:] for column in columns), self._per_newton)
+                shown, seen, powers, twist, yaw = (column[first:] for column in columns)
+                window = Window(shown, seen, powers, twist, yaw, self._per_newton)
                 for place, is_so in enumerate(astuple(self._judge(window))):
                     self._found_at[place] = self._newest if is_so else self._found_at[place]
             if first == 0:
