@@ -692,9 +692,9 @@ def test_what_a_push_leaves_is_slip_only_where_forces_show_one() -> None:
     assert said(30, 26)[SLIP] == pytest.approx(9.0)
 
 
-@pytest.mark.parametrize("kind", [CONTROLS, ENCODERS, DRAGS, WEAKS])
+@pytest.mark.parametrize("kind", [CONTROLS, ENCODERS, DRAGS, WEAKS, METERS])
 def test_what_a_slope_explains_accuses_no_wheel(kind: slice) -> None:
-    """But one that has been accused before."""
+    """But one that has been accused before, and a power sensor."""
     network = Saying()
     network.likelihoods[:] = -30.0
     judge = WindowJudge(network, ClassifierSettings(striking=0.0))  # type: ignore[arg-type]
@@ -706,9 +706,9 @@ def test_what_a_slope_explains_accuses_no_wheel(kind: slice) -> None:
 
     on_a_slope, on_the_level = Contacts(0.0, force=True), Contacts(0.0)
     network.likelihoods[[NORMAL, kind.start]] = 0.0, 4.0
-    assert not accused(30, 0, on_a_slope)
-    assert accused(30, 30, on_the_level)
-    assert accused(30, 60, on_a_slope)
+    assert accused(40, 0, on_a_slope) == (kind is METERS)
+    assert accused(30, 40, on_the_level)
+    assert accused(30, 70, on_a_slope)
 
 
 def test_within_bands_of_its_own_a_robot_hardly_slips() -> None:
