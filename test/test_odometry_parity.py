@@ -1,7 +1,8 @@
-"""A recording through the node `slip_odometry` over DDS and through the offline core: the same."""
+"""A recording through the node `slip_odometry` over DDS, held up for a while, and through the
+offline core: the same."""
 
+import signal
 from collections.abc import Callable
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,8 @@ import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from replays import TIMING, listening, playing
+from rosgraph_msgs.msg import Clock
 
 from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.offline import estimates
@@ -21,12 +24,9 @@ from tomr_power_model.robot import shipped_robot
 from tomr_power_model.topics.inputs import Complaints
 
 BAG = Path(__file__).parents[1] / "bags" / "square"
-ROBOT = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")
-PATIENCE = 5.0  # s
-RATE = 2.0  # times real time
-
-GIVEN = {"patience": PATIENCE, "publish_floor": True}
-SETTINGS = OdometrySettings.given(GIVEN, "test")
+SETTINGS = OdometrySettings.given({**TIMING, "publish_floor": True}, "test")
+# While this is played the node is held up, longer than a socket keeps what comes.
+HELD_UP = (1_700_000_004_000_000_000, 1_700_000_006_500_000_000)
 
 Key = tuple[str, int]
 
@@ -49,6 +49,12 @@ def test_node_and_offline_tool_publish_the_same(
     if not BAG.exists():
         pytest.fail(f"{BAG} is missing: make bags")
     store, online = jazzy_typestore(), {}
+    played, is_held, stalls = 0, False, 0
+
+    def note(message: Clock) -> None:
+        nonlocal played
+        played = message.clock.sec * 1_000_000_000 + message.clock.nanosec
+
     rclpy.init()
     node, executor = Node("listener"), SingleThreadedExecutor()
     executor.add_node(node)
@@ -62,17 +68,22 @@ def test_node_and_offline_tool_publish_the_same(
                 online[topic, stamp.sec * 1_000_000_000 + stamp.nanosec] = again
 
             node.create_subscription(message_class(name), topic, keep, STAGE_QOS, raw=True)
-        parameters = ["--ros-args", "--params-file", str(ROBOT), "-p", f"patience:={PATIENCE}"]
-        spawn(["slip_odometry", *parameters, "-p", "publish_floor:=true"])
+        node.create_subscription(Clock, "/clock", note, STAGE_QOS)
+        odometry = spawn(["slip_odometry", *listening(BAG), "-p", "publish_floor:=true"])
 
         def connected() -> bool:
             executor.spin_once(0.01)
             return all(node.count_publishers(topic) == 1 for topic in outputs(SETTINGS))
 
         wait_until(connected, "the node")
-        replay = spawn(["bag_replay", "--ros-args", "-p", f"bag:={BAG}", "-p", f"rate:={RATE}"])
+        replay = spawn(playing(BAG))
         while replay.popen.poll() is None:
             executor.spin_once(0.05)
+            is_due = HELD_UP[0] < played < HELD_UP[1]
+            if is_due != is_held:
+                odometry.signal(signal.SIGSTOP if is_due else signal.SIGCONT)
+                is_held, stalls = is_due, stalls + is_due
+        assert stalls == 1
         offline = _offline()
 
         def complete() -> bool:

@@ -3,7 +3,6 @@ and through `tomr_diagnose`: the same messages."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from replays import TIMING, listening, playing
 
 from tomr_fault_diag.classifier.messages import NAME, SILENCE
 from tomr_fault_diag.classifier.messages import TOPIC as DIAGNOSTICS
@@ -26,10 +26,6 @@ from tomr_power_model.robot import shipped_robot
 from tomr_power_model.topics.predictions import EXPECTED, prediction_topics
 
 BAG = Path(__file__).parents[1] / "bags" / "circle_encoder_lost"
-ROBOT = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")
-RATE = 2.0  # times real time
-# A busy machine may hold up one process for longer than a robot would be waited for.
-PATIENCE = 5.0  # s
 
 Key = tuple[str, int, str]
 
@@ -49,9 +45,7 @@ def _key(topic: str, stamp_ns: int, message: Any) -> Key:
 
 
 def _offline() -> dict[Key, Any]:
-    pipeline = Pipeline(
-        shipped_robot("reference"), DiagnosisSettings.of({"patience": PATIENCE}, "test")
-    )
+    pipeline = Pipeline(shipped_robot("reference"), DiagnosisSettings.of(TIMING, "test"))
     store = jazzy_typestore()
     found: dict[Key, Any] = {}
     with open_recording(BAG) as recording:
@@ -116,9 +110,8 @@ def test_nodes_and_offline_tool_publish_the_same(
                 online[_key(topic, stamp_ns, message)] = message
 
             node.create_subscription(message_class(name), topic, keep, STAGE_QOS, raw=True)
-        parameters = ["--ros-args", "--params-file", str(ROBOT), "-p", f"patience:={PATIENCE}"]
         for command in commands:
-            spawn([command, *parameters])
+            spawn([command, *listening(BAG)])
 
         def connected() -> bool:
             executor.spin_once(0.01)
@@ -130,7 +123,7 @@ def test_nodes_and_offline_tool_publish_the_same(
             return published and heard
 
         wait_until(connected, "nodes that found each other")
-        replay = spawn(["bag_replay", "--ros-args", "-p", f"bag:={BAG}", "-p", f"rate:={RATE}"])
+        replay = spawn(playing(BAG))
         while replay.popen.poll() is None:
             executor.spin_once(0.05)
         assert replay.popen.returncode == 0

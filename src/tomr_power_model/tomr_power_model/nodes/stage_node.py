@@ -28,6 +28,7 @@ from tomr_power_model.errors import InputError, one_line
 from tomr_power_model.messages.outgoing import TYPES, DiagnosticMessage, Outgoing
 from tomr_power_model.messages.plain import Plain, build
 from tomr_power_model.nodes.command_type import CommandType
+from tomr_power_model.nodes.reliability import subscription_qos
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
 from tomr_power_model.robot import Robot
 from tomr_power_model.robot.parameters import NAMELESS, ParameterSpec, Value
@@ -119,7 +120,7 @@ class StageNode(Node):
             self._subscribe(item, advance, qos)
 
     def _subscribe(self, item: Input, advance: Callable[[], None], qos: QoSProfile) -> None:
-        clock = self.get_clock()
+        clock, qos = self.get_clock(), subscription_qos(self, item.topic, qos)
         self._note("listens to", item.topic, item.type_name)
         if not item.is_optional:
             self._unheard.add(item.topic)

@@ -1,0 +1,28 @@
+"""A recording played to nodes that miss nothing of it, however long they are held up."""
+
+from importlib.resources import files
+from pathlib import Path
+
+from tomr_power_model.recordings import open_recording
+
+ROBOT = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")
+RATE = 2.0  # times real time
+# Stage and offline core wait as long for what is sent again.
+PATIENCE = 5.0  # s
+SETTLE_TIME = 1.0  # s
+TIMING = {"patience": PATIENCE, "settle_time": SETTLE_TIME}
+
+
+def listening(bag: Path) -> list[str]:
+    """Arguments of a node that asks again for what it missed of a bag's topics."""
+    given = {name: str(value) for name, value in TIMING.items()}
+    with open_recording(bag) as recording:
+        for topic in recording.topics:
+            given[f"qos_overrides.{topic}.subscription.reliability"] = "reliable"
+    parameters = [part for item in given.items() for part in ("-p", ":=".join(item))]
+    return ["--ros-args", "--params-file", str(ROBOT), *parameters]
+
+
+def playing(bag: Path) -> list[str]:
+    """The command that plays a bag."""
+    return ["bag_replay", "--ros-args", "-p", f"bag:={bag}", "-p", f"rate:={RATE}"]
