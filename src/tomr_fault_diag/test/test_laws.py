@@ -46,6 +46,13 @@ def test_a_force_of_one_direction() -> None:
     assert steady.left_by_push() == (pytest.approx(0.0, abs=0.01), pytest.approx(3.0, abs=0.01))
 
 
+def test_a_slope_turns_nothing() -> None:
+    turning = shows((0.0, 3.0, 3.0), (0.0, 6.0, 6.0))
+    assert turning.left_by_push()[0] == pytest.approx(0.0, abs=0.01)
+    left, pull = turning.left_by_push(turns=False)
+    assert (left, pull) == (pytest.approx(45.0, abs=0.01), pytest.approx(3.0, abs=0.01))
+
+
 def test_a_direction_of_the_world() -> None:
     """The robot turns by a quarter, and what came from ahead comes from the right."""
     turned = evolve(shows((3.0, 0.0, 0.0), (0.0, -6.0, 0.0)), yaw=np.array([0.0, math.pi / 2.0]))

@@ -17,6 +17,7 @@ from tomr_fault_diag.classifier.states import (
     DISOBEYS,
     FAULTLESS,
     NORMAL,
+    PUSHED,
     UNKNOWN,
     WAITING,
 )
@@ -236,16 +237,52 @@ def test_what_is_far_off_and_merely_looks_like_a_fault_is_unknown(power: float) 
 class Leans(OutsideWatch):
     """Somebody leans on the robot, whatever it shows."""
 
+    outside = Outside(may_be_push=True)
+
     def take(self, frame: ResidualFrame) -> Outside:
-        return Outside(may_be_push=True)
+        return self.outside
+
+
+class Looks(Sure):
+    """Less than sure that something pushes, and otherwise of a state."""
+
+    def judge(
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, beside: Beside = ALONE
+    ) -> Opinion:
+        said = super().judge(frame, elapsed_ns, unseen, beside)
+        return evolve(said, state=PUSHED if self.state == NORMAL else None, sure=False)
+
+
+def judged(judge: Sure, outside: Outside, seconds: float = 3.0) -> list[str]:
+    """States of a robot that is far off."""
+    leans = Leans(shipped_robot("reference"))
+    leans.outside = outside
+    classifier = FaultClassifier(judge, outside=leans)
+    far = (frame(t, TURNING, TURNING, power=9.0) for t in range(50, round(1000 * seconds), 50))
+    said = [classifier.classify(item) for item in far]
+    return [item.state.name for item in said if item is not None and item.changed]
 
 
 def test_what_somebody_who_leans_explains_is_not_unknown() -> None:
-    far = [frame(t, TURNING, TURNING, power=9.0) for t in range(50, 3000, 50)]
-    classifier = FaultClassifier(Sure(NORMAL), outside=Leans(shipped_robot("reference")))
-    said = [classifier.classify(item) for item in far]
-    names = [item.state.name for item in said if item is not None and item.changed]
-    assert names == ["normal", "pushed"]
+    assert judged(Sure(NORMAL), Outside(may_be_push=True)) == ["normal", "pushed"]
+
+
+def test_what_looks_like_a_push_and_may_be_a_slope_is_not_unknown() -> None:
+    assert judged(Looks(NORMAL), Outside(fits_slope=True)) == ["normal", "pushed"]
+    assert judged(Looks(NORMAL), Outside()) == ["normal", "unknown"]
+    assert judged(Sure(NORMAL), Outside(fits_slope=True)) == ["normal", "unknown"]
+    assert judged(Looks(CONTROL), Outside(fits_slope=True))[-1] == "unknown"
+
+
+def test_what_is_seen_later_to_be_a_push_is_unknown_no_longer() -> None:
+    leans = Leans(shipped_robot("reference"))
+    classifier, states = FaultClassifier(Sure(NORMAL), outside=leans), []
+    for t in range(50, 5000, 50):
+        leans.outside = Outside(may_be_push=t > 3000)
+        said = classifier.classify(frame(t, TURNING, TURNING, power=9.0))
+        if said is not None and said.changed:
+            states.append(said.state.name)
+    assert states == ["normal", "unknown", "pushed"]
 
 
 def test_a_short_stray_is_not_unknown() -> None:

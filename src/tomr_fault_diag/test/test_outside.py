@@ -150,6 +150,19 @@ def test_while_a_wheel_stands_some_force_explains_the_others() -> None:
     assert set(found(frames(fixed(2.5), motion=ahead))) == {NOTHING_ACTS}
 
 
+def test_of_a_slope_little_is_left_whoever_else_may_do_the_same() -> None:
+    """Its force passes the centre: two wheels that turn show all of it, and how steep it is."""
+    items = found(frames(fixed(0.8), seconds=3.0, motion=ahead))
+    assert all(item.fits_slope for item in items[20:])
+    assert not any(item.push for item in items)
+    assert not any(item.fits_slope for item in found(frames(fixed(1.4), motion=ahead)))
+
+
+def test_after_three_quarters_of_a_second_a_slope_is_looked_for() -> None:
+    items = found(frames(fixed(0.8), seconds=3.0, motion=ahead))
+    assert [item.fits_slope for item in items].index(True) * PERIOD < 0.95
+
+
 def test_a_motion_that_does_not_change_has_tried_nothing() -> None:
     items = found(frames(cart(0.8, -0.2), motion=lambda _: OBLIQUE))
     assert not any(item.load for item in items)
@@ -191,7 +204,8 @@ def test_a_shove_is_neither() -> None:
 def test_what_one_wheel_bears_alone_comes_from_that_wheel(wheel: int, watts: float) -> None:
     more = np.zeros(3)
     more[wheel] = watts
-    assert set(found(frames(nothing, more=more))) == {NOTHING_ACTS}
+    items = found(frames(nothing, more=more))
+    assert not any(item.load or item.push or item.may_be_push for item in items)
 
 
 def test_little_of_another_wheel_takes_the_blame_off_none() -> None:

@@ -102,12 +102,14 @@ class Window:
         best = int(np.argmin(left))
         return float(left[best]), float(drags[best])
 
-    def left_by_push(self) -> tuple[float, float]:
+    def left_by_push(self, *, turns: bool = True) -> tuple[float, float]:
         """Sum of squares that the best force and moment of one direction leave, in the world or in
-        the body, steady, growing or ceasing, and its force if steady, else 0 [N/kg]."""
-        time = np.linspace(0.0, 1.0, len(self.yaw))
+        the body, steady, growing or ceasing, and its force if steady, else 0 [N/kg]. One that
+        `turns` nothing passes the centre, as a slope's does."""
+        time, axes_of = np.linspace(0.0, 1.0, len(self.yaw)), 3 if turns else 2
         # The axes of the world, and those of the body.
-        shares = [self._shares_at(angle) for angle in (self.yaw, np.zeros(len(self.yaw)))]
+        angles = (self.yaw, np.zeros(len(self.yaw)))
+        shares = [self._shares_at(angle)[:, :, :axes_of] for angle in angles]
         steady, growing, ceasing = (
             [_left(self.shown, axes * course[:, None, None]) for axes in shares]
             for course in (np.ones(len(time)), time, 1.0 - time)
@@ -131,9 +133,9 @@ def _turned(twist: Array, other: Array) -> Array:
 
 
 def _left(shown: Array, shares: Array) -> tuple[float, Array]:
-    """Sum of squares that a force and a moment leave, and these, (3,)."""
-    design = shares.reshape(-1, WHEELS)
+    """Sum of squares that a force, and a moment, leave, and these, (2,) or (3,)."""
+    design = shares.reshape(shown.size, -1)
     normal = design.T @ design
-    ridge = _RIDGE * (np.trace(normal) + 1.0) * np.eye(WHEELS)
+    ridge = _RIDGE * (np.trace(normal) + 1.0) * np.eye(len(normal))
     size = np.linalg.solve(normal + ridge, design.T @ shown.ravel())
     return float(((shown.ravel() - design @ size) ** 2).sum()), size

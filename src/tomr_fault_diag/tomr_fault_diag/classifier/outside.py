@@ -37,7 +37,7 @@ class OutsideSettings:
     """When something acts from outside; residuals are torques of motors, in bands."""
 
     windows: tuple[int, ...] = (to_ns(1.5), to_ns(4.0), to_ns(8.0))
-    ticks: int = 20  # at least, in a window
+    ticks: int = 15  # at least, in a window
     every: int = to_ns(0.2)  # windows are looked at
     holds: int = to_ns(1.0)  # what was found, where the motion changes
     shows: float = 0.5  # bands of some motor, while something acts ...
@@ -60,6 +60,7 @@ class Outside:
     load: bool = False  # something that stays
     push: bool = False  # what a person may do, and no wheel
     may_be_push: bool = False  # the same, for all that the motion has shown
+    fits_slope: bool = False  # a force that passes the centre explains it, and so may a wheel
 
 
 NOTHING_ACTS = Outside()
@@ -84,14 +85,14 @@ class OutsideWatch:
         self._newest = 0  # ns
         self._shown_at = NEVER  # ns, when some motor last showed something
         self._looked_at = NEVER  # ns
-        self._found_at = [NEVER] * 3  # ns, when each of what may be found last was
+        self._found_at = [NEVER] * 4  # ns, when each of what may be found last was
         self._yaw = 0.0  # rad
         self._ticks: deque[tuple[int, Array, Array, Array, Array, float]] = deque()
         self._found = NOTHING_ACTS
 
     def _forget(self) -> None:
         self._ticks.clear()
-        self._found_at, self._found = [NEVER] * 3, NOTHING_ACTS
+        self._found_at, self._found = [NEVER] * 4, NOTHING_ACTS
 
     def take(self, frame: ResidualFrame) -> Outside:
         """Take a tick."""
@@ -182,12 +183,14 @@ class OutsideWatch:
         if drag > s.drag and explains(dragged, lone, torques, drivers, pushed):
             return Outside(load=True)
         may_be = explains(pushed, lone)
+        sloping, pull = window.left_by_push(turns=False)
         # Where a wheel stands two residuals are left, which some force always explains.
         is_tried, is_strong = may_be and window.moving > s.moving, force > s.person
         return Outside(
             load=is_tried and is_strong,
             push=is_tried and not is_strong,
             may_be_push=may_be and not is_strong,
+            fits_slope=explains(sloping) and pull < s.person,
         )
 
 

@@ -13,7 +13,7 @@ from tomr_fault_diag.classifier.lasting import LastingWatch
 from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
-from tomr_fault_diag.classifier.outside import NOTHING_ACTS, OutsideWatch
+from tomr_fault_diag.classifier.outside import NOTHING_ACTS, Outside, OutsideWatch
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.severity import Severity, SeverityWatch
 from tomr_fault_diag.classifier.slides import SlideWatch
@@ -235,14 +235,17 @@ class FaultClassifier:
             beside = evolve(beside, lasting=self._lasting.take(frame, is_well))
         self._opinion = self._judge.judge(frame, elapsed, self._unseen, beside)
         if data.enough or self._state not in _QUIET:
-            self._weigh(self._opinion, misfit, frame.stamp_ns, outside.may_be_push)
+            self._weigh(self._opinion, misfit, frame.stamp_ns, outside)
         else:
             self._enter(NOT_ENOUGH, frame.stamp_ns, None)
 
-    def _weigh(self, opinion: Opinion, misfit: Misfit, stamp: int, may_be_push: bool) -> None:
-        """Name what the judge is sure of, or what it does not know; `may_be_push`: somebody who
-        leans on the robot explains what is far off."""
+    def _weigh(self, opinion: Opinion, misfit: Misfit, stamp: int, outside: Outside) -> None:
+        """Name what the judge is sure of, or what it does not know."""
         leading = _called(opinion, misfit)
+        looks_so = opinion.leading is PUSHED and outside.fits_slope
+        is_unnamed = self._state in _QUIET or self._state is UNKNOWN
+        if leading is UNKNOWN and is_unnamed and (outside.may_be_push or looks_so):
+            leading = PUSHED  # somebody who leans on the robot explains what is far off
         candidate = STATES[NORMAL] if leading in _WELL else leading
         if not _is_one_fault(candidate, self._candidate):
             self._candidate_since, self._sure_since = stamp, None
@@ -251,7 +254,7 @@ class FaultClassifier:
         is_blind = opinion.wheel in [wheel for wheel, _ in self._unseen.blind]
         if leading is UNKNOWN and misfit.unexplained:
             if self._state in _QUIET:
-                self._enter(PUSHED if may_be_push else UNKNOWN, stamp, None)
+                self._enter(UNKNOWN, stamp, None)
         elif leading is LOW_SUPPLY:
             if self._state in _QUIET or self._is_over(stamp):
                 self._enter(LOW_SUPPLY, stamp, None)
