@@ -163,6 +163,15 @@ def test_after_three_quarters_of_a_second_a_slope_is_looked_for() -> None:
     assert [item.fits_slope for item in items].index(True) * PERIOD < 0.95
 
 
+def test_what_turns_the_body_is_no_slope() -> None:
+    def moment(_: float, __: Array, ___: float) -> Array:
+        return np.array([0.0, 0.0, 3.0 * MASS * ROBOT.robot_radius])
+
+    items = list(frames(moment, seconds=3.0, motion=lambda _: OBLIQUE))
+    assert min(abs(entry.residual) for item in items for entry in item.residuals[1:4]) > 1.5
+    assert not any(item.fits_slope for item in found(iter(items)))
+
+
 def test_a_motion_that_does_not_change_has_tried_nothing() -> None:
     items = found(frames(cart(0.8, -0.2), motion=lambda _: OBLIQUE))
     assert not any(item.load for item in items)
