@@ -1,4 +1,4 @@
-"""A recording played to nodes that miss nothing of it, however long they are held up."""
+"""A recording played to nodes that ask again for what they missed, on machines that are busy."""
 
 from importlib.resources import files
 from pathlib import Path
@@ -6,11 +6,9 @@ from pathlib import Path
 from tomr_power_model.recordings import open_recording
 
 ROBOT = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")
-RATE = 2.0  # times real time
-# Stage and offline core wait as long for what is sent again.
-PATIENCE = 5.0  # s
-SETTLE_TIME = 1.0  # s
-TIMING = {"patience": PATIENCE, "settle_time": SETTLE_TIME}
+RATE = 1.0  # times real time: what is lost is sent again within the second that commands may take
+# [s], for which node and offline core wait for what is sent again.
+TIMING = {"patience": 5.0, "settle_time": 1.0}
 
 
 def listening(bag: Path) -> list[str]:

@@ -1,7 +1,5 @@
-"""A recording through the node `slip_odometry` over DDS, held up for a while, and through the
-offline core: the same."""
+"""A recording through the node `slip_odometry` over DDS and through the offline core: the same."""
 
-import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,8 +8,8 @@ import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import ReliabilityPolicy
 from replays import TIMING, listening, playing
-from rosgraph_msgs.msg import Clock
 
 from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.offline import estimates
@@ -25,8 +23,6 @@ from tomr_power_model.topics.inputs import Complaints
 
 BAG = Path(__file__).parents[1] / "bags" / "square"
 SETTINGS = OdometrySettings.given({**TIMING, "publish_floor": True}, "test")
-# While this is played the node is held up, longer than a socket keeps what comes.
-HELD_UP = (1_700_000_004_000_000_000, 1_700_000_006_500_000_000)
 
 Key = tuple[str, int]
 
@@ -49,12 +45,6 @@ def test_node_and_offline_tool_publish_the_same(
     if not BAG.exists():
         pytest.fail(f"{BAG} is missing: make bags")
     store, online = jazzy_typestore(), {}
-    played, is_held, stalls = 0, False, 0
-
-    def note(message: Clock) -> None:
-        nonlocal played
-        played = message.clock.sec * 1_000_000_000 + message.clock.nanosec
-
     rclpy.init()
     node, executor = Node("listener"), SingleThreadedExecutor()
     executor.add_node(node)
@@ -68,22 +58,19 @@ def test_node_and_offline_tool_publish_the_same(
                 online[topic, stamp.sec * 1_000_000_000 + stamp.nanosec] = again
 
             node.create_subscription(message_class(name), topic, keep, STAGE_QOS, raw=True)
-        node.create_subscription(Clock, "/clock", note, STAGE_QOS)
-        odometry = spawn(["slip_odometry", *listening(BAG), "-p", "publish_floor:=true"])
+        spawn(["slip_odometry", *listening(BAG), "-p", "publish_floor:=true"])
 
         def connected() -> bool:
             executor.spin_once(0.01)
             return all(node.count_publishers(topic) == 1 for topic in outputs(SETTINGS))
 
         wait_until(connected, "the node")
+        for topic in ("cmd_vel", "joint_states", "wheel_1/power", "imu/data"):
+            (heard,) = node.get_subscriptions_info_by_topic(topic)
+            assert heard.qos_profile.reliability == ReliabilityPolicy.RELIABLE
         replay = spawn(playing(BAG))
         while replay.popen.poll() is None:
             executor.spin_once(0.05)
-            is_due = HELD_UP[0] < played < HELD_UP[1]
-            if is_due != is_held:
-                odometry.signal(signal.SIGSTOP if is_due else signal.SIGCONT)
-                is_held, stalls = is_due, stalls + is_due
-        assert stalls == 1
         offline = _offline()
 
         def complete() -> bool:

@@ -253,12 +253,12 @@ class Looks(Sure):
         return evolve(said, state=PUSHED if self.state == NORMAL else None, sure=False)
 
 
-def judged(judge: Sure, outside: Outside, seconds: float = 3.0) -> list[str]:
+def judged(judge: Sure, outside: Outside) -> list[str]:
     """States of a robot that is far off."""
     leans = Leans(shipped_robot("reference"))
     leans.outside = outside
     classifier = FaultClassifier(judge, outside=leans)
-    far = (frame(t, TURNING, TURNING, power=9.0) for t in range(50, round(1000 * seconds), 50))
+    far = (frame(t, TURNING, TURNING, power=9.0) for t in range(50, 3000, 50))
     said = [classifier.classify(item) for item in far]
     return [item.state.name for item in said if item is not None and item.changed]
 

@@ -106,10 +106,10 @@ class Window:
         """Sum of squares that the best force and moment of one direction leave, in the world or in
         the body, steady, growing or ceasing, and its force if steady, else 0 [N/kg]. One that
         `turns` nothing passes the centre, as a slope's does."""
-        time, axes_of = np.linspace(0.0, 1.0, len(self.yaw)), 3 if turns else 2
+        time, columns = np.linspace(0.0, 1.0, len(self.yaw)), 3 if turns else 2
         # The axes of the world, and those of the body.
         angles = (self.yaw, np.zeros(len(self.yaw)))
-        shares = [self._shares_at(angle)[:, :, :axes_of] for angle in angles]
+        shares = [self._shares_at(angle)[:, :, :columns] for angle in angles]
         steady, growing, ceasing = (
             [_left(self.shown, axes * course[:, None, None]) for axes in shares]
             for course in (np.ones(len(time)), time, 1.0 - time)

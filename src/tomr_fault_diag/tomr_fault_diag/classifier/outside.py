@@ -64,6 +64,7 @@ class Outside:
 
 
 NOTHING_ACTS = Outside()
+_NEVER_FOUND = (NEVER,) * len(astuple(NOTHING_ACTS))
 
 
 class OutsideWatch:
@@ -85,14 +86,14 @@ class OutsideWatch:
         self._newest = 0  # ns
         self._shown_at = NEVER  # ns, when some motor last showed something
         self._looked_at = NEVER  # ns
-        self._found_at = [NEVER] * 4  # ns, when each of what may be found last was
+        self._found_at = list(_NEVER_FOUND)  # ns, when each of what may be found last was
         self._yaw = 0.0  # rad
         self._ticks: deque[tuple[int, Array, Array, Array, Array, float]] = deque()
         self._found = NOTHING_ACTS
 
     def _forget(self) -> None:
         self._ticks.clear()
-        self._found_at, self._found = [NEVER] * 4, NOTHING_ACTS
+        self._found_at, self._found = list(_NEVER_FOUND), NOTHING_ACTS
 
     def take(self, frame: ResidualFrame) -> Outside:
         """Take a tick."""

@@ -1,4 +1,9 @@
-"""Whether a subscription asks again for what it missed: the override that ROS 2 has for it."""
+"""Whether a subscription asks again for what it missed: the override that ROS 2 has for it.
+
+rclpy's QoSOverridingOptions writes into the profile that it is given, which topics share, leaves
+what was given free to change while nothing follows it, and ends a node with a trace for a wrong
+value; so the parameter of that name is checked and declared as all others are.
+"""
 
 from attrs import evolve
 from rclpy.node import Node
@@ -9,8 +14,8 @@ from tomr_power_model.robot.parameters import ParameterSpec
 
 _SPEC = ParameterSpec(
     "reliability",
-    "reliable: what was missed is sent again, as in a replay; best_effort also hears publishers "
-    "that send once",
+    "reliable: asks again for what was lost, hears reliable publishers only; best_effort: hears "
+    "all, once",
     "str",
     choices=("best_effort", "reliable"),
 )
