@@ -83,6 +83,7 @@ def _plain(value: Any) -> Any:
     return value
 
 
+@pytest.mark.serial  # beside other tests commands may come too late
 @pytest.mark.parametrize(
     ("commands", "readers"),
     [(("power_model", "power_residuals", "fault_classifier"), 2), (("tomr_diagnosis",), 1)],
