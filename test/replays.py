@@ -1,14 +1,18 @@
 """A recording played to nodes that ask again for what they missed, on machines that are busy."""
 
+from collections.abc import Iterable
 from importlib.resources import files
 from pathlib import Path
+
+from rclpy.node import Node
+from rclpy.qos import ReliabilityPolicy
 
 from tomr_power_model.recordings import open_recording
 
 ROBOT = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")
-RATE = 1.0  # times real time: what is lost is sent again within the second that commands may take
-# [s], for which node and offline core wait for what is sent again.
-TIMING = {"patience": 5.0, "settle_time": 1.0}
+RATE = 1.0  # times real time: a node held up for seconds falls behind by no more
+# [s], for which node and offline core wait for what is sent again: commands, samples.
+TIMING = {"patience": 5.0, "settle_time": 3.0}
 
 
 def listening(bag: Path) -> list[str]:
@@ -24,3 +28,10 @@ def listening(bag: Path) -> list[str]:
 def playing(bag: Path) -> list[str]:
     """The command that plays a bag."""
     return ["bag_replay", "--ros-args", "-p", f"bag:={bag}", "-p", f"rate:={RATE}"]
+
+
+def is_heard_reliably(node: Node, topics: Iterable[str]) -> bool:
+    """Whether every subscription of these topics asks again; False while one is not found yet."""
+    found = [node.get_subscriptions_info_by_topic(topic) for topic in topics]
+    asked = [one.qos_profile.reliability for each in found for one in each]
+    return all(found) and all(one == ReliabilityPolicy.RELIABLE for one in asked)

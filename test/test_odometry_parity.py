@@ -8,8 +8,7 @@ import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import ReliabilityPolicy
-from replays import TIMING, listening, playing
+from replays import TIMING, is_heard_reliably, listening, playing
 
 from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.offline import estimates
@@ -22,6 +21,7 @@ from tomr_power_model.robot import shipped_robot
 from tomr_power_model.topics.inputs import Complaints
 
 BAG = Path(__file__).parents[1] / "bags" / "square"
+SENSORS = ("cmd_vel", "joint_states", "wheel_1/power", "imu/data")
 SETTINGS = OdometrySettings.given({**TIMING, "publish_floor": True}, "test")
 
 Key = tuple[str, int]
@@ -67,12 +67,10 @@ def test_node_and_offline_tool_publish_the_same(
 
         def connected() -> bool:
             executor.spin_once(0.01)
-            return all(node.count_publishers(topic) == 1 for topic in outputs(SETTINGS))
+            published = all(node.count_publishers(topic) == 1 for topic in outputs(SETTINGS))
+            return published and is_heard_reliably(node, SENSORS)
 
-        wait_until(connected, "the node")
-        for topic in ("cmd_vel", "joint_states", "wheel_1/power", "imu/data"):
-            (heard,) = node.get_subscriptions_info_by_topic(topic)
-            assert heard.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+        wait_until(connected, "the node, which asks again for what it missed")
         replay = spawn(playing(BAG))
         while replay.popen.poll() is None:
             executor.spin_once(0.05)

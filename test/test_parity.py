@@ -11,7 +11,7 @@ import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from replays import TIMING, listening, playing
+from replays import TIMING, is_heard_reliably, listening, playing
 
 from tomr_fault_diag.classifier.messages import NAME, SILENCE
 from tomr_fault_diag.classifier.messages import TOPIC as DIAGNOSTICS
@@ -26,6 +26,7 @@ from tomr_power_model.robot import shipped_robot
 from tomr_power_model.topics.predictions import EXPECTED, prediction_topics
 
 BAG = Path(__file__).parents[1] / "bags" / "circle_encoder_lost"
+SENSORS = ("cmd_vel", "joint_states", "wheel_1/power")
 
 Key = tuple[str, int, str]
 
@@ -121,7 +122,7 @@ def test_nodes_and_offline_tool_publish_the_same(
                 for topic in types
             )
             heard = all(node.count_subscribers(t) == readers for t in types if t != DIAGNOSTICS)
-            return published and heard
+            return published and heard and is_heard_reliably(node, SENSORS)
 
         wait_until(connected, "nodes that found each other")
         replay = spawn(playing(BAG))

@@ -15,7 +15,7 @@ from tomr_power_model.robot.parameters import HARDWARE_ID, NAMELESS, ParameterSp
 _S = ParameterSpec
 PARAMETERS: tuple[ParameterSpec, ...] = (
     _S("decision_rate", "estimates on the grid of data stamps", "float", 50.0, "Hz", 1.0, 100.0),
-    _S("settle_time", "data time to wait for late messages", "float", 0.02, "s", 0.0, 1.0),
+    _S("settle_time", "data time to wait for late messages", "float", 0.02, "s", 0.0, 5.0),
     _S("patience", "silence after which a stream is not waited for", "float", 0.25, "s", 0.0, 5.0),
     GAP,
     _S("use_imu", "take imu/data where it is there", "bool", True),

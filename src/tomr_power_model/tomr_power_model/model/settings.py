@@ -26,7 +26,7 @@ GAP = _S(
 )
 TICK_PARAMETERS: tuple[ParameterSpec, ...] = (
     _S("decision_rate", "ticks on the grid of data stamps", "float", 20.0, "Hz", 1.0, 100.0),
-    _S("settle_time", "data time to wait for late messages", "float", 0.02, "s", 0.0, 1.0),
+    _S("settle_time", "data time to wait for late messages", "float", 0.02, "s", 0.0, 5.0),
     _S("patience", "silence after which a stream is not waited for", "float", 0.25, "s", 0.0, 5.0),
     GAP,
     _S("stale_after", "age at which an input counts as missing", "float", 0.5, "s", 0.01, 10.0),
