@@ -31,7 +31,7 @@ def playing(bag: Path) -> list[str]:
 
 
 def is_heard_reliably(node: Node, topics: Iterable[str]) -> bool:
-    """Whether every subscription of these topics asks again; False while one is not found yet."""
+    """Whether all that subscribe to these topics ask again; False while one has no subscriber."""
     found = [node.get_subscriptions_info_by_topic(topic) for topic in topics]
-    asked = [one.qos_profile.reliability for each in found for one in each]
-    return all(found) and all(one == ReliabilityPolicy.RELIABLE for one in asked)
+    asks = ReliabilityPolicy.RELIABLE
+    return all(each and all(one.qos_profile.reliability == asks for one in each) for each in found)
