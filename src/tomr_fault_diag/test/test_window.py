@@ -692,6 +692,22 @@ def test_what_a_push_leaves_is_slip_only_where_forces_show_one() -> None:
     assert said(30, 26)[SLIP] == pytest.approx(9.0)
 
 
+@pytest.mark.parametrize(("before", "first"), [(NORMAL, 10.0), (EXTERNAL, 8.0)])
+def test_what_a_push_leaves_is_hardly_a_lost_signal(before: int, first: float) -> None:
+    """Until it is believed, which it is while the push would still show."""
+    network, said = Saying(), []
+    judge = WindowJudge(network, ClassifierSettings())  # type: ignore[arg-type]
+    for tick, leading in enumerate([before] * 20 + [CONTROLS.start] * 11):
+        network.likelihoods[:] = -30.0
+        network.likelihoods[[leading, NORMAL]] = 10.0, 0.0
+        judge.judge(frame(tick), 50 * MS, Unseen())
+        if leading == CONTROLS.start:
+            said.append(judge._recent[-1][leading] - judge._recent[-1][NORMAL])
+    assert judge._shaken > 0 or before == NORMAL
+    assert said[0] == pytest.approx(first)
+    assert said[-1] == pytest.approx(10.0)
+
+
 @pytest.mark.parametrize("kind", [CONTROLS, ENCODERS, DRAGS, WEAKS, METERS])
 def test_what_a_slope_explains_accuses_no_wheel(kind: slice) -> None:
     """But one that has been accused before, and a power sensor."""

@@ -78,7 +78,7 @@ _CREEPING = (DRAGS, WEAKS, METERS)
 _SLIGHT = 1.0
 # What a push leaves for so many ticks looks like slip to the network, and so do small residuals
 # within bands that are the robot's own: it says so much less where neither forces nor a gyro show
-# one.
+# one. A driver that lets go of what a push left in its integral looks like one without a signal.
 _SHAKEN, _DOUBTED = 12, 2.0
 # What is seen to act on the body for seconds is so much likelier than what a window looks like.
 _SHARED, _LOADED = 10.0, 24.0
@@ -189,6 +189,8 @@ class WindowJudge:
         is_calm = beside.contacts.calm and bool(self.settings.commissioned)  # within its own bands
         if (self._shaken or is_calm) and said[SLIP] <= 0.0:
             likelihoods[SLIP] -= _DOUBTED
+        if self._shaken and self._best in _GROUPS[0]:
+            likelihoods[CONTROLS] -= _DOUBTED
         if not self._shaken:
             likelihoods = self._with_lasting(likelihoods, beside.lasting)
         likelihoods = _with_outside(of_states(likelihoods + said), beside)
