@@ -98,7 +98,7 @@ figures: .venv/training ## draw the figures of docs/experiments.md anew (install
 docs: setup ## write the table of keys in docs/keys.md anew
 	$(BIN)/python -m tomr_fault_diag.diagnosis.key_table > docs/keys.md
 
-train: .venv/training ## train the classifier anew, in a quarter of an hour (installs torch)
+train: .venv/training ## train the classifier anew, in three quarters of an hour (installs torch)
 	$(BIN)/tomr_train --out src/tomr_fault_diag/tomr_fault_diag/weights/window.npz $(ARGS)
 
 bags: setup ## record the small recordings in bags/ anew

@@ -28,7 +28,13 @@ def test_weights_and_their_provenance_are_written_together(tmp_path: Path) -> No
         assert held["bias"].dtype == np.float32
     written = json.loads(weights.with_suffix(".json").read_text())
     assert written["validation"]["accuracy"] == 1.0
-    assert written["drives"]["validation_seeds"][0] == written["drives"]["training_seeds"][1] + 1
+    drives = written["drives"]
+    assert drives["training_seeds"] == [
+        [10_000_000, 10_007_199],
+        [40_000_000, 40_007_199],
+        [50_000_000, 50_007_199],
+    ]
+    assert drives["validation_seeds"] == [50_007_200, 50_007_399]
 
 
 def test_of_weights_and_provenance_both_are_new_or_none(
@@ -51,3 +57,18 @@ def test_bad_name_is_refused_before_hours_of_training(
         assert main(["--out", str(tmp_path / out)]) == 2
     assert not generate.called
     assert "ends in .npz" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("more", "part"),
+    [
+        (["--classifier", "wang2024", "--first-seed", "1", "9000"], "one network"),
+        (["--first-seed", "9000", "1700"], "overlap"),
+    ],
+)
+def test_networks_have_drives_of_their_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], part: str
+) -> None:
+    assert main(["--out", str(tmp_path / "window.npz"), *more]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert part in line

@@ -111,18 +111,9 @@ class WindowModule(nn.Module):
         return torch.cat([common[:, :2], wheels, common[:, 2:]], dim=1)
 
 
-@frozen
-class FittedWindow:
-    """Trained weights, and what torch itself answers to some windows."""
-
-    network: WindowNetwork
-    check_windows: NDArray[np.float64]  # (k, WINDOW, 20)
-    check_scores: NDArray[np.float64]  # (k, 19)
-
-
 def fit_window(
     examples: Examples, recipe: WindowRecipe, progress: Callable[[float], None]
-) -> FittedWindow:
+) -> WindowNetwork:
     """Train; the same examples and recipe give the same weights."""
     begin(recipe.seed)
     module = WindowModule(recipe.hidden)
@@ -136,7 +127,8 @@ def fit_window(
     for _ in range(recipe.epochs):
         batches = torch.split(torch.from_numpy(random.permutation(len(examples))), recipe.batch)
         progress(epoch(module, trained, batches, optimiser.step, schedule.step))
-    return _fitted(module, examples)
+    arrays = [*weights_of(module), prior_of(examples.label)]
+    return WindowNetwork(*arrays)
 
 
 def views_of(examples: Examples, recipe: WindowRecipe, random: np.random.Generator) -> torch.Tensor:
@@ -167,12 +159,19 @@ def prior_of(labels: NDArray[np.int64]) -> NDArray[np.float64]:
     return np.maximum(share, 1.0 / len(labels))
 
 
-def _fitted(module: WindowModule, examples: Examples) -> FittedWindow:
+def check_windows(examples: Examples) -> NDArray[np.float64]:
+    """Twenty windows (20, WINDOW, 20) from all over the drives, as they are stored: rounded, since
+    rounding may turn the direction of a wheel that hardly moves."""
     rows = np.arange(0, len(examples), max(1, len(examples) // 20))[:20]
-    # As they are stored: rounding may turn the direction of a wheel that hardly moves.
-    check: NDArray[np.float64] = examples.windows(rows).astype(np.float64).round(4)
-    arrays = [*weights_of(module), prior_of(examples.label)]
+    return np.asarray(examples.windows(rows).astype(np.float64).round(4))
+
+
+def torch_scores(network: WindowNetwork, windows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What torch itself makes of windows (k, WINDOW, 20) with a network's weights, (k, 19)."""
     # In double precision, as the robot computes it: the trained weights are exact there.
+    module = WindowModule((len(network.bias_1), len(network.bias_2))).double()
+    names = ("weight_1", "bias_1", "weight_2", "bias_2", "weight_3", "bias_3")
     with torch.no_grad():
-        scores = module.double()(torch.from_numpy(by_wheel(check)))
-    return FittedWindow(WindowNetwork(*arrays), check, scores.numpy())
+        for parameter, name in zip(module.parameters(), names, strict=True):
+            parameter.copy_(torch.from_numpy(getattr(network, name)))
+        return np.asarray(module(torch.from_numpy(by_wheel(windows))).numpy())

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
 from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.errors import InputError
 from tomr_power_model.files.write import make_folder, write_together
+from tomr_training.ensemble import mean_of
 
 if TYPE_CHECKING:  # it takes seconds to import: --help does without
     from tomr_training.planar.generate import LabelledTicks
@@ -32,11 +34,16 @@ examples:
   tomr_diagnose BAG --set weights=window.npz
 
 Drives come from the planar dynamics of the power model and are drawn from the seeds FIRST,
-FIRST+1, ...; validation takes the seeds that follow and never trains. The same seeds give the same
+FIRST+1, ...; validation takes the seeds that follow and never trains. For each FIRST there is a
+window network of its own drives, and what is stored is their mean. The same seeds give the same
 file, bit by bit, on the same machine. Needs torch: pip install -r requirements-train.txt."""
 
 _BANDS = {"calibrated": BandSettings(), "paper": PAPER_BANDS}
 Counts = NDArray[np.int64]
+_FIRST_SEEDS = {
+    "window": (10_000_000, 40_000_000, 50_000_000),
+    "wang2024": (10_000_000,),
+}  # as shipped
 _CHUNK = 10_000  # examples that are validated at a time
 # The paper's six, and what is none of them.
 _NAMES = (*(state.name for state in STATES), "beyond these")
@@ -73,7 +80,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--drives", type=int, default=7200, help="to train on (default 7200)")
     parser.add_argument("--validation", type=int, default=200, help="to validate on (default 200)")
-    parser.add_argument("--first-seed", type=int, default=10_000_000, help="of the drives")
+    parser.add_argument(
+        "--first-seed",
+        type=int,
+        nargs="+",
+        metavar="FIRST",
+        help="of the drives of each network (default: those of the shipped weights)",
+    )
     parser.add_argument("--epochs", type=int, help="default: that of the recipe")
     return parser
 
@@ -84,6 +97,7 @@ def _train(arguments: Sequence[str] | None) -> int:
         raise InputError("--drives and --validation: give at least 1")
     if options.out.suffix != ".npz":
         raise InputError(f"--out {options.out}: give a name that ends in .npz")
+    firsts = _first_seeds(options)
     make_folder(options.out.parent)
     try:
         import torch
@@ -93,10 +107,9 @@ def _train(arguments: Sequence[str] | None) -> int:
         ) from None
     from tomr_training.planar.generate import generate
 
-    between = options.first_seed + options.drives
-    seeds = range(options.first_seed, between), range(between, between + options.validation)
-    train, unseen = (generate(chosen) for chosen in seeds)
-    trained = _KINDS[options.classifier](options, train, unseen)
+    seeds = [range(first, first + options.drives) for first in firsts]
+    validation = range(seeds[-1].stop, seeds[-1].stop + options.validation)
+    trained = _KINDS[options.classifier](options, map(generate, seeds), generate(validation))
     arrays: dict[str, Any] = {name: a.astype(np.float32) for name, a in trained.arrays.items()}
     weights = BytesIO()
     np.savez(weights, **arrays)
@@ -106,8 +119,8 @@ def _train(arguments: Sequence[str] | None) -> int:
         **trained.provenance,
         "drives": {
             "simulator": "planar dynamics of tomr_power_model",
-            "training_seeds": [seeds[0][0], seeds[0][-1]],
-            "validation_seeds": [seeds[1][0], seeds[1][-1]],
+            "training_seeds": [[part[0], part[-1]] for part in seeds],
+            "validation_seeds": [validation[0], validation[-1]],
         },
         "torch": torch.__version__,
         "states": list(_NAMES),
@@ -122,40 +135,61 @@ def _train(arguments: Sequence[str] | None) -> int:
     return EXIT_OK
 
 
-def _window(options: argparse.Namespace, train: Ticks, unseen: Ticks) -> Trained:
-    from tomr_training.fit_window import WindowRecipe, examples_of, fit_window
+def _first_seeds(options: argparse.Namespace) -> list[int]:
+    """First seeds of the networks' drives, which share none."""
+    found = sorted(options.first_seed or _FIRST_SEEDS[options.classifier])
+    if options.classifier == "wang2024" and len(found) > 1:
+        raise InputError("--first-seed: wang2024 is one network: give one seed")
+    if any(after - first < options.drives + options.validation for first, after in pairwise(found)):
+        raise InputError("--first-seed: drives of two networks overlap: give seeds further apart")
+    return found
+
+
+def _window(options: argparse.Namespace, train: Iterable[Ticks], unseen: Ticks) -> Trained:
+    from tomr_training.fit_window import (
+        WindowRecipe,
+        check_windows,
+        examples_of,
+        fit_window,
+        torch_scores,
+    )
     from tomr_training.planar.generate import PAPER_OF
 
     recipe = WindowRecipe()
     recipe = evolve(recipe, epochs=options.epochs or recipe.epochs)
-    examples = examples_of(train, recipe)
-    with _epochs(recipe.epochs) as progress:
-        fitted = fit_window(examples, recipe, progress)
+    networks, ticks = [], []
+    for drives in train:
+        examples = examples_of(drives, recipe)
+        ticks.append(len(examples))
+        with _epochs(recipe.epochs) as progress:
+            networks.append(fit_window(examples, recipe, progress))
+    network, windows = mean_of(networks), check_windows(examples)
     check = examples_of(unseen, evolve(recipe, healthy=1.0, faulty=1.0))
     named = []
     for start in range(0, len(check), _CHUNK):
         rows = np.arange(start, min(start + _CHUNK, len(check)))
-        scores = fitted.network.scores_of(check.windows(rows).astype(np.float64))
+        scores = network.scores_of(check.windows(rows).astype(np.float64))
         named.append(PAPER_OF[scores.argmax(axis=1)])
     provenance: dict[str, object] = {
         "recipe": asdict(recipe),
-        "training_ticks": len(examples),
+        "training_ticks": ticks,
         "torch_check": {
-            "windows": fitted.check_windows.tolist(),
-            "scores": fitted.check_scores.tolist(),
+            "windows": windows.tolist(),
+            "scores": torch_scores(network, windows).tolist(),
         },
     }
     confusion = _confusion(PAPER_OF[check.label], np.concatenate(named))
-    return Trained(asdict(fitted.network), provenance, confusion)
+    return Trained(asdict(network), provenance, confusion)
 
 
-def _codes(options: argparse.Namespace, train: Ticks, unseen: Ticks) -> Trained:
+def _codes(options: argparse.Namespace, train: Iterable[Ticks], unseen: Ticks) -> Trained:
     from tomr_training.fit_codes import Recipe, examples_of, fit
 
     bands = _BANDS[options.bands]
     recipe = Recipe()
     recipe = evolve(recipe, epochs=options.epochs or recipe.epochs)
-    examples, check = examples_of(train, bands), examples_of(unseen, bands)
+    (drives,) = train
+    examples, check = examples_of(drives, bands), examples_of(unseen, bands)
     with _epochs(recipe.epochs) as progress:
         fitted = fit(examples, recipe, progress)
     named = fitted.network.probabilities(check.codes.astype(np.float64)).argmax(axis=1)
@@ -172,7 +206,7 @@ def _codes(options: argparse.Namespace, train: Ticks, unseen: Ticks) -> Trained:
     return Trained(asdict(fitted.network), provenance, _confusion(check.labels, named))
 
 
-_KINDS: dict[str, Callable[[argparse.Namespace, Ticks, Ticks], Trained]] = {
+_KINDS: dict[str, Callable[[argparse.Namespace, Iterable[Ticks], Ticks], Trained]] = {
     "window": _window,
     "wang2024": _codes,
 }
