@@ -727,20 +727,24 @@ def test_what_a_slope_explains_accuses_no_wheel(kind: slice) -> None:
     assert accused(30, 70, on_a_slope)
 
 
-def test_within_bands_of_its_own_a_robot_hardly_slips() -> None:
+def test_where_it_grips_or_within_bands_of_its_own_a_robot_hardly_slips() -> None:
     network = Saying()
     network.likelihoods[SLIP] = 5.0
 
-    def said(commissioned: str, contacts: Contacts) -> float:
-        settings = ClassifierSettings(commissioned=commissioned)
+    def said(commissioned: str, contacts: Contacts) -> list[float]:
+        """At first, and when slip has been believed for long."""
+        settings, found = ClassifierSettings(commissioned=commissioned), []
         judge = WindowJudge(network, settings)  # type: ignore[arg-type]
-        for tick in range(20):
+        for tick in range(40):
             judge.judge(frame(tick), 50 * MS, Unseen(), Beside(contacts))
-        return float(judge._recent[-1][SLIP] - judge._recent[-1][NORMAL])
+            found += [newest[SLIP] - newest[NORMAL] for newest in list(judge._recent)[-1:]]
+        return [float(found[0]), float(found[-1])]
 
-    calm = Contacts(0.0, calm=True)
-    assert said("2026-01-01", NOTHING) == pytest.approx(said("2026-01-01", calm) + 2.0)
-    assert said("2026-01-01", Contacts(0.0)) == said("", calm) == said("", NOTHING)
+    calm, grips, slides = Contacts(0.0, calm=True), Contacts(0.09), Contacts(0.11)
+    plain = np.array(said("2026-01-01", NOTHING))
+    assert said("2026-01-01", calm) == pytest.approx(plain - 2.0)
+    assert said("2026-01-01", grips) == pytest.approx(plain - [2.0, 0.0])
+    assert said("2026-01-01", slides) == said("", calm) == said("", grips) == list(plain)
 
 
 def test_a_robot_that_stands_says_the_same_again_and_again() -> None:

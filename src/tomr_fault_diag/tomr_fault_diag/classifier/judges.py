@@ -77,8 +77,9 @@ _SLIP_MARGIN = 4.0  # that slip need be less striking: a short one shows in few 
 _CREEPING = (DRAGS, WEAKS, METERS)
 _SLIGHT = 1.0
 # What a push leaves for so many ticks looks like slip to the network, and so do small residuals
-# within bands that are the robot's own: it says so much less where neither forces nor a gyro show
-# one. A driver that lets go of what a push left in its integral looks like one without a signal.
+# within bands that are the robot's own, and slopes: it says so much less where neither forces nor a
+# gyro show one. A driver that lets go of what a push left in its integral looks like one without a
+# signal.
 _SHAKEN, _DOUBTED = 12, 2.0
 # What is seen to act on the body for seconds is so much likelier than what a window looks like.
 _SHARED, _LOADED = 10.0, 24.0
@@ -186,10 +187,11 @@ class WindowJudge:
         if self._lacking:
             return self._opinion
         likelihoods = self._seen(frame, unseen)
-        is_calm = beside.contacts.calm and bool(self.settings.commissioned)  # within its own bands
-        if (self._shaken or is_calm) and said[SLIP] <= 0.0:
+        is_well = self._best in _GROUPS[0]
+        grips = beside.contacts.calm or (beside.contacts.grips and is_well)
+        if (self._shaken or (grips and self.settings.commissioned)) and said[SLIP] <= 0.0:
             likelihoods[SLIP] -= _DOUBTED
-        if self._shaken and self._best in _GROUPS[0]:
+        if self._shaken and is_well:
             likelihoods[CONTROLS] -= _DOUBTED
         if not self._shaken:
             likelihoods = self._with_lasting(likelihoods, beside.lasting)
