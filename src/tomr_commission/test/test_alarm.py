@@ -123,11 +123,21 @@ def test_a_tail_begins_higher_by_halves_while_it_is_heavy_and_has_peaks_enough()
 
 
 def test_peaks_at_the_cap_count_for_the_scale_by_their_length_alone() -> None:
-    """Of 2, 4 and one of 32 decades at least: the usual scale of 4 counts as four more peaks."""
+    """2, 4 and one of 32 decades at least, over 1: the usual scale of 4 counts as four more."""
     choice = evolve(CHOICE, kept=1.0, least_peaks=2)
-    tail = Tail.of("", [0.0, 2.0, 4.0, 40.0], 30.0, choice)
-    assert (tail.threshold, tail.above, tail.certain) == (0.0, 3, 6)
-    assert tail.scale == pytest.approx((4 * 4.0 + 2.0 + 4.0 + MOST_CAUTION + SURE) / 6)
+    tail = Tail.of("", [1.0, 3.0, 5.0, 40.0], 30.0, choice)
+    assert (tail.threshold, tail.above, tail.certain) == (1.0, 3, 6)
+    assert tail.scale == pytest.approx((4 * 4.0 + 2.0 + 4.0 + MOST_CAUTION + SURE - 1.0) / 6)
+
+
+@pytest.mark.parametrize("without", [80, 370, 3000])
+def test_where_most_events_leave_nothing_the_tail_begins_at_the_lowest_peak(without: int) -> None:
+    """Twenty peaks of 6 to 7.9 decades, the usual scale of 4 as four more."""
+    peaks = [*[0.0] * without, *(6.0 + 0.1 * np.arange(20))]
+    tail = Tail.of("shoves", peaks, 30.0, CHOICE)
+    assert (tail.threshold, tail.above) == (6.0, 19)
+    assert tail.scale == pytest.approx((4 * 4.0 + 0.1 * 190) / 23)
+    assert alarm_level([tail], 0.05, 0.0, CHOICE).needed < 16.0
 
 
 def test_exponential_excesses_are_taken_for_heavier_once_in_twenty() -> None:

@@ -11,9 +11,10 @@ What the peaks leave open of P (Jeffreys) and of the scale (gamma, a usual scale
 peaks) is drawn by chance, and the level is taken at which so many of the draws as `confidence` says
 have the chosen rate or less. Where the peaks over u have a heavier tail (their coefficient of
 variation is over 1 at the 5 % level: del Castillo, Daoudi & Lockhart 2014), u is raised to the
-highest half of them, and so on: what is rare may have another cause than what is frequent. A source
-without any peak has no tail to extrapolate: it counts as nothing, and the report says for how long
-it was watched. A generalised Pareto tail is fitted beside, and its shape reported.
+highest half of them, and so on: what is rare may have another cause than what is frequent. Where
+most events leave no evidence at all, u is the lowest peak. A source without any peak has no tail to
+extrapolate: it counts as nothing, and the report says for how long it was watched. A generalised
+Pareto tail is fitted beside, and its shape reported.
 """
 
 import math
@@ -100,6 +101,8 @@ def _tail_of(values: Array, choice: AlarmChoice) -> tuple[float, Array]:
     share = choice.kept
     while len(values):
         higher = float(np.quantile(values, 1.0 - share))
+        if not higher:  # most events leave nothing: peaks begin at the lowest, not at nothing
+            higher = float(values[values > 0.0].min(initial=_CAP))
         peaks = values[values > higher]
         if len(peaks) < choice.least_peaks:
             break
