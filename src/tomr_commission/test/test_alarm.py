@@ -130,7 +130,7 @@ def test_peaks_at_the_cap_count_for_the_scale_by_their_length_alone() -> None:
     assert tail.scale == pytest.approx((4 * 4.0 + 2.0 + 4.0 + MOST_CAUTION + SURE - 1.0) / 6)
 
 
-@pytest.mark.parametrize("without", [80, 370, 3000])
+@pytest.mark.parametrize("without", [59, 60, 61, 80, 370, 3000])  # a quarter of 79 or 80: 20
 def test_where_most_events_leave_nothing_the_tail_begins_at_the_lowest_peak(without: int) -> None:
     """Twenty peaks of 6 to 7.9 decades, the usual scale of 4 as four more."""
     peaks = [*[0.0] * without, *(6.0 + 0.1 * np.arange(20))]

@@ -99,10 +99,10 @@ def _tail_of(values: Array, choice: AlarmChoice) -> tuple[float, Array]:
     """The threshold of a tail that is exponential, or as high as there are peaks for, and these."""
     threshold, over = 0.0, values[values > 0.0]
     share = choice.kept
+    # Where most events leave nothing peaks begin at the lowest, not at nothing.
+    lowest = float(over.min(initial=_CAP))
     while len(values):
-        higher = float(np.quantile(values, 1.0 - share))
-        if not higher:  # most events leave nothing: peaks begin at the lowest, not at nothing
-            higher = float(values[values > 0.0].min(initial=_CAP))
+        higher = max(float(np.quantile(values, 1.0 - share)), lowest)
         peaks = values[values > higher]
         if len(peaks) < choice.least_peaks:
             break
