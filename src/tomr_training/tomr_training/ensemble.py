@@ -1,7 +1,6 @@
 """Window networks of different drives that decide together (Lakshminarayanan 2017).
 
-What one of them makes too much of, as of a shove or a slope, the others do not; a fault they all
-see.
+What one of them has from chance the others have not.
 """
 
 from collections.abc import Sequence

@@ -40,10 +40,11 @@ file, bit by bit, on the same machine. Needs torch: pip install -r requirements-
 
 _BANDS = {"calibrated": BandSettings(), "paper": PAPER_BANDS}
 Counts = NDArray[np.int64]
+# Of the shipped weights.
 _FIRST_SEEDS = {
     "window": (10_000_000, 40_000_000, 50_000_000),
     "wang2024": (10_000_000,),
-}  # as shipped
+}
 _CHUNK = 10_000  # examples that are validated at a time
 # The paper's six, and what is none of them.
 _NAMES = (*(state.name for state in STATES), "beyond these")
