@@ -374,7 +374,7 @@ def test_where_a_force_explains_the_same_there_is_no_evidence_either_way() -> No
 
 def test_it_is_looked_for_where_that_is_asked_for_alone() -> None:
     """There the network sees nothing in it, and the belief gathers it."""
-    off = 0.4 * BAND / of_friction(20, 1, 1.0)[1]
+    off = 0.37 * BAND / of_friction(20, 1, 1.0)[1]
     healthy = [frame(t, NOTHING) for t in range(3 * SECOND)]
     ticks = [*healthy, *(frame(3 * SECOND + t, of_friction(t, 1, off)) for t in range(8 * SECOND))]
     named = []
