@@ -45,6 +45,19 @@ def test_rate_is_kept_as_often_as_the_confidence_says() -> None:
     assert np.median(rates) > 0.3 * wanted  # nor is it more careful than it has to be
 
 
+@pytest.mark.parametrize("shown", [0.1, 0.24, 0.26])
+def test_rate_is_kept_where_most_events_leave_nothing(shown: float) -> None:
+    """Peaks of 5.5 decades and an exponential part, of so many of the events."""
+    wanted, per_hour, scale, rates = 0.05, 30.0, 3.0, []
+    for seed in range(30):
+        random = np.random.default_rng(seed)
+        peaks = np.where(random.random(390) < shown, 5.5 + random.exponential(scale, 390), 0.0)
+        level = alarm_level([Tail.of("", peaks, per_hour, CHOICE)], wanted, 0.0, CHOICE)
+        rates.append(per_hour * shown * np.exp(-(level.needed + SURE - 5.5) / scale))
+    assert kept_share(rates, wanted) >= CHOICE.confidence
+    assert np.median(rates) > 0.3 * wanted
+
+
 def test_rate_is_kept_where_evidence_comes_in_clusters() -> None:
     """Each tick exponential, and like those of the second before: peaks of 10 s count once."""
     wanted, tick, hours = 2.0, 0.05, 100.0
