@@ -43,6 +43,7 @@ def _ramp(start: float, mass: float, random: Random) -> list[Bump]:
             length,
             (share * pull * math.cos(azimuth), share * pull * math.sin(azimuth)),
             0.0,
+            is_slope=True,
         )
         for at, length, share in (*onto, (top, long, 1.0), *off)
     ]

@@ -42,4 +42,5 @@ def test_bumps_stay() -> None:
     bump = Bump(1.0, 0.1, (3.0, 0.0), 0.2)
     bumped = over_ramps(evolve(DRIVES[0], bumps=(bump,)))
     assert bump in bumped.bumps
+    assert [one.is_slope for one in bumped.bumps if one != bump] == [True] * (len(bumped.bumps) - 1)
     assert len(bumped.bumps) > 1

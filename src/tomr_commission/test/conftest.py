@@ -43,7 +43,7 @@ def steady() -> Callable[..., Observed]:
         units = np.array(["W"] * 4 + ["rad/s"] * 3 + ["W"] * 3)
         stamps = 50_000_000 * np.arange(1, ticks + 1, dtype=np.int64)
         missing = np.full(modelled.shape, "", dtype="<U1")
-        yaw = np.full((ticks, 2), np.nan)
-        return Observed(name, stamps, residual, modelled, missing, units, yaw)
+        yaw, along = np.full((ticks, 2), np.nan), np.full((ticks, 4), np.nan)
+        return Observed(name, stamps, residual, modelled, missing, units, yaw, along)
 
     return make

@@ -44,6 +44,21 @@ def test_the_band_of_a_gyro_is_widened_where_healthy_driving_asks_for_it(steady:
     assert band(0.1).yaw_relative / usual.yaw_relative > 4.0
 
 
+def test_the_band_of_an_accelerometer_as_well(steady: Steady) -> None:
+    usual, drive = BandSettings(), steady()
+    random = np.random.default_rng(2)
+
+    def band(sigma: float) -> BandSettings:
+        along = np.hstack([random.normal(0.0, sigma, (4000, 2)), np.full((4000, 2), 0.5)])
+        return bands_of([evolve(drive, along=along)], BandChoice(margin=1.5))
+
+    assert bands_of([drive], BandChoice()).along == usual.along
+    assert band(0.02).along == usual.along
+    assert band(0.2).along == pytest.approx(1.5 * 3.29 * 0.2, rel=0.1)
+    assert band(0.2).along_relative / usual.along_relative > 3.0
+    assert band(0.2).yaw == usual.yaw
+
+
 def test_regimes_of_a_start_and_a_reversal(steady: Steady) -> None:
     drive = steady(ticks=60)
     modelled = drive.modelled.copy()

@@ -69,3 +69,15 @@ def test_the_gyro_is_seen_with_its_band(healthy: Observed) -> None:
     assert second.code == 0
     narrow = BandSettings(yaw_transient=0.0)
     assert frames_of(drive, narrow)[2].yaw.code == -1
+
+
+def test_the_accelerometer_is_seen_with_its_bands(healthy: Observed) -> None:
+    along = np.array([[np.nan] * 4, [0.1, -0.7, 2.0, 1.0], [0.1, -0.7, 3.0, 1.0]])
+    drive = evolve(healthy.part(slice(0, 3), "three"), along=along)
+    unknown, first, second = (frame.along for frame in frames_of(drive, BandSettings()))
+    assert all(item.stale for item in unknown)
+    x, y = first
+    assert (x.residual, x.modelled, x.unit, x.code) == (0.1, 2.0, "m/s^2", 0)
+    assert (y.residual, y.modelled, y.unit, y.code) == (-0.7, 1.0, "m/s^2", -1)
+    # 0.15 of 3 m/s^2, and 0.3 of the 1 m/s^2 by which it moved; along y the least.
+    assert np.isclose([item.band for item in second], [0.75, 0.3]).all()

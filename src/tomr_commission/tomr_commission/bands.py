@@ -6,7 +6,13 @@ import numpy as np
 from attrs import asdict, evolve, frozen
 from numpy.typing import NDArray
 
-from tomr_commission.observed import Observed, band_of, reports_currents, yaw_band_of
+from tomr_commission.observed import (
+    Observed,
+    along_bands_of,
+    band_of,
+    reports_currents,
+    yaw_band_of,
+)
 from tomr_commission.request import BandChoice
 from tomr_fault_diag.residuals.calibrated import fit_bands, widened
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL
@@ -40,22 +46,31 @@ def bands_of(drives: Sequence[Observed], choice: BandChoice) -> BandSettings:
         str(drives[0].units[MOTORS.start]),
         choice.within,
     )
-    wide = _yaw_widened(drives, widened(fitted, choice.margin, choice.speed_factor), choice)
+    wide = _inertial_widened(drives, widened(fitted, choice.margin, choice.speed_factor), choice)
     return BandSettings(**{name: float(f"{value:.4g}") for name, value in asdict(wide).items()})
 
 
-def _yaw_widened(
+def _inertial_widened(
     drives: Sequence[Observed], bands: BandSettings, choice: BandChoice
 ) -> BandSettings:
-    """Bands in which a gyro's healthy residuals stay: as they are, or wider."""
-    ratio = np.concatenate(
-        [np.abs(drive.yaw[:, 0]) / yaw_band_of(drive, bands) for drive in drives]
+    """Bands in which the healthy residuals of an IMU stay: as they are, or wider."""
+
+    def wider(ratios: Sequence[Array]) -> float:
+        ratio = np.concatenate([ratio.ravel() for ratio in ratios])
+        known = ratio[np.isfinite(ratio)]
+        if not len(known):
+            return 1.0
+        return max(choice.margin * float(np.quantile(known, choice.within)), 1.0)
+
+    yaw = wider([np.abs(drive.yaw[:, 0]) / yaw_band_of(drive, bands) for drive in drives])
+    along = wider([np.abs(drive.along[:, :2]) / along_bands_of(drive, bands) for drive in drives])
+    return evolve(
+        bands,
+        yaw=yaw * bands.yaw,
+        yaw_relative=yaw * bands.yaw_relative,
+        along=along * bands.along,
+        along_relative=along * bands.along_relative,
     )
-    known = ratio[np.isfinite(ratio)]
-    if not len(known):
-        return bands
-    wider = max(choice.margin * float(np.quantile(known, choice.within)), 1.0)
-    return evolve(bands, yaw=wider * bands.yaw, yaw_relative=wider * bands.yaw_relative)
 
 
 def regimes(drive: Observed) -> Mapping[str, Mask]:

@@ -17,7 +17,7 @@ from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import (
     MOTORS,
-    NO_GYRO,
+    NO_IMU,
     NOT_MEASURED,
     RESIDUALS,
     SPEEDS,
@@ -25,6 +25,7 @@ from tomr_fault_diag.residuals.frame import (
     UNITS,
     Residual,
     ResidualFrame,
+    Unit,
     rounded,
 )
 from tomr_fault_diag.residuals.settings import BandSettings
@@ -48,6 +49,7 @@ class Observed:
     missing: NDArray[np.str_]  # why a residual is unknown, empty where it is known, (n, 10)
     units: NDArray[np.str_]  # of the residuals, (10,)
     yaw: Array  # gyro less wheels, and yaw rate as the wheels show [rad/s], (n, 2)
+    along: Array  # accelerometer less wheels along x and y, and as the wheels show [m/s^2], (n, 4)
 
     @classmethod
     def of(cls, name: str, frames: list[ResidualFrame]) -> Self:
@@ -67,6 +69,12 @@ class Observed:
             np.array([[item.missing for item in row] for row in rows], dtype=np.str_),
             np.array(units),
             np.array([[frame.yaw.residual, frame.yaw.modelled] for frame in frames]),
+            np.array(
+                [
+                    [*(one.residual for one in frame.along), *(one.modelled for one in frame.along)]
+                    for frame in frames
+                ]
+            ),
         )
 
     @property
@@ -117,6 +125,7 @@ class Observed:
             self.missing[rows],
             self.units,
             self.yaw[rows],
+            self.along[rows],
         )
 
 
@@ -173,6 +182,13 @@ def yaw_band_of(observed: Observed, bands: BandSettings) -> Array:
     return np.asarray(width + bands.yaw_transient * _moved(wheels))[:, 0]
 
 
+def along_bands_of(observed: Observed, bands: BandSettings) -> Array:
+    """Half widths of the bands of the acceleration along x and y [m/s^2], (n, 2)."""
+    wheels = observed.along[:, 2:]
+    width = np.maximum(bands.along, bands.along_relative * np.abs(np.nan_to_num(wheels)))
+    return np.asarray(width + bands.along_transient * _moved(wheels))
+
+
 def frames_of(observed: Observed, bands: BandSettings) -> list[ResidualFrame]:
     """The frames that the residual stage publishes with some bands."""
     width = band_of(observed, bands)
@@ -184,6 +200,7 @@ def frames_of(observed: Observed, bands: BandSettings) -> list[ResidualFrame]:
         observed.modelled.tolist(),
         observed.missing.tolist(),
         zip(observed.yaw.tolist(), yaw_band_of(observed, bands).tolist(), strict=True),
+        zip(observed.along.tolist(), along_bands_of(observed, bands).tolist(), strict=True),
         strict=True,
     )
     return [
@@ -195,7 +212,20 @@ def frames_of(observed: Observed, bands: BandSettings) -> list[ResidualFrame]:
                     residuals, widths, models, units, absent, strict=True
                 )
             ),
-            yaw=Residual(yaw, rounded(band), wheels, "rad/s", "" if yaw == yaw else NO_GYRO),
+            yaw=_of_imu(yaw, band, wheels, "rad/s"),
+            along=(
+                _of_imu(x, x_band, x_wheels, "m/s^2"),
+                _of_imu(y, y_band, y_wheels, "m/s^2"),
+            ),
         )
-        for stamp, residuals, widths, models, absent, ((yaw, wheels), band) in rows
+        for (
+            *(stamp, residuals, widths, models, absent),
+            ((yaw, wheels), band),
+            ((x, y, x_wheels, y_wheels), (x_band, y_band)),
+        ) in rows
     ]
+
+
+def _of_imu(residual: float, band: float, wheels: float, unit: Unit) -> Residual:
+    missing = "" if residual == residual else NO_IMU
+    return Residual(residual, rounded(band), wheels, unit, missing)

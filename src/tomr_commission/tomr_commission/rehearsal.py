@@ -187,5 +187,6 @@ def observed_of(drive: Drive) -> Observed:
         np.asarray(compared.modelled),
         missing,
         units,
-        np.full((len(residual), 2), np.nan),  # a gyro is not simulated
+        np.full((len(residual), 2), np.nan),  # an IMU is not simulated
+        np.full((len(residual), 4), np.nan),
     )

@@ -17,7 +17,7 @@ from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.classifier.states import MOTOR, NORMAL, SLIP, STATES, State
 from tomr_fault_diag.classifier.window_network import WindowNetwork
 from tomr_fault_diag.residuals.frame import (
-    NO_GYRO,
+    NO_IMU,
     NOT_BELIEVED,
     RESIDUALS,
     SPEEDS,
@@ -131,7 +131,7 @@ def test_a_gyro_that_is_mounted_otherwise_is_never_believed(rate: float) -> None
 
 def test_a_robot_without_one_misses_nothing_else() -> None:
     with_one, without = frames(lambda at_ms: RATE), frames(lambda at_ms: None)
-    assert {frame.yaw.missing for frame in without.values()} == {NO_GYRO}
+    assert {frame.yaw.missing for frame in without.values()} == {NO_IMU}
     assert repr(without[5000].residuals) == repr(with_one[5000].residuals)
 
 
@@ -151,7 +151,7 @@ def test_the_mean_is_of_the_tick() -> None:
 
 
 def test_it_is_left_out_where_the_robot_says_so() -> None:
-    settings = ResidualSettings(watch_gyro=False)
+    settings = ResidualSettings(watch_gyro=False, watch_accelerometer=False)
     topics = {item.topic for item in residual_inputs(ROBOT, ResidualStage(ROBOT, settings))}
     assert "imu/data" not in topics
     (gyro,) = (

@@ -92,9 +92,11 @@ def frames(
     motion: Callable[[float], Array] = twist_at,
     more: Array | None = None,
     turned: int = 0,
+    sloping: float = math.nan,
 ) -> Iterator[ResidualFrame]:
     """Ticks of wheels that turn as they should; `more`: that each motor draws besides [W];
-    `turned`: by so many thirds of a turn is the robot called otherwise."""
+    `turned`: by so many thirds of a turn is the robot called otherwise; `sloping`: share of the
+    force that is a slope's, which an accelerometer feels; NaN without one."""
     random, yaw = np.random.default_rng(3), 0.0
     for tick in range(round(seconds / PERIOD)):
         time = tick * PERIOD
@@ -105,7 +107,9 @@ def frames(
         shown = power(-(BODY.to_twist.T @ wrench(time, twist, yaw)), speed) - explained
         shown = shown + 0.1 * BAND * random.standard_normal(3) + (0.0 if more is None else more)
         rows = (np.roll(item, turned).tolist() for item in (speed, shown, explained))
-        yield frame(tick, *rows)
+        felt = -sloping * wrench(time, twist, yaw)[:2] / MASS
+        x, y = (Residual(off, 0.3, 0.0, "m/s^2") for off in felt.tolist())
+        yield evolve(frame(tick, *rows), along=(x, y))
 
 
 def frame(tick: int, speed: list[float], shown: list[float], power: list[float]) -> ResidualFrame:
@@ -130,6 +134,28 @@ def test_what_drags_whichever_way_the_robot_goes_is_a_load(hitch: float) -> None
     items = found(frames(cart(0.8, hitch)))
     assert first(items) < 3.0  # the second direction shows it
     assert all(item.load for item in items[-20:])
+
+
+@pytest.mark.parametrize("azimuth", [0.5, 2.5])
+def test_a_slope_that_an_accelerometer_feels_acts_from_nowhere(azimuth: float) -> None:
+    unknown = found(frames(fixed(0.7, azimuth), 8.0))
+    assert unknown[-1].push
+    felt = found(frames(fixed(0.7, azimuth), 8.0, sloping=1.0))
+    assert set(felt) == {NOTHING_ACTS}
+
+
+def test_what_no_slope_is_and_no_person_does_is_a_load() -> None:
+    """Nobody pushes for four seconds with so much; a slope would be felt."""
+    unknown = found(frames(fixed(0.7), 8.0))
+    assert not any(item.load for item in unknown)
+    assert 3.8 <= first(found(frames(fixed(0.7), 8.0, sloping=0.0))) < 5.0
+    assert first(found(frames(fixed(1.0), 8.0, sloping=0.4))) < 5.0  # and a slope besides
+    assert first(found(frames(fixed(0.25), 8.0, sloping=0.0))) == math.inf
+
+    def leans(time: float, twist: Array, yaw: float) -> Array:
+        return fixed(0.7)(time, twist, yaw) * (2.0 <= time < 5.0)
+
+    assert first(found(frames(leans, 8.0, sloping=0.0))) == math.inf
 
 
 @pytest.mark.parametrize("more", [1.0, 1.5, 3.0])

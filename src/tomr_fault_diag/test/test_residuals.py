@@ -24,6 +24,7 @@ from tomr_power_model.robot import Robot, shipped_robot
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
+FRAME = 13  # statuses of a frame
 NAN = math.nan
 SPEED = (4.0, -4.0, 0.0)
 
@@ -483,18 +484,18 @@ def test_a_band_without_width_is_refused(band: str, residual: str) -> None:
     pairs = [Message(key=key, value=value) for key, value in values.items()]
     status = Message(name="x", message="high by 1 W", values=pairs)
     with pytest.raises(Unusable, match=f"x: a band of {float(band):g}, it must be above 0"):
-        frame_of(Message(status=[status] * 11), BASE)
+        frame_of(Message(status=[status] * FRAME), BASE)
 
 
 @pytest.mark.parametrize(
     "message",
     [
         Message(status=[]),
-        Message(status=[Message(name="x", message="", values=[])] * 11),
+        Message(status=[Message(name="x", message="", values=[])] * FRAME),
         Message(
             status=[
                 Message(name="x", message="", values=[Message(key="residual", value="a")])
-            ] * 11
+            ] * FRAME
         ),
     ],
 )  # fmt: skip

@@ -20,13 +20,14 @@ from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.slides import SlideWatch, _is_plain
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.classifier.states import NORMAL, SLIP, STATES
-from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
+from tomr_fault_diag.residuals.frame import SPEEDS, UNKNOWN_FORCE, Residual, ResidualFrame
 from tomr_power_model.robot import shipped_robot
 from tomr_power_model.slides.body import body_of
 from tomr_power_model.slides.particles import Pull, Slides
 
 Array = NDArray[np.float64]
 Twist = Callable[[float], Array]  # of the rims as if they rolled, at a time [s]
+Felt = Callable[[float], tuple[float, float]]
 Forces = Callable[[float, Array, Array], Array]  # of contacts [N]; of rolling, at rims [m/s]
 
 ROBOT = shipped_robot("reference")
@@ -91,8 +92,11 @@ def power(force: Array, speed: Array, change: Array) -> Array:
     return MOTORS.resistance * current**2 + MOTORS.constant * speed * current + MOTORS.idle
 
 
-def frames(forces: Forces, seconds: float = 4.0, yaw: float = math.nan) -> list[ResidualFrame]:
-    """Ticks of 50 ms of rims that turn as commanded; powers are explained by rolling."""
+def frames(
+    forces: Forces, seconds: float = 4.0, yaw: float = math.nan, felt: Felt | None = None
+) -> list[ResidualFrame]:
+    """Ticks of 50 ms of rims that turn as commanded; powers are explained by rolling. `felt`: by an
+    accelerometer beyond what rims show."""
     found, last = [], BODY.rows @ ahead(0.0)
     for tick in range(1, round(seconds / 0.05)):
         time = 0.05 * tick
@@ -106,8 +110,21 @@ def frames(forces: Forces, seconds: float = 4.0, yaw: float = math.nan) -> list[
         )
         explained = power(of_rolling, speed, change)
         shown = power(forces(time, of_rolling, rims), speed, change) - explained
-        found.append(frame(tick, speed, shown, explained, yaw))
+        item = frame(tick, speed, shown, explained, yaw)
+        if felt is not None:
+            change_of_body = BODY.to_twist @ (RADIUS * change) + turning
+            x, y = (
+                Residual(more, 0.3, model, "m/s^2")
+                for more, model in zip(felt(time), change_of_body.tolist()[:2], strict=True)
+            )
+            item = evolve(item, along=(x, y))
+        found.append(item)
     return found
+
+
+def since(begin: float, x: float, y: float) -> Felt:
+    """Felt from a time on [m/s^2]."""
+    return lambda time: (x, y) if time >= begin else (0.0, 0.0)
 
 
 def frame(
@@ -208,6 +225,62 @@ def test_a_gyro_tells_a_slide_sooner() -> None:
     alone = probabilities(frames(pushed(np.array([-4.0, 0.0, 0.0]), 2.2, 9.0)))
     seen = probabilities(frames(pushed(np.array([-4.0, 0.0, 0.0]), 2.2, 9.0), yaw=-0.25))
     assert np.nanmax(alone) < 0.5 < np.nanmax(seen[45:])
+
+
+def forces_stay(items: list[ResidualFrame]) -> list[float]:
+    """Times [s] at which a force is said to stay."""
+    watch = SlideWatch(ROBOT)
+    return [0.05 * (n + 1) for n, item in enumerate(items) if watch.take(item).force]
+
+
+def test_a_slope_that_is_felt_is_known_at_once_and_what_pushes_is_none() -> None:
+    """Of a slope an accelerometer feels what the motors do, of a push nothing."""
+    push = pushed(BODY.mass * np.array([-0.6, 0.2, 0.0]), 2.175, 9.0)
+    unknown = forces_stay(frames(push))
+    sloping = forces_stay(frames(push, felt=since(2.175, 0.6, -0.2)))
+    leant_on = forces_stay(frames(push, felt=since(2.175, 0.0, 0.0)))
+    assert 2.2 <= sloping[0] <= 2.45
+    assert not unknown or unknown[0] > sloping[0] + 0.3
+    assert len(sloping) > 0.9 * (4.0 - sloping[0]) / 0.05
+    assert not leant_on
+
+
+def test_what_is_felt_counts_for_nothing_where_an_encoder_is_far_off() -> None:
+    """For then wheels do not show how the body moves."""
+    push = pushed(BODY.mass * np.array([-0.6, 0.2, 0.0]), 2.175, 9.0)
+    items = frames(push, felt=since(2.175, 0.6, -0.2))
+
+    def lost(item: ResidualFrame) -> ResidualFrame:
+        off = [evolve(item.residuals[k], residual=-0.7) for k in SPEEDS]
+        return evolve(item, residuals=(*item.residuals[:4], *off, *item.residuals[7:]))
+
+    seen = [lost(item) for item in items]
+    deaf = [evolve(item, along=(UNKNOWN_FORCE, UNKNOWN_FORCE)) for item in seen]
+    one, other = SlideWatch(ROBOT), SlideWatch(ROBOT)
+    assert repr([one.take(item) for item in seen]) == repr([other.take(item) for item in deaf])
+
+
+def test_a_slide_is_one_whatever_is_felt_of_it() -> None:
+    """An accelerometer feels no more than what contacts hand on."""
+    slippery = Slippery()
+
+    def felt(time: float) -> tuple[float, float]:
+        if time < 2.05:
+            return 0.0, 0.0
+        handed = handed_on[round(time / 0.05)]
+        rims, last = (BODY.rows @ ahead(at) for at in (time, time - 0.05))
+        change = BODY.to_twist @ (rims - last) / 0.05 + turned(ahead(time))
+        x, y, _ = np.linalg.solve(BODY.inertia, BODY.rows.T @ handed) - change
+        return float(x), float(y)
+
+    handed_on: dict[int, Array] = {}
+
+    def noted(time: float, of_rolling: Array, rims: Array) -> Array:
+        handed_on[round(time / 0.05)] = slippery(time, of_rolling, rims)
+        return handed_on[round(time / 0.05)]
+
+    found = probabilities(frames(noted, felt=felt))
+    assert (found[39 + 8 :] > 0.6).all()
 
 
 def test_both_currents_leave_a_motor_its_power() -> None:

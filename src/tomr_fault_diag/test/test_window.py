@@ -725,6 +725,13 @@ def test_what_a_slope_explains_accuses_no_wheel(kind: slice) -> None:
     assert accused(40, 0, on_a_slope) == (kind is METERS)
     assert accused(30, 40, on_the_level)
     assert accused(30, 70, on_a_slope)
+    # What fits nothing accuses none, and lets none be accused.
+    judge.clear()
+    network.likelihoods[[kind.start, OTHER]] = -30.0, 4.0
+    accused(40, 0, on_a_slope)
+    assert judge._best == OTHER
+    network.likelihoods[[kind.start, OTHER]] = 12.0, 4.0
+    assert accused(20, 40, on_a_slope) == (kind is METERS)
 
 
 def test_where_it_grips_or_within_bands_of_its_own_a_robot_hardly_slips() -> None:
@@ -745,6 +752,12 @@ def test_where_it_grips_or_within_bands_of_its_own_a_robot_hardly_slips() -> Non
     assert said("2026-01-01", calm) == pytest.approx(plain - 2.0)
     assert said("2026-01-01", grips) == pytest.approx(plain - [2.0, 0.0])
     assert said("2026-01-01", slides) == said("", calm) == said("", grips) == list(plain)
+    # What an accelerometer feels of it counts more, and without commissioning as well.
+    felt = Contacts(0.09, felt=True)
+    assert said("2026-01-01", felt) == said("", felt) == pytest.approx(plain - 10.0)
+    assert said("2026-01-01", evolve(calm, felt=True)) == pytest.approx(plain - 10.0)
+    assert said("", evolve(calm, felt=True)) == list(plain)
+    assert said("2026-01-01", Contacts(0.11, felt=True)) == list(plain)
 
 
 def test_a_robot_that_stands_says_the_same_again_and_again() -> None:

@@ -11,7 +11,13 @@ from tomr_odometry.estimate import Estimate
 from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.grip import SIDE, Grid
 from tomr_odometry.settings import OdometrySettings
-from tomr_power_model.messages.intake import Unusable, WheelFinder, stamp_of, twist_of
+from tomr_power_model.messages.intake import (
+    Unusable,
+    WheelFinder,
+    specific_force_of,
+    stamp_of,
+    twist_of,
+)
 from tomr_power_model.messages.motion import odometry, quaternion, transform_of
 from tomr_power_model.messages.plain import (
     Level,
@@ -62,19 +68,15 @@ class Published:
 
 def imu_of(message: Any) -> tuple[float, ...]:
     """Angular rates [rad/s] and specific forces [m/s^2] of an Imu; NaN where it says none."""
-    rate, force = message.angular_velocity, message.linear_acceleration
-    values = [float(rate.x), float(rate.y), float(rate.z)]
-    values += [float(force.x), float(force.y), float(force.z)]
+    rate, covariance = message.angular_velocity, message.angular_velocity_covariance
+    rates = [float(rate.x), float(rate.y), float(rate.z)]
     # A covariance that begins with -1 says that the quantity is not measured.
-    for first, covariance in (
-        (0, message.angular_velocity_covariance),
-        (3, message.linear_acceleration_covariance),
-    ):
-        if len(covariance) and float(covariance[0]) == -1.0:
-            values[first : first + 3] = [math.nan] * 3
-    if not math.isfinite(values[2]) and not math.isfinite(values[3]):
+    if len(covariance) and float(covariance[0]) == -1.0:
+        rates = [math.nan] * 3
+    force = specific_force_of(message)
+    if not math.isfinite(rates[2]) and not math.isfinite(force[0]):
         raise Unusable("neither the yaw rate nor the acceleration is finite")
-    return tuple(value if math.isfinite(value) else math.nan for value in values)
+    return (*(value if math.isfinite(value) else math.nan for value in rates), *force)
 
 
 def odometry_inputs(robot: Robot, core: SlipOdometry) -> tuple[Input, ...]:

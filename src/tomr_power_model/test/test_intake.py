@@ -18,6 +18,7 @@ from tomr_power_model.messages.intake import (
     WheelFinder,
     battery_of,
     numbers_of,
+    specific_force_of,
     stamp_of,
     twist_of,
 )
@@ -103,6 +104,20 @@ def test_twists_with_and_without_stamp() -> None:
     assert stamp_of(_twist(1.0, 0), 7, fallback=True) == 7
     with pytest.raises(Unusable, match="finite"):
         twist_of(_twist(math.nan))
+
+
+def test_a_specific_force_is_what_an_imu_measures_of_it() -> None:
+    def imu(*force: float, covariance: float = 0.0) -> Any:
+        message = MagicMock(linear_acceleration_covariance=[covariance] * 9)
+        axes = zip("xyz", force, strict=True)
+        message.linear_acceleration = MagicMock(**dict(axes))
+        return message
+
+    assert specific_force_of(imu(1.0, -2.0, 9.8)) == (1.0, -2.0, 9.8)
+    # -1 says that it is not measured; what no robot on wheels feels is none.
+    for message in (imu(1.0, -2.0, 9.8, covariance=-1.0), imu(1.0, 1e6, 9.8)):
+        assert np.isnan(specific_force_of(message)).all()
+    assert np.isnan(specific_force_of(imu(math.inf, 2.0, 9.8))).tolist() == [True, False, False]
 
 
 def test_battery_voltage_may_be_missing_but_not_the_current() -> None:

@@ -8,7 +8,7 @@ from attrs import evolve
 from tomr_fault_diag.residuals.frame import MOTORS, SPEEDS
 from tomr_sim_bridge.missions.schema import PlannedFault
 from tomr_training.drives import Bump, Drive
-from tomr_training.simulated_drive import healthy_twin, simulated_drive
+from tomr_training.simulated_drive import START_NS, healthy_twin, simulated_drive
 
 Straight = Callable[..., Drive]
 
@@ -54,3 +54,19 @@ def test_a_twin_is_the_same_drive_without_its_fault(straight: Straight) -> None:
     assert change[:30].max() == 0.0
     assert change[30:34].max() > 2.0
     assert change[45:].max() < 0.5
+
+
+def test_an_accelerometer_feels_the_slope_that_pulls_and_no_push(straight: Straight) -> None:
+    """For half a second 0.6 m/s^2 along x, on wheels that hold the robot."""
+    mass = straight().plant.mass
+    push = Bump(3.0, 0.5, (-0.6 * mass, 0.0), 0.0)
+    felt = {}
+    for is_slope in (False, True):
+        seen = simulated_drive(straight(bumps=(evolve(push, is_slope=is_slope),)))
+        begin = next(n for n, one in enumerate(seen.frames) if one.stamp_ns > START_NS + 3.2e9)
+        while_it_pulls = [one.along[0].residual for one in seen.frames[begin : begin + 5]]
+        felt[is_slope] = float(np.mean(while_it_pulls))
+        after = [one.along[0].residual for one in seen.frames[begin + 12 :]]
+        assert abs(np.mean(after)) < 0.05
+    assert abs(felt[False]) < 0.05
+    assert abs(felt[True] - 0.6) < 0.05

@@ -48,6 +48,7 @@ class Bump:
     duration: float  # s
     force: tuple[float, float]  # N in the world
     moment: float  # N m about the vertical
+    is_slope: bool = False  # the floor leans: an accelerometer does not feel it as a push
 
 
 @frozen

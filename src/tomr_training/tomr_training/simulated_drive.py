@@ -43,6 +43,7 @@ class ProbedSimulation(Simulation):
             stamp_jitter=mission.stamp_jitter,
         )
         self._edges = _edges(chosen.bumps)
+        self._gravity = self._design.gravity
         self._before = self._memory.latest.values
         self._ticks = 1
         self.rows: list[Array] = []
@@ -57,7 +58,9 @@ class ProbedSimulation(Simulation):
                 break
             found.extend(super().step_to(stop))
             if self._edges and stop == self._edges[0][0]:
-                self.engine.data.xfrc_applied[_BODY] = self._edges.pop(0)[1]
+                _, push, slope = self._edges.pop(0)
+                self.engine.data.xfrc_applied[_BODY] = push
+                self._design.gravity = self._gravity + slope / self._design.mass
             if stop == tick:
                 self._note()
         return found + super().step_to(stamp_ns)
@@ -79,16 +82,18 @@ class ProbedSimulation(Simulation):
         )
 
 
-def _edges(bumps: tuple[Bump, ...]) -> list[tuple[int, Array]]:
-    """Times [ns] at which the push on the body changes, and what it changes to."""
+def _edges(bumps: tuple[Bump, ...]) -> list[tuple[int, Array, Array]]:
+    """Times [ns] at which the push on the body changes, what it changes to, (6,), and what of that
+    is a slope's [N], (3,)."""
     times = sorted({t for bump in bumps for t in (bump.start, bump.start + bump.duration)})
     found = []
     for time in times:
-        push = np.zeros(6)
+        push, slope = np.zeros(6), np.zeros(3)
         for bump in bumps:
             if bump.start <= time < bump.start + bump.duration:
                 push += [*bump.force, 0.0, 0.0, 0.0, bump.moment]
-        found.append((START_NS + round(time * NANOSECONDS), push))
+                slope[:2] += bump.is_slope * np.array(bump.force)
+        found.append((START_NS + round(time * NANOSECONDS), push, slope))
     return found
 
 

@@ -188,15 +188,17 @@ class WindowJudge:
             return self._opinion
         likelihoods = self._seen(frame, unseen)
         is_well = self._best in _GROUPS[0]
-        grips = beside.contacts.calm or (beside.contacts.grips and is_well)
-        if (self._shaken or (grips and self.settings.commissioned)) and said[SLIP] <= 0.0:
-            likelihoods[SLIP] -= _DOUBTED
+        contacts = beside.contacts
+        grips = contacts.calm or (contacts.grips and is_well)
+        known = self.settings.commissioned or (contacts.felt and not contacts.calm)
+        if (self._shaken or (grips and known)) and said[SLIP] <= 0.0:
+            likelihoods[SLIP] -= _SHARED if grips and contacts.felt else _DOUBTED
         if self._shaken and is_well:
             likelihoods[CONTROLS] -= _DOUBTED
         if not self._shaken:
             likelihoods = self._with_lasting(likelihoods, beside.lasting)
         likelihoods = _with_outside(of_states(likelihoods + said), beside)
-        if beside.contacts.force and self._best in _GROUPS[0]:
+        if contacts.force and self._best in (*_GROUPS[0], OTHER):
             # What a slope explains accuses no wheel; one that is accused already stays so.
             likelihoods[CONTROLS.start : WEAKS.stop] -= _SHARED
         shares = self._belief.update(likelihoods)

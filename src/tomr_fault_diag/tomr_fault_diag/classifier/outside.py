@@ -51,6 +51,7 @@ class OutsideSettings:
     plainly: float = 6.0  # squared bands by which it is, at least
     drag: float = 0.35  # N/kg: no floor drags so much more than another
     person: float = 1.2  # N/kg: more than somebody pushes for seconds, or a steep floor does
+    longer: int = to_ns(3.8)  # than a person pushes, where an accelerometer excludes a floor
 
 
 @frozen
@@ -88,7 +89,7 @@ class OutsideWatch:
         self._looked_at = NEVER  # ns
         self._found_at = list(_NEVER_FOUND)  # ns, when each of what may be found last was
         self._yaw = 0.0  # rad
-        self._ticks: deque[tuple[int, Array, Array, Array, Array, float]] = deque()
+        self._ticks: deque[tuple[int, Array, Array, Array, Array, float, bool]] = deque()
         self._found = NOTHING_ACTS
 
     def _forget(self) -> None:
@@ -128,12 +129,15 @@ class OutsideWatch:
         if not off < self.settings.far:
             return
         shown, per_torque = self._torques(tick, follows=off < 1.0)
+        is_felt = not frame.along[0].stale
+        if is_felt:  # gravity, or a slide
+            shown = shown - self._per_newton @ [*(item.residual for item in frame.along), 0.0]
         bands = np.array([frame.residuals[k].band for k in ENCODERS])
         powers = np.where(np.abs(tick.speed) > MOVES, np.sign(per_torque) / bands, 0.0)
         seen = per_torque * powers
         shown = np.clip(seen * shown, -_MOST, _MOST)
         if np.isfinite(shown).all() and np.isfinite(seen).all():
-            self._ticks.append((frame.stamp_ns, shown, seen, powers, twist, self._yaw))
+            self._ticks.append((frame.stamp_ns, shown, seen, powers, twist, self._yaw, is_felt))
         while self._ticks and self._ticks[0][0] < frame.stamp_ns - self.settings.windows[-1]:
             self._ticks.popleft()
 
@@ -159,15 +163,16 @@ class OutsideWatch:
         for length in self.settings.windows:
             first = int(np.searchsorted(stamps, self._newest - length))
             if len(stamps) - first >= self.settings.ticks:
-                shown, seen, powers, twist, yaw = (column[first:] for column in columns)
+                shown, seen, powers, twist, yaw, felt = (column[first:] for column in columns)
                 window = Window(shown, seen, powers, twist, yaw, self._per_newton)
-                for place, is_so in enumerate(astuple(self._judge(window))):
+                lasts = bool(felt.all() and stamps[-1] - stamps[first] >= self.settings.longer)
+                for place, is_so in enumerate(astuple(self._judge(window, lasts=lasts))):
                     self._found_at[place] = self._newest if is_so else self._found_at[place]
             if first == 0:
                 break
         self._found = Outside(*(self._newest - at <= self.settings.holds for at in self._found_at))
 
-    def _judge(self, window: Window) -> Outside:
+    def _judge(self, window: Window, *, lasts: bool) -> Outside:
         s, total = self.settings, window.sum_of_squares
         if total < s.mean_square * len(window.shown):
             return NOTHING_ACTS
@@ -186,7 +191,8 @@ class OutsideWatch:
         may_be = explains(pushed, lone)
         sloping, pull = window.left_by_push(turns=False)
         # Where a wheel stands two residuals are left, which some force always explains.
-        is_tried, is_strong = may_be and window.moving > s.moving, force > s.person
+        is_tried = may_be and window.moving > s.moving
+        is_strong = force > (s.drag if lasts else s.person)
         return Outside(
             load=is_tried and is_strong,
             push=is_tried and not is_strong,

@@ -20,13 +20,14 @@ from attrs import evolve
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.contacts import NOTHING, Contacts, LoneWheelWatch
+from tomr_fault_diag.classifier.misfit import is_far
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.severity.tick import MOVES, Tick
-from tomr_fault_diag.residuals.frame import BAND_SIGMAS, ENCODERS, Residual, ResidualFrame
+from tomr_fault_diag.residuals.frame import BAND_SIGMAS, ENCODERS, SPEEDS, Residual, ResidualFrame
 from tomr_power_model.model.ticks import NANOSECONDS, NEVER, to_ns
 from tomr_power_model.robot import Robot
 from tomr_power_model.slides.body import body_of, rolling_forces
-from tomr_power_model.slides.particles import Pair, Particles, ParticleSettings, Pull
+from tomr_power_model.slides.particles import Felt, Pair, Particles, ParticleSettings, Pull
 
 Array = NDArray[np.float64]
 
@@ -42,6 +43,7 @@ _STEEP = 0.2  # N/kg
 _HOLDS = to_ns(0.5)  # where the motion changes
 _PLAIN = 3.0  # standard deviations of a force that is there
 _OFF = 1.2  # standard deviations of what it leaves
+_LEAST_FORCE = 0.1  # m/s^2, that of an accelerometer
 _LEAST_YAW = 0.02  # rad/s, standard deviation of a gyro beside the wheels
 
 
@@ -95,6 +97,7 @@ class SlideWatch:
             self._found = self._follow(frame)
         else:
             self._rest()
+            self._found = evolve(self._found, felt=_is_felt(frame))
         self._recent.append(frame)
         while self._recent[0].stamp_ns < frame.stamp_ns - _BEFORE:
             self._recent.popleft()
@@ -118,11 +121,15 @@ class SlideWatch:
             if not yaw.stale:
                 std = max(yaw.band / BAND_SIGMAS, _LEAST_YAW)
                 self._particles.turns(yaw.modelled + yaw.residual, std)
+            is_felt = _is_felt(frame)
+            if is_felt:
+                self._particles.feels(_felt(frame))
             self._particles.step((tick.stamp_ns - last.stamp_ns) / NANOSECONDS, rims)
             found = self._lone.take(tick, self._particles.slides(rims).any_probability)
             if found.grips and _is_plain(self._particles.pull()):
                 self._pulled_at = tick.stamp_ns
-            return evolve(found, force=tick.stamp_ns - self._pulled_at <= _HOLDS)
+            holds = tick.stamp_ns - self._pulled_at <= _HOLDS
+            return evolve(found, force=holds, felt=is_felt)
 
     def _weigh(self, tick: Tick, rims: Array) -> None:
         """Hand on what the powers show of the contacts."""
@@ -154,6 +161,19 @@ class SlideWatch:
         slope = np.abs(2.0 * motors.resistance * current + motors.constant * tick.speed)
         watts = noise + _POWER_SHARE * np.abs(tick.power)
         return np.asarray(newtons * watts / np.maximum(slope, _LEAST_SLOPE))
+
+
+def _is_felt(frame: ResidualFrame) -> bool:
+    """Whether an accelerometer shows how the body moves, and the wheels as well."""
+    return not frame.along[0].stale and not any(is_far(frame.residuals[k]) for k in SPEEDS)
+
+
+def _felt(frame: ResidualFrame) -> Felt:
+    """What an accelerometer shows of a tick."""
+    beyond = np.array([item.residual for item in frame.along])
+    std = np.array([item.band for item in frame.along]) / BAND_SIGMAS
+    model = np.array([item.modelled for item in frame.along])
+    return Felt(force=model + beyond, std=np.maximum(std, _LEAST_FORCE), pull=-beyond)
 
 
 def _is_hint(frame: ResidualFrame) -> bool:

@@ -17,6 +17,7 @@ from tomr_fault_diag.classifier.outside import NOTHING_ACTS, Outside, OutsideWat
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.severity import Severity, SeverityWatch
 from tomr_fault_diag.classifier.slides import SlideWatch
+from tomr_fault_diag.classifier.slope import SlopeFilter
 from tomr_fault_diag.classifier.states import (
     BURDENED,
     DISOBEYS,
@@ -82,12 +83,14 @@ class FaultClassifier:
         *,
         slides: SlideWatch | None = None,
         outside: OutsideWatch | None = None,
+        slope: SlopeFilter | None = None,
         lasting: LastingWatch | None = None,
         misfits: MisfitWatch | None = None,
         turning: Array | None = None,
     ) -> None:
         """Without `severity` it is not stated how bad a fault is, nor what has changed slowly;
-        without `slides` residuals alone show a slip, without `outside` a load; without `lasting`
+        without `slides` residuals alone show a slip, without `outside` a load; without `slope` what
+        an accelerometer feels of one stays in the residuals; without `lasting`
         small faults are not looked for; without `misfits` it is not known what a motor draws that
         is not driven; without `turning`, the yaw rate per wheel speed (3,), a gyro bears no
         encoder out."""
@@ -96,6 +99,7 @@ class FaultClassifier:
         self._severity = severity
         self._slides = slides
         self._outside = outside
+        self._slope = slope
         self._motion = MotionWatch()
         self._misfits = misfits or MisfitWatch()
         self._turning = turning
@@ -115,6 +119,7 @@ class FaultClassifier:
             severity,
             slides=SlideWatch(robot),
             outside=OutsideWatch(robot),
+            slope=SlopeFilter(robot),
             lasting=LastingWatch(robot) if judge.settings.small_faults else None,
             misfits=MisfitWatch(Motors(robot).idle.tolist()),
             turning=Body.of(robot).to_twist[2],
@@ -146,6 +151,7 @@ class FaultClassifier:
         self._stamp = 0
         self._opinion: Opinion | None = None
         self._unseen = Unseen()
+        self._contacts, self._acts = NOTHING, NOTHING_ACTS
         self._usable = True
         self._state: State | None = None
         self._since = 0
@@ -174,10 +180,11 @@ class FaultClassifier:
         elapsed = frame.stamp_ns - self._stamp if self._stamp else 0
         self._stamp = frame.stamp_ns
         before = self._state
-        self._decide(frame, elapsed)
+        level = self._leveled(frame)
+        self._decide(level, elapsed)
         assert self._state is not None
         if self._severity is not None:
-            self._severity.take(frame, self._state, self._wheel)
+            self._severity.take(level, self._state, self._wheel)
         changed = self._state != before
         if not changed and not self._is_periodic(frame.stamp_ns, elapsed):
             return None
@@ -206,12 +213,17 @@ class FaultClassifier:
         period = self.settings.report_period
         return stamp // period != (stamp - elapsed) // period
 
+    def _leveled(self, frame: ResidualFrame) -> ResidualFrame:
+        """Look at what contacts and the body show of a frame; the same on a level floor."""
+        self._contacts = NOTHING if self._slides is None else self._slides.take(frame)
+        self._acts = NOTHING_ACTS if self._outside is None else self._outside.take(frame)
+        return frame if self._slope is None else self._slope.without(frame, self._contacts)
+
     def _decide(self, frame: ResidualFrame, elapsed: int) -> None:
         """Look at a frame, if there is something in it, and name a state."""
         data = self._data.take(frame)
         self._unseen = evolve(self._motion.take(frame), blind=data.blind)
-        contacts = NOTHING if self._slides is None else self._slides.take(frame)
-        outside = NOTHING_ACTS if self._outside is None else self._outside.take(frame)
+        contacts, outside = self._contacts, self._acts
         if contacts.force:
             outside = evolve(outside, load=False, may_be_push=True)
         misfit, self._usable = self._misfits.take(frame, self.settings.low_supply), data.usable

@@ -22,18 +22,21 @@ INPUT_ORDERS: Mapping[str, tuple[int, ...]] = {
 BAND_SIGMAS = 3.3  # standard deviations of the noise that a band holds: 99.9 %
 
 YAW = "residuals: yaw rate against the gyro"
+ALONG = tuple(f"residuals: acceleration along {axis} against the accelerometer" for axis in "xy")
 
 # Why a residual is unknown: until the first command, and on robots without power of single motors.
 NO_COMMAND = "no fresh cmd_vel for the model"
 NOT_MEASURED = "not measured on this robot"
 GAP = "a gap in "  # and which stream: it paused, or went on only just before
 SCATTER = "the stamps of joint_states scatter too much to measure a speed"
-NOT_BELIEVED = "the gyro has not agreed with the wheels for long enough yet"
-NO_GYRO = "no fresh imu/data"
+NOT_BELIEVED = "it has not agreed with the wheels for long enough yet"
+NO_IMU = "no fresh imu/data"
+NO_ENCODERS = "no fresh joint_states"
+NO_WEIGHT = "imu/data does not feel gravity along z"
 FROZEN = " repeats itself while the motor works"  # and before it which stream
 
-Unit = Literal["W", "A", "rad/s"]
-UNITS: dict[str, Unit] = {"W": "W", "A": "A", "rad/s": "rad/s"}
+Unit = Literal["W", "A", "rad/s", "m/s^2"]
+UNITS: dict[str, Unit] = {"W": "W", "A": "A", "rad/s": "rad/s", "m/s^2": "m/s^2"}
 
 
 def rounded(value: float) -> float:
@@ -62,6 +65,10 @@ class Residual:
         return int(self.residual > self.band) - int(-self.residual > self.band)
 
 
+UNKNOWN_YAW = Residual(math.nan, math.nan, math.nan, "rad/s", NO_IMU)
+UNKNOWN_FORCE = Residual(math.nan, math.nan, math.nan, "m/s^2", NO_IMU)
+
+
 @frozen
 class ResidualFrame:
     """Residuals of one tick: total power, motor powers 1-3 (measured - predicted from the
@@ -71,7 +78,8 @@ class ResidualFrame:
     stamp_ns: int
     residuals: tuple[Residual, ...]
     supply: float = float("nan")  # voltage of the supply over the nominal one, where it is measured
-    yaw: Residual = Residual(math.nan, math.nan, math.nan, "rad/s", NO_GYRO)  # gyro - wheels
+    yaw: Residual = UNKNOWN_YAW  # gyro - wheels
+    along: tuple[Residual, Residual] = (UNKNOWN_FORCE, UNKNOWN_FORCE)  # accelerometer - wheels
 
     @property
     def codes(self) -> tuple[int, ...]:

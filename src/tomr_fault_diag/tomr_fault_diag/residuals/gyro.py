@@ -7,6 +7,17 @@ only once it has agreed with the wheels while the robot turned for a while.
 
 from collections import deque
 
+from attrs import evolve
+
+from tomr_fault_diag.residuals.frame import (
+    NO_ENCODERS,
+    NO_IMU,
+    NOT_BELIEVED,
+    UNKNOWN_YAW,
+    Residual,
+    rounded,
+)
+from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.model.ticks import to_ns
 
 _TURNS = 0.2  # rad/s: slower turning says nothing of how a gyro is mounted
@@ -49,6 +60,20 @@ class GyroWatch:
             samples.popleft()
         found = [rate for stamp, rate in samples if stamp <= tick_ns]
         return sum(found) / len(found) if found else float("nan")
+
+    def residual(self, tick_ns: int, wheels: float, bands: BandSettings) -> Residual:
+        """What it measures at a tick less what the wheels show [rad/s], NaN where that is
+        unknown, or the gyro is not believed yet."""
+        measured = self.rate(tick_ns)
+        residual = measured - wheels
+        band = max(bands.yaw, bands.yaw_relative * abs(wheels))
+        band += bands.yaw_transient * self.spread(wheels)
+        self.compare(wheels, residual, band)
+        if residual != residual:
+            return evolve(UNKNOWN_YAW, missing=NO_IMU if measured != measured else NO_ENCODERS)
+        if not self.is_believed:
+            return evolve(UNKNOWN_YAW, missing=NOT_BELIEVED)
+        return Residual(rounded(residual), rounded(band), rounded(wheels), "rad/s")
 
     def spread(self, wheels: float) -> float:
         """How far the yaw rate that the wheels show [rad/s] moved lately, the newest included."""

@@ -7,6 +7,7 @@ from typing import Any
 from attrs import evolve
 
 from tomr_fault_diag.residuals.frame import (
+    ALONG,
     RESIDUALS,
     TOTAL,
     UNITS,
@@ -32,10 +33,16 @@ def residual_message(
         _status(name, residual, hardware_id, [("supply", f"{frame.supply:.6g}")] * (not place))
         for place, (name, residual) in enumerate(zip(names, frame.residuals, strict=True))
     )
-    yaw = _status(YAW, frame.yaw, hardware_id, ())
-    if frame.yaw.stale:  # a robot need not have a gyro
-        yaw = evolve(yaw, level=Level.OK)
-    return DiagnosticMessage(TOPIC, frame.stamp_ns, (*statuses, yaw))
+    inertial = tuple(
+        _inertial(_status(name, residual, hardware_id, ()), residual)
+        for name, residual in zip((YAW, *ALONG), (frame.yaw, *frame.along), strict=True)
+    )
+    return DiagnosticMessage(TOPIC, frame.stamp_ns, (*statuses, *inertial))
+
+
+def _inertial(status: Status, residual: Residual) -> Status:
+    """Of an IMU: a robot need not have one."""
+    return evolve(status, level=Level.OK) if residual.stale else status
 
 
 def _status(
@@ -79,10 +86,11 @@ def sentence(residual: Residual) -> str:
 def frame_of(message: Any, stamp_ns: int) -> ResidualFrame:
     """The frame that a message carries; raises Unusable if it carries none."""
     statuses = message.status
-    if len(statuses) != RESIDUALS + 1:
-        raise Unusable(f"{len(statuses)} statuses, a frame has {RESIDUALS + 1}")
-    *residuals, yaw = (_residual(status) for status in statuses)
-    return ResidualFrame(stamp_ns, tuple(residuals), _supply(statuses[TOTAL]), yaw)
+    count = RESIDUALS + 1 + len(ALONG)
+    if len(statuses) != count:
+        raise Unusable(f"{len(statuses)} statuses, a frame has {count}")
+    *residuals, yaw, x, y = (_residual(status) for status in statuses)
+    return ResidualFrame(stamp_ns, tuple(residuals), _supply(statuses[TOTAL]), yaw, (x, y))
 
 
 def _supply(status: Any) -> float:

@@ -23,6 +23,9 @@ RESIDUAL_PARAMETERS: tuple[ParameterSpec, ...] = (
     *TICK_PARAMETERS,
     HARDWARE_ID,
     ParameterSpec("watch_gyro", "compare the yaw rate of imu/data with the wheels'", "bool", True),
+    ParameterSpec(
+        "watch_accelerometer", "compare the forces of imu/data with the wheels'", "bool", True
+    ),
     ParameterSpec("encoder_window", "span of the fit to the encoders", "float", 0.07, "s", 0.01, 1),
     _live("band.relative", "of the modelled power or current of a motor", 0.6),
     _live("band.power", "least band of a motor's power", 1.1, "W", LEAST_BAND),
@@ -38,6 +41,15 @@ RESIDUAL_PARAMETERS: tuple[ParameterSpec, ...] = (
     ),
     _live("band.yaw_relative", "of the yaw rate that the wheels show", 0.1),
     _live("band.yaw_transient", "part of that yaw rate's change over the last ticks", 1.0),
+    _live(
+        "band.along",
+        "least band of an accelerometer's force against the wheels' acceleration",
+        0.3,
+        "m/s^2",
+        LEAST_BAND,
+    ),
+    _live("band.along_relative", "of the acceleration that the wheels show", 0.15),
+    _live("band.along_transient", "part of that acceleration's change over the last ticks", 0.3),
 )
 
 
@@ -62,6 +74,9 @@ class BandSettings:
     yaw: float = 0.1  # rad/s
     yaw_relative: float = 0.1
     yaw_transient: float = 1.0
+    along: float = 0.3  # m/s^2
+    along_relative: float = 0.15
+    along_transient: float = 0.3
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:
@@ -99,6 +114,7 @@ class ResidualSettings:
     bands: BandSettings = field(factory=BandSettings)
     hardware_id: str = NAMELESS
     watch_gyro: bool = True
+    watch_accelerometer: bool = True
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:
@@ -110,4 +126,5 @@ class ResidualSettings:
             bands=BandSettings.of(values),
             hardware_id=str(values["hardware_id"]) or NAMELESS,
             watch_gyro=bool(values["watch_gyro"]),
+            watch_accelerometer=bool(values["watch_accelerometer"]),
         )

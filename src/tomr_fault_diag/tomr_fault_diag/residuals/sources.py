@@ -4,7 +4,7 @@ from typing import Any
 
 from tomr_fault_diag.residuals.gyro import CLOSEST_NS
 from tomr_fault_diag.residuals.stage import ResidualStage
-from tomr_power_model.messages.intake import WheelFinder, stamp_of, yaw_rate_of
+from tomr_power_model.messages.intake import WheelFinder, specific_force_of, stamp_of, yaw_rate_of
 from tomr_power_model.messages.types import IMU
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.robot import Robot
@@ -14,15 +14,16 @@ from tomr_power_model.topics.inputs import Input, Thinning, guarded, measured_in
 def residual_inputs(
     robot: Robot, stage: ResidualStage, wheels: WheelFinder | None = None
 ) -> tuple[Input, ...]:
-    """Encoders, power as the robot publishes it, and the gyro of a robot that has one."""
+    """Encoders, power as the robot publishes it, and the IMU of a robot that has one."""
     inputs = measured_inputs(robot, stage.encoders, stage.power, wheels, refused=stage.refused)
-    if not stage.settings.watch_gyro:
+    if not (stage.settings.watch_gyro or stage.settings.watch_accelerometer):
         return inputs
 
     def imu(message: Any, receive_ns: int) -> Arrival:
-        return stage.imu(stamp_of(message, receive_ns), yaw_rate_of(message))
+        stamp = stamp_of(message, receive_ns)
+        return stage.imu(stamp, yaw_rate_of(message), specific_force_of(message))
 
     thinning = Thinning(CLOSEST_NS)
     taker = guarded(thinning.around(imu))
-    gyro = Input("imu/data", IMU, taker, is_too_close=thinning.is_too_close, is_optional=True)
-    return (*inputs, gyro)
+    inertial = Input("imu/data", IMU, taker, is_too_close=thinning.is_too_close, is_optional=True)
+    return (*inputs, inertial)

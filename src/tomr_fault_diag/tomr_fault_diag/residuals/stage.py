@@ -4,16 +4,17 @@ import math
 from collections import deque
 from typing import Self
 
+import numpy as np
 from attrs import evolve, frozen
+from numpy.typing import NDArray
 
+from tomr_fault_diag.residuals.accelerometer import AccelerometerWatch
 from tomr_fault_diag.residuals.frame import (
     BAND_SIGMAS,
     FROZEN,
     GAP,
     MOTORS,
     NO_COMMAND,
-    NO_GYRO,
-    NOT_BELIEVED,
     NOT_MEASURED,
     SCATTER,
     Residual,
@@ -50,6 +51,8 @@ from tomr_power_model.model.input_health import InputReporter, InputState
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.ticks import Arrival, TickClock, to_ns
 from tomr_power_model.robot import WHEELS, Robot
+
+Array = NDArray[np.float64]
 
 PREDICTIONS = "predictions"
 ENCODERS = "joint_states"
@@ -120,8 +123,9 @@ class ResidualStage:
         self._recent: deque[_Modelled] = deque(maxlen=lately)
         self._scatter = ScatterWatch(fastest)
         self._gyro = GyroWatch(ticks.period, lately)
+        self._accelerometer = AccelerometerWatch(ticks.period, lately)
         self._flaws = EncoderFlaws.of(robot)
-        self._turning = Body.of(robot).to_twist[2]  # yaw rate per wheel speed [1]
+        self._to_twist = Body.of(robot).to_twist
         self._decided = 0  # newest tick
 
     def retune(self, bands: BandSettings) -> None:
@@ -166,11 +170,14 @@ class ResidualStage:
             self._flows[supply].precedes(stamp)
         return arrival
 
-    def imu(self, stamp_ns: int, yaw_rate: float) -> Arrival:
-        """Take a gyro's yaw rate [rad/s]."""
+    def imu(self, stamp_ns: int, yaw_rate: float, force: Triple = (NAN, NAN, NAN)) -> Arrival:
+        """Take a gyro's yaw rate [rad/s] and an accelerometer's specific force [m/s^2]."""
         arrival = self._arrive(IMU, stamp_ns)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
-            self._gyro.add(stamp_ns, yaw_rate)
+            if self.settings.watch_gyro:
+                self._gyro.add(stamp_ns, yaw_rate)
+            if self.settings.watch_accelerometer:
+                self._accelerometer.add(stamp_ns, force)
         return arrival
 
     def refused(self, topic: str) -> None:
@@ -222,6 +229,7 @@ class ResidualStage:
             self._encoders.leap()
             self._scatter.clear()
             self._gyro.clear()
+            self._accelerometer.clear()
             self._predictions.clear()
             self._recent.clear()
         return arrival
@@ -236,16 +244,16 @@ class ResidualStage:
         estimate = self._encoders.at(tick)
         speeds = self._speeds(tick, estimate, absent)
         motors = [self._supply(tick, wheel, speeds[wheel]) for wheel in range(WHEELS)]
+        powers = [self._motor(wheel, motors[wheel], absent) for wheel in range(WHEELS)]
+        derived = [self._derived(wheel, motors[wheel], absent) for wheel in range(WHEELS)]
+        twist, bands = self._twist(estimate, speeds), self.settings.bands
+        is_well = not any(item.stale or item.code for item in (*powers, *speeds, *derived))
         return ResidualFrame(
             tick,
-            (
-                self._total(tick, motors, absent),
-                *(self._motor(wheel, motors[wheel], absent) for wheel in range(WHEELS)),
-                *speeds,
-                *(self._derived(wheel, motors[wheel], absent) for wheel in range(WHEELS)),
-            ),
+            (self._total(tick, motors, absent), *powers, *speeds, *derived),
             self._supply_share(tick),
-            self._yaw(tick, estimate, speeds),
+            self._gyro.residual(tick, float(twist[2]), bands),
+            self._accelerometer.residuals(tick, twist, bands, is_well=is_well),
         )
 
     def _supply_share(self, tick: int) -> float:
@@ -343,22 +351,11 @@ class ResidualStage:
             speeds = [evolve(one, residual=NAN, missing=one.missing or SCATTER) for one in speeds]
         return speeds
 
-    def _yaw(self, tick: int, estimate: WheelEstimate, speeds: list[Residual]) -> Residual:
-        """What a gyro measures less what the wheels show."""
-        bands, measured = self.settings.bands, self._gyro.rate(tick)
-        wheels = float(self._turning @ self._flaws.turned(estimate).speed)
+    def _twist(self, estimate: WheelEstimate, speeds: list[Residual]) -> Array:
+        """That the wheels show of the body [m/s, m/s, rad/s], NaN where some wheel shows none."""
         if any(speed.residual != speed.residual for speed in speeds):
-            wheels = NAN
-        band = max(bands.yaw, bands.yaw_relative * abs(wheels))
-        band += bands.yaw_transient * self._gyro.spread(wheels)
-        unmodelled = "no fresh joint_states"
-        residual, missing = measured - wheels, _missing(measured, wheels, NO_GYRO, "", unmodelled)
-        self._gyro.compare(wheels, residual, band)
-        if not missing and not self._gyro.is_believed:
-            missing = NOT_BELIEVED
-        if missing:
-            return Residual(NAN, NAN, NAN, "rad/s", missing)
-        return Residual(rounded(residual), rounded(band), rounded(wheels), "rad/s")
+            return np.full(3, NAN)
+        return np.asarray(self._to_twist @ self._flaws.turned(estimate).speed)
 
     def _least(self, unit: Unit) -> float:
         bands = self.settings.bands

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tomr_power_model.robot import shipped_robot
 from tomr_power_model.slides.body import body_of
-from tomr_power_model.slides.particles import Pair, Particles, ParticleSettings, Slides
+from tomr_power_model.slides.particles import Felt, Pair, Particles, ParticleSettings, Slides
 
 Array = NDArray[np.float64]
 BODY, _ = body_of(shipped_robot("reference"))
@@ -166,16 +166,18 @@ def test_a_slope_pulls_downhill_in_the_world_and_drag_against_the_rollers() -> N
     particles = _alike(1.0, np.array([1.0, 0.0, 0.0]))
     particles._slope[:] = 0.3, 0.0
     particles._yaw[:] = 0.5 * math.pi  # the robot looks to the left of downhill
-    assert particles._wrench()[0] == pytest.approx([0.0, -0.3 * BODY.mass, 0.0], abs=1e-9)
+    assert sum(particles._wrenches())[0] == pytest.approx([0.0, -0.3 * BODY.mass, 0.0], abs=1e-9)
     particles._slope[:] = 9.0, 0.0  # more than the floor holds: 0.7 of its traction
     particles._yaw[:] = 0.0
-    assert particles._wrench()[0, 0] == pytest.approx(0.7 * 9.81 * BODY.mass, rel=1e-3)
+    assert sum(particles._wrenches())[0, 0] == pytest.approx(0.7 * 9.81 * BODY.mass, rel=1e-3)
     particles._slope[:] = 0.0
     particles._drag[:] = 0.1
     # Forward, one wheel's rollers turn at full speed and two at half of it: along the axles 1 and
     # 1/2; each drags with a tenth of its load, and of two of them half of that is forward.
     load = 0.1 * BODY.mass * 9.81 / 3.0
-    assert particles._wrench()[0] == pytest.approx([-2.0 * load, 0.0, 0.0], rel=1e-3, abs=1e-6)
+    assert sum(particles._wrenches())[0] == pytest.approx(
+        [-2.0 * load, 0.0, 0.0], rel=1e-3, abs=1e-6
+    )
 
 
 def test_without_traction_a_body_that_turns_keeps_its_way_in_the_world() -> None:
@@ -255,7 +257,7 @@ def test_shoves_come_and_go() -> None:
     assert hit.mean() == pytest.approx(1.0 / 6.0, abs=0.05)
     assert particles._shove[hit].std() == pytest.approx(2.0 * BODY.mass, rel=0.15)
     particles._slope[:], particles._drag[:] = 0.0, 0.0
-    assert particles._wrench()[:, :2] == pytest.approx(particles._shove)
+    assert sum(particles._wrenches())[:, :2] == pytest.approx(particles._shove)
     assert not Particles(BODY, FRICTION, 0.0)._shove.any()
 
 
@@ -303,3 +305,21 @@ def test_wheels_are_heard_whose_power_was_measured_in_the_last_step() -> None:
         particles.step(STEP, np.zeros(3))
         heard.append(particles._is_heard.tolist())
     assert heard == [[True, False, True], [False, True, False], [False] * 3]
+
+
+@pytest.mark.parametrize("is_felt", [False, True])
+def test_a_slope_that_is_felt_is_known_at_once(is_felt: bool) -> None:
+    """0.5 N/kg along x: wheels at a steady speed hold the robot, and it feels what they do."""
+    particles = Particles(BODY, FRICTION, 0.0, ParticleSettings(ramps=0.1, shoved=1.0))
+    particles.start(FORWARD)
+    pull, rims = np.array([0.5, 0.0]), BODY.rows @ FORWARD
+    holding = np.linalg.solve(BODY.rows.T, np.array([*(-BODY.mass * pull), 0.0]))
+    for tick in range(60):
+        is_on = tick >= 50
+        for wheel in range(3):
+            particles.take(wheel, either(float(holding[wheel]) * is_on))
+        if is_felt:
+            particles.feels(Felt(force=-pull * is_on, std=np.full(2, 0.1), pull=pull * is_on))
+        assert particles.step(STEP, rims)
+    found = particles.pull()
+    assert (np.hypot(*(found.mean - pull)) < 0.15) == is_felt

@@ -27,6 +27,7 @@ class Largest:
     power: float = 1e7  # W
     twist: float = 1e3  # m/s or rad/s
     yaw_rate: float = 1e3  # rad/s
+    force: float = 1e4  # m/s^2
 
 
 LARGEST = Largest()
@@ -74,6 +75,19 @@ def yaw_rate_of(message: Any) -> float:
     rate = float(message.angular_velocity.z)
     _check(rate, LARGEST.yaw_rate, "the yaw rate")
     return rate
+
+
+def specific_force_of(message: Any) -> Triple:
+    """Specific force of an Imu along x, y and z [m/s^2]; NaN where it says none."""
+    covariance, force = message.linear_acceleration_covariance, message.linear_acceleration
+    # A covariance that begins with -1 says that the quantity is not measured.
+    if len(covariance) and float(covariance[0]) == -1.0:
+        return _UNKNOWN
+    values = (float(force.x), float(force.y), float(force.z))
+    if any(abs(value) > LARGEST.force for value in values if math.isfinite(value)):
+        return _UNKNOWN
+    x, y, z = (value if math.isfinite(value) else math.nan for value in values)
+    return x, y, z
 
 
 @frozen

@@ -55,6 +55,8 @@ class ParticleSettings(NamedTuple):
     dragging: float = 0.2  # share of floors on which rollers drag by anything up to
     drag_most: float = 0.4
     ramps: float = 0.0  # 1/s, at which a robot comes to a slope, or to its end
+    felt_ramps: float = 1.0  # 1/s, the same where an accelerometer feels how steep it is ...
+    felt: float = 0.15  # m/s^2, ... but for so much
     shoved: float = 0.0  # 1/s, at which somebody shoves the robot
     shove: float = 1.5  # N per kg of the robot, standard deviation of each direction
     shove_ends: float = 6.0  # 1/s
@@ -77,6 +79,15 @@ class Slides:
     force: Array  # of each contact [N]
     probability: Array  # that each wheel slides
     any_probability: float  # that any wheel does
+
+
+@frozen
+class Felt:
+    """What an accelerometer shows of the body, along x and y of base_link [m/s^2], (2,) each."""
+
+    force: Array  # specific force
+    std: Array  # standard deviation
+    pull: Array  # of a slope, if wheels grip
 
 
 @frozen
@@ -125,10 +136,13 @@ class Particles:
         self._shove = np.zeros((n, 2))  # N, on the body
         self._force = np.zeros((n, WHEELS))
         self._off = np.zeros((n, WHEELS))  # standard deviations, averaged
+        self._specific = np.zeros((n, 2))  # force that an accelerometer would feel [m/s^2]
+        self._felt_off = np.zeros((n, 2))  # standard deviations, averaged
         self._is_heard = np.zeros(WHEELS, dtype=bool)  # in the last step
         self._weight = np.full(n, 1.0 / n)
         self._readings: list[tuple[int, Pair]] = []
         self._turning: tuple[float, float] | None = None
+        self._felt: Felt | None = None
         self._rough = [Roughness() for _ in range(WHEELS)]
         self._since = 0.0
 
@@ -147,6 +161,10 @@ class Particles:
         """Take what a gyro shows of the body until the next step: yaw rate and its standard
         deviation [rad/s]."""
         self._turning = rate, std
+
+    def feels(self, felt: Felt) -> None:
+        """Take what an accelerometer shows of the body until the next step."""
+        self._felt = felt
 
     def step(self, dt: float, rims: Array) -> bool:
         """Go on by dt [s] to rims that turn so fast [m/s]; False: too soon for a step."""
@@ -205,6 +223,12 @@ class Particles:
         if s.ramps:
             onto = np.flatnonzero(random.random(n) < s.ramps * dt)
             self._slope[onto] = s.slope * random.standard_normal((len(onto), 2))
+        if s.ramps and self._felt is not None:
+            onto = np.flatnonzero(random.random(n) < s.felt_ramps * dt)
+            cos, sin = np.cos(self._yaw[onto]), np.sin(self._yaw[onto])
+            x, y = self._felt.pull.tolist()
+            self._slope[onto] = np.column_stack([cos * x - sin * y, sin * x + cos * y])
+            self._slope[onto] += s.felt * random.standard_normal((len(onto), 2))
         self._traction *= np.exp(s.wander * math.sqrt(dt) * random.standard_normal(n))
         np.clip(self._traction, 0.5 * s.least, 1.2 * s.most, out=self._traction)
         self._slope += s.walk_slope * math.sqrt(dt) * random.standard_normal((n, 2))
@@ -212,7 +236,8 @@ class Particles:
     def _move(self, dt: float, rims: Array) -> None:
         """Twists and forces on each floor, by sweeps over the contacts."""
         b, s, twist = self._body, self._set, self._twist
-        free = twist + dt * (self._wrench() @ self._light + self._force @ self._per_force)
+        others, slope = self._wrenches()
+        free = twist + dt * ((others + slope) @ self._light + self._force @ self._per_force)
         free[:, 0] += dt * twist[:, 2] * twist[:, 1]
         free[:, 1] -= dt * twist[:, 2] * twist[:, 0]
         free += self._pushed(dt, free, rims) @ self._per_force * dt
@@ -221,6 +246,9 @@ class Particles:
         free[slides] += s.walk_twist * math.sqrt(dt) * shaken
         self._twist = free
         self._yaw += dt * free[:, 2]
+        if self._felt is not None:
+            felt = others @ self._light + self._force @ self._per_force
+            self._specific = felt[:, :2]
 
     def _pushed(self, dt: float, free: Array, rims: Array) -> Array:
         """What contacts give beside the forces of before, by sweeps over them [N], (n, 3).
@@ -240,18 +268,19 @@ class Particles:
         self._force = np.ascontiguousarray(force.T)
         return np.asarray((force - before).T)
 
-    def _wrench(self) -> Array:
-        """Of drag and slope on the body [N, N, N m]."""
+    def _wrenches(self) -> tuple[Array, Array]:
+        """Of drag and shoves, and of the slope, on the body [N, N, N m], (n, 3) each."""
         b, cos, sin = self._body, np.cos(self._yaw), np.sin(self._yaw)
         along = np.tanh(self._twist @ b.along.T / STICKING) * b.load
         wrench = -self._drag[:, None] * (along @ b.along)
         steep = np.hypot(self._slope[:, 0], self._slope[:, 1])
         most = self._set.holds * GRAVITY * self._traction
         pull = b.mass * np.minimum(1.0, most / np.maximum(steep, 1e-9))
-        wrench[:, 0] += pull * (cos * self._slope[:, 0] + sin * self._slope[:, 1])
-        wrench[:, 1] += pull * (cos * self._slope[:, 1] - sin * self._slope[:, 0])
+        sloping = np.zeros_like(wrench)
+        sloping[:, 0] = pull * (cos * self._slope[:, 0] + sin * self._slope[:, 1])
+        sloping[:, 1] = pull * (cos * self._slope[:, 1] - sin * self._slope[:, 0])
         wrench[:, :2] += self._shove
-        return np.asarray(wrench)
+        return np.asarray(wrench), sloping
 
     def _judge(self, dt: float, rims: Array) -> None:
         """Weigh the particles by the powers, and leave those that nothing speaks for."""
@@ -273,6 +302,14 @@ class Particles:
             off = np.clip((self._twist[:, 2] - rate) / std, -s.farthest, s.farthest)
             logs -= 0.5 * s.trust * dt / s.time * off**2
             self._turning = None
+        if self._felt is not None:
+            off = np.clip(
+                (self._specific - self._felt.force) / self._felt.std, -s.farthest, s.farthest
+            )
+            self._felt_off += share * (off - self._felt_off)
+            square = np.log1p(self._felt_off**2 / s.tails).sum(axis=1)
+            logs -= 0.5 * (s.tails + 1.0) * s.trust * dt / s.time * square
+            self._felt = None
         weight = np.exp(logs - logs.max())
         self._weight = weight / weight.sum()
         if self._weight @ self._weight > 2.0 / s.particles:
@@ -301,6 +338,7 @@ class Particles:
         self._friction = self._spread(self._friction, kept)
         self._drag = self._spread(self._drag, kept)
         self._force, self._off = self._force[kept], self._off[kept]
+        self._felt_off = self._felt_off[kept]
         self._shove = self._shove[kept]
         self._weight = np.full(n, 1.0 / n)
 

@@ -1,0 +1,188 @@
+"""The accelerometer's force beside the acceleration that wheels show: what it says, and when it is
+believed."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from tomr_fault_diag.residuals.accelerometer import AccelerometerWatch, Force, Pair
+from tomr_fault_diag.residuals.frame import (
+    ALONG,
+    NO_ENCODERS,
+    NO_IMU,
+    NO_WEIGHT,
+    NOT_BELIEVED,
+    RESIDUALS,
+    UNKNOWN_YAW,
+    Residual,
+    ResidualFrame,
+)
+from tomr_fault_diag.residuals.messages import frame_of, residual_message
+from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
+from tomr_fault_diag.residuals.sources import residual_inputs
+from tomr_fault_diag.residuals.stage import ResidualStage
+from tomr_power_model.messages.bag import to_bag
+from tomr_power_model.messages.plain import Level
+from tomr_power_model.robot import GRAVITY, shipped_robot
+
+MS = 1_000_000
+ROBOT = shipped_robot("reference")
+TURNING, SPEED, ACROSS, FASTER = 0.8, 0.5, 0.2, 0.6  # rad/s, m/s, m/s, m/s^2
+BANDS = BandSettings()
+Felt = Callable[[float], Force | None]
+
+
+def twist(time: float) -> np.ndarray:
+    """Turning all the while, ahead faster and slower by turns, a second each."""
+    return np.array([SPEED + FASTER * abs(time % 2.0 - 1.0), ACROSS, TURNING])
+
+
+def level(time: float) -> Force:
+    """What an accelerometer feels then on a level floor: dv/dt + omega x v, and gravity."""
+    change = -FASTER if time % 2.0 < 1.0 else FASTER
+    speed = float(twist(time)[0])
+    return change - TURNING * ACROSS, TURNING * speed, GRAVITY
+
+
+def leaning(x: float, y: float, since: float = 0.0, z: float = GRAVITY) -> Felt:
+    """As `level`, and so much more along the axes from a time on [m/s^2]."""
+
+    def felt(time: float) -> Force:
+        f_x, f_y, _ = level(time)
+        return (f_x + x, f_y + y, z) if time >= since else (f_x, f_y, z)
+
+    return felt
+
+
+def followed(
+    felt: Felt,
+    period_ms: int = 50,
+    is_well: Callable[[float], bool] = lambda time: True,
+    seconds: float = 6.0,
+    motion: Callable[[float], np.ndarray] = twist,
+) -> dict[int, Pair]:
+    """Residuals by the time of their ticks [ms]."""
+    watch, found = AccelerometerWatch(period_ms * MS, 3), {}
+    for at_ms in range(10, round(1000 * seconds), 10):
+        force = felt(at_ms / 1000.0)
+        if force is not None:
+            watch.add(at_ms * MS, force)
+        if at_ms % period_ms == 0:
+            time = at_ms / 1000.0
+            middle = motion(time - 0.0005 * period_ms)
+            found[at_ms] = watch.residuals(at_ms * MS, middle, BANDS, is_well=is_well(time))
+    return found
+
+
+@pytest.mark.parametrize("period_ms", [10, 50, 200])
+def test_it_agrees_with_wheels_that_turn_and_speed_up(period_ms: int) -> None:
+    """At any rate of decisions; where they change both may differ for a tick or two."""
+    found = followed(level, period_ms)
+    steady = [pair for at, pair in found.items() if at > 500 and 300 <= at % 1000 <= 900]
+    off = np.array([[item.residual for item in pair] for pair in steady])
+    assert np.abs(off).max() < 0.03
+    assert max(abs(pair[0].residual) / pair[0].band for at, pair in found.items() if at > 500) < 1.0
+    # The mean of a window that ends half a period ago, in which the robot slows down.
+    x, y = found[2600]
+    middle = 2.6 - 0.0005 * (period_ms + max(period_ms, 50))
+    assert x.modelled == pytest.approx(-FASTER - TURNING * ACROSS, abs=1e-3)
+    assert y.modelled == pytest.approx(TURNING * float(twist(middle)[0]), abs=1e-3)
+
+
+def test_what_a_slope_pulls_with_is_the_rest() -> None:
+    """It is felt as an acceleration uphill that the wheels do not show."""
+    found = followed(leaning(0.5, -0.3, since=3.0), is_well=lambda time: time < 3.0)
+    before, after = found[2900], found[3100]
+    assert [item.code for item in before] == [0, 0]
+    assert [item.residual for item in after] == pytest.approx([0.5, -0.3], abs=0.03)
+    assert [item.code for item in found[3800]] == [1, 0]
+
+
+def test_a_bias_is_learnt_while_all_is_well_and_makes_bands_wide_until_then() -> None:
+    found = followed(leaning(0.2, -0.1), seconds=40.0)
+    first, middle, last = found[100], found[4900], found[39900]
+    assert [item.residual for item in first] == pytest.approx([0.2, -0.1], abs=0.05)
+    assert [item.residual for item in middle] == pytest.approx([0.09, -0.045], abs=0.02)
+    assert [item.residual for item in last] == pytest.approx([0.02, -0.01], abs=0.02)
+    assert first[0].band == pytest.approx(BANDS.along + 0.3, abs=0.05)
+    assert found[39800][0].band == pytest.approx(BANDS.along, abs=0.04)
+    off = followed(leaning(0.2, -0.1), is_well=lambda time: False)
+    assert off[5900][0].residual == pytest.approx(0.2, abs=0.03)
+
+
+def test_a_robot_that_stands_shows_no_bias() -> None:
+    """It may stand on a slope."""
+    found = followed(lambda time: (0.3, 0.0, GRAVITY), motion=lambda time: np.zeros(3))
+    assert found[5900][0].residual == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("period_ms", [10, 50])
+def test_one_that_is_mounted_otherwise_is_not_believed_until_it_agrees(period_ms: int) -> None:
+    def turned(time: float) -> Force:
+        x, y, z = level(time)
+        return (-y, x, z) if time < 3.0 else (x, y, z)
+
+    found = followed(turned, period_ms)
+    assert {pair[0].missing for at, pair in found.items() if 1500 < at <= 3000} == {NOT_BELIEVED}
+    first = min(at for at, pair in found.items() if at > 3000 and not pair[0].missing)
+    assert 3400 <= first <= 3700  # half a second of acceleration
+
+
+@pytest.mark.parametrize(
+    ("felt", "missing"),
+    [
+        pytest.param(lambda time: None, NO_IMU, id="none"),
+        pytest.param(leaning(0.0, 0.0, z=0.0), NO_WEIGHT, id="gravity taken off"),
+        pytest.param(lambda time: (0.0, 0.0, 0.0), NO_WEIGHT, id="never filled in"),
+        pytest.param(leaning(math.nan, 0.0), NO_IMU, id="no number"),
+    ],
+)
+def test_what_does_not_measure_says_so(felt: Felt, missing: str) -> None:
+    found = followed(felt, seconds=1.0)
+    assert {item.missing for pair in found.values() for item in pair} == {missing}
+    assert all(item.stale for pair in found.values() for item in pair)
+
+
+def test_without_the_speed_of_every_wheel_nothing_is_known() -> None:
+    found = followed(level, seconds=1.0, motion=lambda time: np.full(3, np.nan))
+    assert {item.missing for pair in found.values() for item in pair} == {NO_ENCODERS}
+
+
+def test_after_a_leap_of_time_it_is_the_same_sensor() -> None:
+    watch = AccelerometerWatch(50 * MS, 3)
+    bias = leaning(0.2, 0.0)
+    for restart in (0, 1):
+        if restart:
+            watch.clear()
+        for at_ms in range(10, 4010, 10):
+            watch.add(at_ms * MS, bias(at_ms / 1000.0) or (0.0, 0.0, 0.0))
+            if at_ms % 50 == 0:
+                x, _ = watch.residuals(
+                    at_ms * MS, twist(at_ms / 1000.0 - 0.025), BANDS, is_well=True
+                )
+                if restart and at_ms == 50:
+                    assert x.missing == NO_ENCODERS  # no speed before
+                if restart and at_ms == 200:
+                    assert x.residual == pytest.approx(0.1, abs=0.03)  # half of it is known
+
+
+def test_it_travels_with_the_residuals_and_is_no_fault_where_it_is_missing() -> None:
+    item = Residual(0.5, 0.3, 0.1, "m/s^2")
+    for along in ((item, item), followed(lambda time: None, seconds=0.2)[100]):
+        frame = ResidualFrame(100 * MS, (Residual(0.0, 1.0, 5.0),) * 10, 1.0, UNKNOWN_YAW, along)
+        message = to_bag(residual_message(ROBOT, frame).plain)
+        assert tuple(one.name for one in message.status[RESIDUALS + 1 :]) == ALONG
+        level_of = message.status[-1].level
+        assert level_of == (Level.OK if along[0].stale else Level.WARN)
+        back = frame_of(message, frame.stamp_ns).along
+        assert [item.missing for item in back] == [item.missing for item in along]
+        assert along[0].stale or back == along
+
+
+def test_it_is_left_out_where_the_robot_says_so() -> None:
+    neither = ResidualSettings(watch_gyro=False, watch_accelerometer=False)
+    for settings, is_read in ((neither, False), (ResidualSettings(watch_gyro=False), True)):
+        topics = {item.topic for item in residual_inputs(ROBOT, ResidualStage(ROBOT, settings))}
+        assert ("imu/data" in topics) == is_read
