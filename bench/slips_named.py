@@ -117,11 +117,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for file in tqdm(sorted((root / "slips_truth/practice").glob("*.json")), disable=None):
         truth = json.loads(file.read_text(encoding="utf-8"))
         for heard in (True, False) if truth["imu"] else (False,):
-            residuals = evolve(base.settings.residuals, watch_gyro=heard)
+            residuals = evolve(base.settings.residuals, watch_gyro=heard, watch_accelerometer=heard)
             pipeline = Pipeline(base.robot, evolve(base.settings, residuals=residuals))
             bag = root / "slips/practice" / truth["set"] / truth["id"]
             found = _judged(bag, truth, pipeline)
-            kind = "gyro" if heard else ("its gyro left out" if truth["imu"] else "no gyro")
+            kind = "IMU" if heard else ("its IMU left out" if truth["imu"] else "no IMU")
             parts.setdefault(kind, []).append(found)
             table.add_row(*_row(truth["id"], f"{truth['kind']}, {kind}", found))
     for kind, several in parts.items():

@@ -130,6 +130,19 @@ def test_one_that_is_mounted_otherwise_is_not_believed_until_it_agrees(period_ms
     assert 3400 <= first <= 3700  # half a second of acceleration
 
 
+def test_a_slide_within_the_bands_does_not_make_it_a_liar() -> None:
+    """After three seconds that agree, one in which it differs all the while."""
+
+    def slides(time: float) -> Force:
+        x, y, z = level(time)
+        return (x - 1.5 * (3.0 <= time < 4.0), y, z)
+
+    found = followed(slides)
+    assert not any(pair[0].missing for at, pair in found.items() if at > 100)
+    assert found[3500][0].code == -1
+    assert found[5000][0].code == 0
+
+
 @pytest.mark.parametrize(
     ("felt", "missing"),
     [

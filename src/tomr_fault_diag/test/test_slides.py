@@ -245,7 +245,15 @@ def test_a_slope_that_is_felt_is_known_at_once_and_what_pushes_is_none() -> None
     assert not leant_on
 
 
-def test_what_is_felt_counts_for_nothing_where_an_encoder_is_far_off() -> None:
+def test_what_is_felt_wakes_particles_where_all_else_lies_within_its_bands() -> None:
+    """A slide on a robot that is light for its bands."""
+    watch = SlideWatch(ROBOT)
+    found = [watch.take(item) for item in frames(rolling, felt=since(2.175, -0.6, 0.2))]
+    assert all(item.calm for item in found[:42])
+    assert not any(item.calm for item in found[43:])
+
+
+def test_what_is_felt_counts_for_nothing_where_encoders_or_the_gyro_are_off() -> None:
     """For then wheels do not show how the body moves."""
     push = pushed(BODY.mass * np.array([-0.6, 0.2, 0.0]), 2.175, 9.0)
     items = frames(push, felt=since(2.175, 0.6, -0.2))
@@ -254,10 +262,14 @@ def test_what_is_felt_counts_for_nothing_where_an_encoder_is_far_off() -> None:
         off = [evolve(item.residuals[k], residual=-0.7) for k in SPEEDS]
         return evolve(item, residuals=(*item.residuals[:4], *off, *item.residuals[7:]))
 
-    seen = [lost(item) for item in items]
-    deaf = [evolve(item, along=(UNKNOWN_FORCE, UNKNOWN_FORCE)) for item in seen]
-    one, other = SlideWatch(ROBOT), SlideWatch(ROBOT)
-    assert repr([one.take(item) for item in seen]) == repr([other.take(item) for item in deaf])
+    def turns(item: ResidualFrame) -> ResidualFrame:
+        return evolve(item, yaw=Residual(0.3, 0.1, 0.3, "rad/s"))
+
+    for astray in (lost, turns):
+        seen = [astray(item) for item in items]
+        deaf = [evolve(item, along=(UNKNOWN_FORCE, UNKNOWN_FORCE)) for item in seen]
+        one, other = SlideWatch(ROBOT), SlideWatch(ROBOT)
+        assert repr([one.take(item) for item in seen]) == repr([other.take(item) for item in deaf])
 
 
 def test_a_slide_is_one_whatever_is_felt_of_it() -> None:

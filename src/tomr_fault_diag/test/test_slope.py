@@ -91,6 +91,7 @@ def test_nor_where_an_encoder_is_off_or_nothing_is_felt() -> None:
     for same in (
         evolve(item, residuals=tuple(residuals)),
         evolve(item, along=(UNKNOWN_FORCE, UNKNOWN_FORCE)),
+        evolve(item, yaw=Residual(0.3, 0.2, 0.5, "rad/s")),  # the body turns otherwise
         frame(0.0, SHOWN),
         frame(0.1, SHOWN, band=0.33),  # a standard deviation of noise
     ):

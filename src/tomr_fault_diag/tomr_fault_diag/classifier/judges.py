@@ -198,7 +198,7 @@ class WindowJudge:
         if not self._shaken:
             likelihoods = self._with_lasting(likelihoods, beside.lasting)
         likelihoods = _with_outside(of_states(likelihoods + said), beside)
-        if contacts.force and self._best in (*_GROUPS[0], OTHER):
+        if contacts.force and self._best in _GROUPS[0]:
             # What a slope explains accuses no wheel; one that is accused already stays so.
             likelihoods[CONTROLS.start : WEAKS.stop] -= _SHARED
         shares = self._belief.update(likelihoods)

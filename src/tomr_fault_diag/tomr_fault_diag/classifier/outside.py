@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from tomr_fault_diag.classifier.laws import Window
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.severity.tick import MOVES, Tick
+from tomr_fault_diag.classifier.slope import shows_motion
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, ResidualFrame
 from tomr_power_model.model.ticks import NANOSECONDS, NEVER, to_ns
 from tomr_power_model.robot import Robot
@@ -129,7 +130,7 @@ class OutsideWatch:
         if not off < self.settings.far:
             return
         shown, per_torque = self._torques(tick, follows=off < 1.0)
-        is_felt = not frame.along[0].stale
+        is_felt = shows_motion(frame)
         if is_felt:  # gravity, or a slide
             shown = shown - self._per_newton @ [*(item.residual for item in frame.along), 0.0]
         bands = np.array([frame.residuals[k].band for k in ENCODERS])

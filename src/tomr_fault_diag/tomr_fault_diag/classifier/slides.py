@@ -20,10 +20,10 @@ from attrs import evolve
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.contacts import NOTHING, Contacts, LoneWheelWatch
-from tomr_fault_diag.classifier.misfit import is_far
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.severity.tick import MOVES, Tick
-from tomr_fault_diag.residuals.frame import BAND_SIGMAS, ENCODERS, SPEEDS, Residual, ResidualFrame
+from tomr_fault_diag.classifier.slope import shows_motion
+from tomr_fault_diag.residuals.frame import BAND_SIGMAS, ENCODERS, Residual, ResidualFrame
 from tomr_power_model.model.ticks import NANOSECONDS, NEVER, to_ns
 from tomr_power_model.robot import Robot
 from tomr_power_model.slides.body import body_of, rolling_forces
@@ -97,7 +97,7 @@ class SlideWatch:
             self._found = self._follow(frame)
         else:
             self._rest()
-            self._found = evolve(self._found, felt=_is_felt(frame))
+            self._found = evolve(self._found, felt=shows_motion(frame))
         self._recent.append(frame)
         while self._recent[0].stamp_ns < frame.stamp_ns - _BEFORE:
             self._recent.popleft()
@@ -121,7 +121,7 @@ class SlideWatch:
             if not yaw.stale:
                 std = max(yaw.band / BAND_SIGMAS, _LEAST_YAW)
                 self._particles.turns(yaw.modelled + yaw.residual, std)
-            is_felt = _is_felt(frame)
+            is_felt = shows_motion(frame)
             if is_felt:
                 self._particles.feels(_felt(frame))
             self._particles.step((tick.stamp_ns - last.stamp_ns) / NANOSECONDS, rims)
@@ -163,11 +163,6 @@ class SlideWatch:
         return np.asarray(newtons * watts / np.maximum(slope, _LEAST_SLOPE))
 
 
-def _is_felt(frame: ResidualFrame) -> bool:
-    """Whether an accelerometer shows how the body moves, and the wheels as well."""
-    return not frame.along[0].stale and not any(is_far(frame.residuals[k]) for k in SPEEDS)
-
-
 def _felt(frame: ResidualFrame) -> Felt:
     """What an accelerometer shows of a tick."""
     beyond = np.array([item.residual for item in frame.along])
@@ -178,7 +173,8 @@ def _felt(frame: ResidualFrame) -> Felt:
 
 def _is_hint(frame: ResidualFrame) -> bool:
     """Whether anything that a slide would move lies outside its band."""
-    return _is_outside(frame.yaw) or any(_is_outside(frame.residuals[k]) for k in ENCODERS)
+    motors = (frame.residuals[k] for k in ENCODERS)
+    return any(_is_outside(item) for item in (frame.yaw, *frame.along, *motors))
 
 
 def _is_outside(item: Residual) -> bool:

@@ -11,6 +11,7 @@ from attrs import evolve
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.contacts import Contacts
+from tomr_fault_diag.classifier.misfit import is_far
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.severity.tick import Tick
 from tomr_fault_diag.residuals.frame import (
@@ -27,6 +28,13 @@ from tomr_power_model.robot import Robot
 Array = NDArray[np.float64]
 
 
+def shows_motion(frame: ResidualFrame) -> bool:
+    """Whether an accelerometer is heard, and wheels show how the body moves: no encoder is far off,
+    and a gyro, if there is one, says the same."""
+    is_far_off = any(is_far(frame.residuals[k]) for k in SPEEDS)
+    return not (frame.along[0].stale or is_far_off or frame.yaw.code)
+
+
 class SlopeFilter:
     """Takes a felt slope out of the residuals of a robot."""
 
@@ -39,7 +47,8 @@ class SlopeFilter:
     def without(self, frame: ResidualFrame, contacts: Contacts) -> ResidualFrame:
         """The residuals of the same robot on a level floor; the frame itself where nothing is felt,
         or the wheels do not show the motion."""
-        if not self._is_able or not contacts.grips or any(frame.residuals[k].code for k in SPEEDS):
+        follows = shows_motion(frame) and not any(frame.residuals[k].code for k in SPEEDS)
+        if not (self._is_able and contacts.grips and follows):
             return frame
         force = _plain(frame.along)
         tick = Tick.of(self._motors, frame, None) if force.any() else None
@@ -69,9 +78,7 @@ class SlopeFilter:
 
 
 def _plain(along: tuple[Residual, Residual]) -> Array:
-    """What is felt beyond noise along x and y [m/s^2], (2,); 0 where nothing is known."""
-    if any(item.stale for item in along):
-        return np.zeros(2)
+    """What is felt beyond noise along x and y [m/s^2], (2,)."""
     force = np.array([item.residual for item in along])
     noise = max(item.band for item in along) / BAND_SIGMAS
     size = float(np.hypot(*force))

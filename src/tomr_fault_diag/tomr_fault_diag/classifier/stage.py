@@ -181,7 +181,7 @@ class FaultClassifier:
         self._stamp = frame.stamp_ns
         before = self._state
         level = self._leveled(frame)
-        self._decide(level, elapsed)
+        self._decide(frame, level, elapsed)
         assert self._state is not None
         if self._severity is not None:
             self._severity.take(level, self._state, self._wheel)
@@ -219,8 +219,9 @@ class FaultClassifier:
         self._acts = NOTHING_ACTS if self._outside is None else self._outside.take(frame)
         return frame if self._slope is None else self._slope.without(frame, self._contacts)
 
-    def _decide(self, frame: ResidualFrame, elapsed: int) -> None:
-        """Look at a frame, if there is something in it, and name a state."""
+    def _decide(self, raw: ResidualFrame, frame: ResidualFrame, elapsed: int) -> None:
+        """Look at a frame, if there is something in it, and name a state. `raw`: on what floor it
+        may be, for small faults, which a share of a slope that is left would look like."""
         data = self._data.take(frame)
         self._unseen = evolve(self._motion.take(frame), blind=data.blind)
         contacts, outside = self._contacts, self._acts
@@ -244,7 +245,7 @@ class FaultClassifier:
         cleared = () if self._turning is None else borne_out(frame, self._turning)
         beside = Beside(contacts, outside, cleared)
         if self._lasting is not None:
-            beside = evolve(beside, lasting=self._lasting.take(frame, is_well))
+            beside = evolve(beside, lasting=self._lasting.take(raw, is_well))
         self._opinion = self._judge.judge(frame, elapsed, self._unseen, beside)
         if data.enough or self._state not in _QUIET:
             self._weigh(self._opinion, misfit, frame.stamp_ns, outside)

@@ -3,8 +3,8 @@ they differ where a slope pulls at the robot, or wheels slide.
 
 What it shows of a robot that moves as described is its bias, which is learnt. One that takes
 gravity off itself is not believed: it has to weigh the robot as gravity does. Nor is one that is
-mounted otherwise: where it differs though all is well, it has to agree with the wheels anew while
-they accelerate.
+mounted otherwise: where it goes on differing though all is well, it has to agree with the wheels
+anew while they accelerate.
 """
 
 import math
@@ -35,6 +35,7 @@ _SLOT = to_ns(0.05)  # over which accelerations are taken, at least
 _KEPT = 1024  # samples, should no tick come
 _ACCELERATES = 0.2  # m/s^2: less says nothing of how it is mounted
 _AGREED = to_ns(0.5)  # of acceleration, in which it has to agree
+_PROVEN = to_ns(2.0)  # of disagreement, that much agreement outweighs: a slide is over sooner
 _WEIGHS = 2.0  # m/s^2 by which the vertical force may differ from gravity
 _MOVES = 0.02  # m/s, rad/s: a robot that stands may stand on a slope
 _BIAS = 0.4  # m/s^2, at most
@@ -54,7 +55,7 @@ class AccelerometerWatch:
         self._samples: deque[tuple[int, Force]] = deque(maxlen=_KEPT)
         self._twists: deque[tuple[int, Array]] = deque(maxlen=1 + self._window // period_ns)
         self._recent: deque[Array] = deque(maxlen=lately)
-        self._agreed = _AGREED  # ns, so far
+        self._agreed, self._is_doubted = _AGREED, False  # ns so far, and whether it ever ran out
         self._bias, self._count = np.zeros(2), 0.0  # m/s^2, ticks
         self.clear()
 
@@ -67,7 +68,7 @@ class AccelerometerWatch:
     @property
     def is_believed(self) -> bool:
         """Whether it has agreed with the wheels for long enough since it last did not."""
-        return self._agreed >= _AGREED
+        return not self._is_doubted
 
     def add(self, stamp_ns: int, force: Force) -> None:
         """Take a sample newer than those before [m/s^2]."""
@@ -136,10 +137,13 @@ class AccelerometerWatch:
         if not np.isfinite(beyond).all() or float(np.abs(self._twists[-1][1]).max()) < _MOVES:
             return
         if (np.abs(beyond) > _BIAS + band).any():
-            self._agreed, self._count, self._bias = 0, 0.0, np.zeros(2)
+            self._agreed = max(self._agreed - self._period, 0)
+            if not self._agreed:
+                self._is_doubted, self._count, self._bias = True, 0.0, np.zeros(2)
             return
         if float(np.hypot(*acceleration)) > _ACCELERATES:
-            self._agreed = min(self._agreed + self._period, _AGREED)
+            self._agreed = min(self._agreed + self._period, _PROVEN)
+            self._is_doubted = self._is_doubted and self._agreed < _AGREED
         self._count = min(self._count + 1.0, _MOST)
         self._bias += (np.clip(beyond, -_BIAS, _BIAS) - self._bias) / (_PRIOR + self._count)
 

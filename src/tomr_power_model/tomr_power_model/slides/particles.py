@@ -28,6 +28,7 @@ _LEAST_STEP = 0.018  # s
 _LONGEST_STEP = 0.1  # s
 _RESTING = 0.025  # m/s of a rim, below which dry friction fades
 _SLIDING = 0.05  # m/s, of a contact that is said to slide
+_PLAINLY = 3.0  # standard deviations of an accelerometer
 
 
 class ParticleSettings(NamedTuple):
@@ -55,8 +56,11 @@ class ParticleSettings(NamedTuple):
     dragging: float = 0.2  # share of floors on which rollers drag by anything up to
     drag_most: float = 0.4
     ramps: float = 0.0  # 1/s, at which a robot comes to a slope, or to its end
-    felt_ramps: float = 1.0  # 1/s, the same where an accelerometer feels how steep it is ...
-    felt: float = 0.15  # m/s^2, ... but for so much
+    felt_rate: float = (
+        0.2  # 1/s, at which it does where an accelerometer feels how steep one is, and
+    )
+    # at which it comes to a slippery floor, which feels alike at first
+    felt: float = 0.15  # m/s^2, by which such a slope is another
     shoved: float = 0.0  # 1/s, at which somebody shoves the robot
     shove: float = 1.5  # N per kg of the robot, standard deviation of each direction
     shove_ends: float = 6.0  # 1/s
@@ -224,14 +228,25 @@ class Particles:
             onto = np.flatnonzero(random.random(n) < s.ramps * dt)
             self._slope[onto] = s.slope * random.standard_normal((len(onto), 2))
         if s.ramps and self._felt is not None:
-            onto = np.flatnonzero(random.random(n) < s.felt_ramps * dt)
-            cos, sin = np.cos(self._yaw[onto]), np.sin(self._yaw[onto])
-            x, y = self._felt.pull.tolist()
-            self._slope[onto] = np.column_stack([cos * x - sin * y, sin * x + cos * y])
-            self._slope[onto] += s.felt * random.standard_normal((len(onto), 2))
+            self._explain(dt, self._felt)
         self._traction *= np.exp(s.wander * math.sqrt(dt) * random.standard_normal(n))
         np.clip(self._traction, 0.5 * s.least, 1.2 * s.most, out=self._traction)
         self._slope += s.walk_slope * math.sqrt(dt) * random.standard_normal((n, 2))
+
+    def _explain(self, dt: float, felt: Felt) -> None:
+        """What an accelerometer feels beside the wheels is a slope, the less likely the steeper it
+        is, or wheels that begin to slide."""
+        s, random, n = self._set, self._random, self._set.particles
+        onto = np.flatnonzero(random.random(n) < s.felt_rate * dt)
+        cos, sin = np.cos(self._yaw[onto]), np.sin(self._yaw[onto])
+        x, y = felt.pull.tolist()
+        slope = np.column_stack([cos * x - sin * y, sin * x + cos * y])
+        self._slope[onto] = slope + s.felt * random.standard_normal((len(onto), 2))
+        self._weight[onto] *= math.exp(-0.5 * (x * x + y * y) / s.slope**2)
+        if math.hypot(x, y) > _PLAINLY * float(felt.std.max()):
+            slippery = np.flatnonzero(random.random(n) < s.felt_rate * dt)
+            least = random.random(len(slippery))
+            self._traction[slippery] = s.least * (s.grips / s.least) ** least
 
     def _move(self, dt: float, rims: Array) -> None:
         """Twists and forces on each floor, by sweeps over the contacts."""
