@@ -725,6 +725,21 @@ def test_what_a_slope_explains_accuses_no_wheel(kind: slice) -> None:
     assert accused(40, 0, on_a_slope) == (kind is METERS)
     assert accused(30, 40, on_the_level)
     assert accused(30, 70, on_a_slope)
+    # What fits nothing accuses none, so the slope still explains; but for a while what was named may
+    # be named again.
+    judge.clear()
+    network.likelihoods[[kind.start, OTHER]] = -30.0, 4.0
+    accused(40, 0, on_a_slope)
+    assert judge._best == OTHER
+    network.likelihoods[[kind.start, OTHER]] = 12.0, 4.0
+    assert accused(20, 40, on_a_slope) == (kind is METERS)
+    judge.clear()
+    assert accused(30, 0, on_the_level)
+    network.likelihoods[[kind.start, OTHER]] = -30.0, 4.0
+    accused(40, 30, on_a_slope)
+    assert judge._best == OTHER
+    network.likelihoods[[kind.start, OTHER]] = 12.0, 4.0
+    assert accused(20, 70, on_a_slope)
 
 
 def test_where_it_grips_or_within_bands_of_its_own_a_robot_hardly_slips() -> None:

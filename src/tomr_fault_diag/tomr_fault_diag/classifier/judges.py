@@ -83,6 +83,7 @@ _SLIGHT = 1.0
 _SHAKEN, _DOUBTED = 12, 2.0
 # What is seen to act on the body for seconds is so much likelier than what a window looks like.
 _SHARED, _LOADED = 10.0, 24.0
+_REMEMBERED = 60  # ticks, in which a fault of a wheel that was named may be so again on a slope
 _MOST_GATHERED = 24.0  # nats: what ended long ago must not count for long
 GATHERED = 12.0  # nats, that small faults which last have shown, in place of a striking window
 _HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
@@ -155,6 +156,7 @@ class WindowJudge:
         self._best = NORMAL
         self._accused, self._led = _GROUPS[0], 0  # what was last, and for how many ticks
         self._calm = 0  # ticks since
+        self._acquitted = _REMEMBERED + 1  # ticks since it was sure of a fault of a wheel
         self._shaken = 0  # ticks in which a push still shows
         self._gathered = np.zeros(HYPOTHESES)  # what small faults that last have shown
         self._belief.clear()
@@ -198,7 +200,8 @@ class WindowJudge:
         if not self._shaken:
             likelihoods = self._with_lasting(likelihoods, beside.lasting)
         likelihoods = _with_outside(of_states(likelihoods + said), beside)
-        if contacts.force and self._best in _GROUPS[0]:
+        is_unaccused = is_well or self._best == OTHER  # which accuses none
+        if contacts.force and is_unaccused and self._acquitted > _REMEMBERED:
             # What a slope explains accuses no wheel; one that is accused already stays so.
             likelihoods[CONTROLS.start : WEAKS.stop] -= _SHARED
         shares = self._belief.update(likelihoods)
@@ -216,6 +219,8 @@ class WindowJudge:
         if state in _CAUSES and self._led < WINDOW and state.paper is not None:
             state = STATES[state.paper]  # its cause shows when the window holds nothing older
         sure = bool(shares[group].sum() > _SURE) and self._is_striking(best)
+        is_accused = sure and CONTROLS.start <= best < METERS.start
+        self._acquitted = 0 if is_accused else self._acquitted + 1
         return Opinion(named_of(shares), sure, wheel, state)
 
     def _seen(self, frame: ResidualFrame, unseen: Unseen) -> Array:
