@@ -145,17 +145,17 @@ def test_a_slope_that_an_accelerometer_feels_acts_from_nowhere(azimuth: float) -
 
 
 def test_what_no_slope_is_and_no_person_does_is_a_load() -> None:
-    """Nobody pushes for four seconds with so much; a slope would be felt."""
-    unknown = found(frames(fixed(0.7), 8.0))
+    """Nobody pushes for six seconds with so much; a slope would be felt."""
+    unknown = found(frames(fixed(0.7), 9.0))
     assert not any(item.load for item in unknown)
-    assert 3.8 <= first(found(frames(fixed(0.7), 8.0, sloping=0.0))) < 5.0
-    assert first(found(frames(fixed(1.0), 8.0, sloping=0.4))) < 5.0  # and a slope besides
-    assert first(found(frames(fixed(0.25), 8.0, sloping=0.0))) == math.inf
+    assert 6.0 <= first(found(frames(fixed(0.7), 9.0, sloping=0.0))) < 7.5
+    assert first(found(frames(fixed(1.0), 9.0, sloping=0.4))) < 7.5  # and a slope besides
+    assert first(found(frames(fixed(0.25), 9.0, sloping=0.0))) == math.inf
 
     def leans(time: float, twist: Array, yaw: float) -> Array:
-        return fixed(0.7)(time, twist, yaw) * (2.0 <= time < 5.0)
+        return fixed(0.9)(time, twist, yaw) * max(1.0 - abs(time - 4.5) / 3.0, 0.0)
 
-    assert first(found(frames(leans, 8.0, sloping=0.0))) == math.inf
+    assert first(found(frames(leans, 9.0, sloping=0.0))) == math.inf  # for six seconds
 
 
 @pytest.mark.parametrize("more", [1.0, 1.5, 3.0])

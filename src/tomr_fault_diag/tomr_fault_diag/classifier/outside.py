@@ -52,7 +52,7 @@ class OutsideSettings:
     plainly: float = 6.0  # squared bands by which it is, at least
     drag: float = 0.35  # N/kg: no floor drags so much more than another
     person: float = 1.2  # N/kg: more than somebody pushes for seconds, or a steep floor does
-    longer: int = to_ns(3.8)  # than a person pushes, where an accelerometer excludes a floor
+    longer: int = to_ns(6.0)  # than a person pushes, where an accelerometer excludes a floor
 
 
 @frozen
