@@ -725,7 +725,7 @@ def test_what_a_slope_explains_accuses_no_wheel(kind: slice) -> None:
     assert accused(40, 0, on_a_slope) == (kind is METERS)
     assert accused(30, 40, on_the_level)
     assert accused(30, 70, on_a_slope)
-    # What fits nothing accuses none, so the slope still explains; but what was named may be so again
+    # What fits nothing accuses none, so the slope explains; but what was named may be so again
     # for a while.
     judge.clear()
     network.likelihoods[[kind.start, OTHER]] = -30.0, 4.0
