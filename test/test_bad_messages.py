@@ -28,6 +28,7 @@ WHEELS = ROBOT.wheel_names
 POWER = tuple(f"{topic}/power" for topic in ROBOT.wheel_topics)
 NAMES = residual_names(ROBOT.wheel_topics)
 TOTAL, SPEEDS, DERIVED = NAMES[0], NAMES[4:7], NAMES[7:]
+FRAME = len(NAMES) + 3  # and what an IMU says
 
 NODES = ("power_model", "power_residuals", "fault_classifier")
 ROUND = 20_000_000  # ns: encoders and power come at 50 Hz
@@ -70,7 +71,7 @@ def _twist(x: float = 0.0) -> TwistStamped:
     return message
 
 
-def _frame(count: int = 11, values: Sequence[tuple[str, str]] = ()) -> DiagnosticArray:
+def _frame(count: int = FRAME, values: Sequence[tuple[str, str]] = ()) -> DiagnosticArray:
     pairs = [KeyValue(key=key, value=value) for key, value in values]
     status = DiagnosticStatus(level=DiagnosticStatus.OK, message="as modelled: 0 W", values=pairs)
     return DiagnosticArray(status=[status] * count)
@@ -178,7 +179,7 @@ def _bench(wait_until: Callable[..., Any]) -> Iterator[Bench]:
         bench.states.extend((_stamp_ns(message), status.message) for status in drive)
 
     def keep(message: DiagnosticArray) -> None:
-        if len(message.status) == len(NAMES) + 1 and message.status[0].name == TOTAL:
+        if len(message.status) == FRAME and message.status[0].name == TOTAL:
             bench.frames.append(Seen.of(message))
 
     node.create_subscription(DiagnosticArray, "/diagnostics", note, STAGE_QOS)
@@ -278,7 +279,9 @@ CASES = {
     "twist infinite": Case(_sends("cmd_vel", lambda: _twist(INF)), "power_model", "not finite"),
     "predictions too short": Case(_broken_predictions, stale=True),
     "residuals too few": Case(
-        _sends("residuals", lambda: _frame(9)), "fault_classifier", "9 statuses, a frame has 11"
+        _sends("residuals", lambda: _frame(9)),
+        "fault_classifier",
+        f"9 statuses, a frame has {FRAME}",
     ),
     "residuals without numbers": Case(_sends("residuals", _frame), "fault_classifier", "no number"),
     "residuals in words": Case(

@@ -309,12 +309,12 @@ def test_wheels_are_heard_whose_power_was_measured_in_the_last_step() -> None:
 
 @pytest.mark.parametrize("is_felt", [False, True])
 def test_a_slope_that_is_felt_is_known_at_once(is_felt: bool) -> None:
-    """0.5 N/kg along x: wheels at a steady speed hold the robot, and it feels what they do."""
+    """0.5 N/kg along x for 0.24 s: wheels at a steady speed hold it, and it feels what they do."""
     particles = Particles(BODY, FRICTION, 0.0, ParticleSettings(ramps=0.1, shoved=1.0))
     particles.start(FORWARD)
     pull, rims = np.array([0.5, 0.0]), BODY.rows @ FORWARD
     holding = np.linalg.solve(BODY.rows.T, np.array([*(-BODY.mass * pull), 0.0]))
-    for tick in range(60):
+    for tick in range(62):
         is_on = tick >= 50
         for wheel in range(3):
             particles.take(wheel, either(float(holding[wheel]) * is_on))
