@@ -323,3 +323,16 @@ def test_a_slope_that_is_felt_is_known_at_once(is_felt: bool) -> None:
         assert particles.step(STEP, rims)
     found = particles.pull()
     assert (np.hypot(*(found.mean - pull)) < 0.15) == is_felt
+
+
+def test_a_steep_slope_explains_less_of_what_is_felt_than_a_gentle_one() -> None:
+    """As slopes are spread: by exp(-1/2) at a standard deviation, exp(-8) at four."""
+    for pull, share in ((0.4, math.exp(-0.5)), (1.6, math.exp(-8.0))):
+        particles = Particles(BODY, FRICTION, 0.0, ParticleSettings(ramps=0.1))
+        before = particles._weight.copy()
+        felt = np.array([pull, 0.0])
+        particles._explain(0.5, Felt(force=-felt, std=np.full(2, 0.1), pull=felt))
+        changed = particles._weight != before
+        assert 0.05 < changed.mean() < 0.15  # 0.2 a second
+        assert particles._weight[changed] == pytest.approx(share * before[changed])
+        assert np.abs(particles._slope[changed].mean(axis=0) - felt).max() < 0.1
