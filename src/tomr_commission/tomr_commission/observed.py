@@ -177,16 +177,20 @@ def band_of(observed: Observed, bands: BandSettings) -> Array:
 
 def yaw_band_of(observed: Observed, bands: BandSettings) -> Array:
     """Half widths of the band of the yaw rate [rad/s], (n,)."""
-    wheels = observed.yaw[:, 1:]
-    width = np.maximum(bands.yaw, bands.yaw_relative * np.abs(np.nan_to_num(wheels)))
-    return np.asarray(width + bands.yaw_transient * _moved(wheels))[:, 0]
+    row = bands.yaw, bands.yaw_relative, bands.yaw_transient
+    return _inertial_bands(observed.yaw[:, 1:], *row)[:, 0]
 
 
 def along_bands_of(observed: Observed, bands: BandSettings) -> Array:
     """Half widths of the bands of the acceleration along x and y [m/s^2], (n, 2)."""
-    wheels = observed.along[:, 2:]
-    width = np.maximum(bands.along, bands.along_relative * np.abs(np.nan_to_num(wheels)))
-    return np.asarray(width + bands.along_transient * _moved(wheels))
+    row = bands.along, bands.along_relative, bands.along_transient
+    return _inertial_bands(observed.along[:, 2:], *row)
+
+
+def _inertial_bands(wheels: Array, least: float, relative: float, transient: float) -> Array:
+    """Of what an IMU measures, around what the wheels show, (n, m) each."""
+    width = np.maximum(least, relative * np.abs(np.nan_to_num(wheels)))
+    return np.asarray(width + transient * _moved(wheels))
 
 
 def frames_of(observed: Observed, bands: BandSettings) -> list[ResidualFrame]:

@@ -3,6 +3,7 @@ believed."""
 
 import math
 from collections.abc import Callable
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -22,7 +23,6 @@ from tomr_fault_diag.residuals.frame import (
 from tomr_fault_diag.residuals.messages import frame_of, residual_message
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_fault_diag.residuals.sources import residual_inputs
-from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.messages.plain import Level
 from tomr_power_model.robot import GRAVITY, shipped_robot
@@ -194,8 +194,19 @@ def test_it_travels_with_the_residuals_and_is_no_fault_where_it_is_missing() -> 
         assert along[0].stale or back == along
 
 
-def test_it_is_left_out_where_the_robot_says_so() -> None:
-    neither = ResidualSettings(watch_gyro=False, watch_accelerometer=False)
-    for settings, is_read in ((neither, False), (ResidualSettings(watch_gyro=False), True)):
-        topics = {item.topic for item in residual_inputs(ROBOT, ResidualStage(ROBOT, settings))}
-        assert ("imu/data" in topics) == is_read
+@pytest.mark.parametrize("turns", [False, True])
+@pytest.mark.parametrize("forces", [False, True])
+def test_either_is_left_out_where_the_robot_says_so(turns: bool, forces: bool) -> None:
+    stage = Mock(settings=ResidualSettings(watch_gyro=turns, watch_accelerometer=forces))
+    taken = [item for item in residual_inputs(ROBOT, stage) if item.topic == "imu/data"]
+    assert bool(taken) == (turns or forces)
+    message = Mock(linear_acceleration_covariance=[0.0] * 9)
+    message.header.stamp = Mock(sec=7, nanosec=5)
+    message.angular_velocity.z = 0.7
+    message.linear_acceleration = Mock(x=0.1, y=0.2, z=9.8)
+    for item in taken:
+        item.take(message, 0)
+        stamp, rate, force = stage.imu.call_args.args
+        assert stamp == 7_000 * MS + 5
+        assert rate == 0.7 if turns else math.isnan(rate)
+        assert force == (0.1, 0.2, 9.8) if forces else all(map(math.isnan, force))

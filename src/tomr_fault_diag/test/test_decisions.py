@@ -1,7 +1,9 @@
 """When a fault is named and let go of, and what a motor's own data have to do with it."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, cast
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -302,6 +304,21 @@ class Fixed:
         self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, beside: Beside = ALONE
     ) -> Opinion:
         return Opinion(np.eye(6)[MOTOR + self.wheel], sure=True, wheel=self.wheel)
+
+
+def test_small_faults_alone_are_looked_for_in_what_a_slope_is_still_in() -> None:
+    """Of a slope that is taken out a tenth may be left, which would look like one."""
+    judge, severity, lasting, slope = Mock(wraps=Fixed()), Mock(), Mock(), Mock()
+    judge.settings = ClassifierSettings()
+    severity.conditions, lasting.take.return_value = (), np.zeros(HYPOTHESES)
+    slope.without.side_effect = lambda item, _: evolve(item, supply=0.95)
+    classifier = FaultClassifier(judge, severity, slope=slope, lasting=lasting)
+    found = [classifier.classify(item) for item in ticks(50, 1500)]
+    assert math.isnan(lasting.take.call_args.args[0].supply)
+    assert judge.judge.call_args.args[0].supply == 0.95
+    assert severity.take.call_args.args[0].supply == 0.95
+    # What is published is what was measured.
+    assert all(math.isnan(item.frame.supply) for item in found if item is not None)
 
 
 @pytest.mark.parametrize("before", [None, 0])

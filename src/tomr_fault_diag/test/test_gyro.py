@@ -35,7 +35,7 @@ from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.messages.readings import SupplyReading
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.ticks import TickSettings
-from tomr_power_model.robot import Robot, shipped_robot
+from tomr_power_model.robot import GRAVITY, Robot, shipped_robot
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
@@ -49,14 +49,17 @@ def frames(
     robot: Robot = ROBOT,
     faster: Callable[[int], float] = lambda at_ms: 1.0,
     period_ms: int = 50,
+    leap_ms: int = 6000,
 ) -> dict[int, ResidualFrame]:
     """By time [ms] for 6 s; wheels turn at SPEED times `faster`, `gyro` says what is measured at a
-    time, None: nothing."""
+    time, None: nothing. An accelerometer feels a tenth of it more along x than wheels show
+    [m/s^2]. From `leap_ms` on stamps are two seconds earlier."""
     stage = ResidualStage(robot, ResidualSettings(ticks=TickSettings(period=period_ms * MS)))
     reading = SupplyReading.rounded(24.0, 0.4)
+    along, across, _ = wheels_to_twist(ROBOT) @ SPEED
     found, turned = {}, np.zeros(3)
     for at_ms in range(0, 6000, 10):
-        stamp = BASE + at_ms * MS
+        stamp = BASE + (at_ms - 2000 * (at_ms >= leap_ms)) * MS
         if at_ms % period_ms == 0:
             motors = (reading, reading, reading)
             stage.prediction(Prediction(stamp, SPEED, SPEED, motors, reading, motors))
@@ -65,7 +68,7 @@ def frames(
         stage.encoders(stamp, (first, second, third), SPEED)
         rate = gyro(at_ms)
         if rate is not None:
-            stage.imu(stamp, rate)
+            stage.imu(stamp, rate, (0.1 * rate - RATE * across, RATE * along, GRAVITY))
         found.update({(frame.stamp_ns - BASE) // MS: frame for frame in stage.due()})
     return found
 
@@ -140,6 +143,21 @@ def test_a_robot_that_does_not_turn_proves_no_gyro() -> None:
     for _ in range(500):
         watch.compare(0.1, 0.0, 0.1)
     assert not watch.is_believed
+
+
+def test_a_bias_of_the_accelerometer_is_learnt_of_no_robot_that_may_not_be_well() -> None:
+    """No motor's power is known here."""
+    found = frames(lambda at_ms: RATE)
+    x, y = found[5900].along
+    assert x.residual == pytest.approx(0.1 * RATE, abs=1e-4)
+    assert y.residual == pytest.approx(0.0, abs=1e-4)
+    assert y.modelled == pytest.approx(RATE * float(wheels_to_twist(ROBOT)[0] @ SPEED), rel=1e-4)
+
+
+def test_after_a_leap_of_time_the_samples_of_before_are_forgotten() -> None:
+    found = frames(lambda at_ms: RATE + 0.5 * (at_ms >= 4500), leap_ms=4000)
+    assert found[2600].yaw.residual == pytest.approx(0.5, abs=1e-6)
+    assert found[2600].along[0].residual == pytest.approx(0.1 * (RATE + 0.5), abs=1e-4)
 
 
 def test_the_mean_is_of_the_tick() -> None:

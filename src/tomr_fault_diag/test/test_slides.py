@@ -245,11 +245,24 @@ def test_a_slope_that_is_felt_is_known_at_once_and_what_pushes_is_none() -> None
     assert not leant_on
 
 
+def named_on_a_slope(felt: Felt | None) -> set[str]:
+    """States of a robot that holds itself on one of 3 degrees for seven seconds."""
+    classifier = FaultClassifier.of(ClassifierSettings(), ROBOT)
+    push = pushed(BODY.mass * np.array([-0.5, 0.2, 0.0]), 2.175, 9.0)
+    found = [classifier.classify(item) for item in frames(push, 9.0, felt=felt)]
+    return {item.state.name for item in found if item is not None}
+
+
+def test_a_slope_that_is_felt_changes_nothing_that_is_named() -> None:
+    assert named_on_a_slope(since(2.175, 0.5, -0.2)) == {"normal"}
+    assert named_on_a_slope(None) > {"normal"}
+
+
 def test_what_is_felt_wakes_particles_where_all_else_lies_within_its_bands() -> None:
     """A slide on a robot that is light for its bands."""
     watch = SlideWatch(ROBOT)
     found = [watch.take(item) for item in frames(rolling, felt=since(2.175, -0.6, 0.2))]
-    assert all(item.calm for item in found[:42])
+    assert all(item.calm and item.felt for item in found[:42])
     assert not any(item.calm for item in found[43:])
 
 

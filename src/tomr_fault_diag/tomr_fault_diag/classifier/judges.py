@@ -156,7 +156,7 @@ class WindowJudge:
         self._best = NORMAL
         self._accused, self._led = _GROUPS[0], 0  # what was last, and for how many ticks
         self._calm = 0  # ticks since
-        self._acquitted = _REMEMBERED + 1  # ticks since it was sure of a fault of a wheel
+        self._since_accused = _REMEMBERED + 1  # ticks since it was sure of a fault of a wheel
         self._shaken = 0  # ticks in which a push still shows
         self._gathered = np.zeros(HYPOTHESES)  # what small faults that last have shown
         self._belief.clear()
@@ -201,7 +201,7 @@ class WindowJudge:
             likelihoods = self._with_lasting(likelihoods, beside.lasting)
         likelihoods = _with_outside(of_states(likelihoods + said), beside)
         is_unaccused = is_well or self._best == OTHER  # which accuses none
-        if contacts.force and is_unaccused and self._acquitted > _REMEMBERED:
+        if contacts.force and is_unaccused and self._since_accused > _REMEMBERED:
             # What a slope explains accuses no wheel; one that is accused already stays so.
             likelihoods[CONTROLS.start : WEAKS.stop] -= _SHARED
         shares = self._belief.update(likelihoods)
@@ -220,7 +220,7 @@ class WindowJudge:
             state = STATES[state.paper]  # its cause shows when the window holds nothing older
         sure = bool(shares[group].sum() > _SURE) and self._is_striking(best)
         is_accused = sure and CONTROLS.start <= best < METERS.start
-        self._acquitted = 0 if is_accused else self._acquitted + 1
+        self._since_accused = 0 if is_accused else self._since_accused + 1
         return Opinion(named_of(shares), sure, wheel, state)
 
     def _seen(self, frame: ResidualFrame, unseen: Unseen) -> Array:

@@ -37,6 +37,7 @@ class Motors:
         self._numbers = numbers.tolist()
         self._laws = plain(tuple(robot.physics))
         self.mass = body.mass  # kg
+        self.per_newton = self.mass * self.from_force  # of 1 N/kg and 1 N m/kg [N m]
         # What a motor shows that is not driven, W or A.
         self.idle = np.zeros(WHEELS) if self.reports_currents else self._idle()
 

@@ -75,7 +75,6 @@ class OutsideWatch:
     def __init__(self, robot: Robot, settings: OutsideSettings | None = None) -> None:
         self.settings = settings or OutsideSettings()
         self._motors = Motors(robot)
-        self._per_newton = self._motors.mass * self._motors.from_force
         turns = np.arange(_DIRECTIONS) * 2.0 * np.pi / _DIRECTIONS
         ring = robot.robot_radius * np.column_stack([np.cos(turns), np.sin(turns)])
         self._hitches = np.concatenate([np.zeros((1, 2)), *(far * ring for far in _PLACES)])
@@ -132,7 +131,8 @@ class OutsideWatch:
         shown, per_torque = self._torques(tick, follows=off < 1.0)
         is_felt = shows_motion(frame)
         if is_felt:  # gravity, or a slide
-            shown = shown - self._per_newton @ [*(item.residual for item in frame.along), 0.0]
+            felt = [*(item.residual for item in frame.along), 0.0]
+            shown = shown - self._motors.per_newton @ felt
         bands = np.array([frame.residuals[k].band for k in ENCODERS])
         powers = np.where(np.abs(tick.speed) > MOVES, np.sign(per_torque) / bands, 0.0)
         seen = per_torque * powers
@@ -165,7 +165,7 @@ class OutsideWatch:
             first = int(np.searchsorted(stamps, self._newest - length))
             if len(stamps) - first >= self.settings.ticks:
                 shown, seen, powers, twist, yaw, felt = (column[first:] for column in columns)
-                window = Window(shown, seen, powers, twist, yaw, self._per_newton)
+                window = Window(shown, seen, powers, twist, yaw, self._motors.per_newton)
                 lasts = bool(felt.all() and stamps[-1] - stamps[first] >= self.settings.longer)
                 for place, is_so in enumerate(astuple(self._judge(window, lasts=lasts))):
                     self._found_at[place] = self._newest if is_so else self._found_at[place]

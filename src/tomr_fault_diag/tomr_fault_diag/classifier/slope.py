@@ -40,7 +40,6 @@ class SlopeFilter:
 
     def __init__(self, robot: Robot) -> None:
         self._motors = Motors(robot)
-        self._per_newton = self._motors.mass * self._motors.from_force
         # Magnitudes of currents do not show which way a motor pushes.
         self._is_able = robot.measurement.signed
 
@@ -55,7 +54,7 @@ class SlopeFilter:
         if tick is None:
             return frame
         with np.errstate(over="ignore", invalid="ignore"):
-            more = self._draws(tick, self._per_newton @ np.array([*force, 0.0]))
+            more = self._draws(tick, self._motors.per_newton @ np.array([*force, 0.0]))
         if not np.isfinite(more).all():
             return frame
         residuals = list(frame.residuals)

@@ -5,6 +5,7 @@ from typing import Any
 from tomr_fault_diag.residuals.gyro import CLOSEST_NS
 from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.messages.intake import WheelFinder, specific_force_of, stamp_of, yaw_rate_of
+from tomr_power_model.messages.readings import NAN
 from tomr_power_model.messages.types import IMU
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.robot import Robot
@@ -16,12 +17,14 @@ def residual_inputs(
 ) -> tuple[Input, ...]:
     """Encoders, power as the robot publishes it, and the IMU of a robot that has one."""
     inputs = measured_inputs(robot, stage.encoders, stage.power, wheels, refused=stage.refused)
-    if not (stage.settings.watch_gyro or stage.settings.watch_accelerometer):
+    turns, forces = stage.settings.watch_gyro, stage.settings.watch_accelerometer
+    if not (turns or forces):
         return inputs
 
     def imu(message: Any, receive_ns: int) -> Arrival:
-        stamp = stamp_of(message, receive_ns)
-        return stage.imu(stamp, yaw_rate_of(message), specific_force_of(message))
+        rate = yaw_rate_of(message) if turns else NAN
+        force = specific_force_of(message) if forces else (NAN, NAN, NAN)
+        return stage.imu(stamp_of(message, receive_ns), rate, force)
 
     thinning = Thinning(CLOSEST_NS)
     taker = guarded(thinning.around(imu))

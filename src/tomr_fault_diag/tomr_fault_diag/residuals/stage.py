@@ -15,6 +15,7 @@ from tomr_fault_diag.residuals.frame import (
     GAP,
     MOTORS,
     NO_COMMAND,
+    NO_ENCODERS,
     NOT_MEASURED,
     SCATTER,
     Residual,
@@ -171,13 +172,12 @@ class ResidualStage:
         return arrival
 
     def imu(self, stamp_ns: int, yaw_rate: float, force: Triple = (NAN, NAN, NAN)) -> Arrival:
-        """Take a gyro's yaw rate [rad/s] and an accelerometer's specific force [m/s^2]."""
+        """Take a gyro's yaw rate [rad/s] and an accelerometer's specific force [m/s^2], NaN for
+        what is not measured."""
         arrival = self._arrive(IMU, stamp_ns)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
-            if self.settings.watch_gyro:
-                self._gyro.add(stamp_ns, yaw_rate)
-            if self.settings.watch_accelerometer:
-                self._accelerometer.add(stamp_ns, force)
+            self._gyro.add(stamp_ns, yaw_rate)
+            self._accelerometer.add(stamp_ns, force)
         return arrival
 
     def refused(self, topic: str) -> None:
@@ -327,7 +327,7 @@ class ResidualStage:
         bands = self.settings.bands
         pauses = self._encoders.continuity.is_broken(tick)
         is_fresh = tick - self._encoders.continuity.last(tick) < self.settings.stale
-        reason = f"{GAP}{ENCODERS}" if pauses and is_fresh else "no fresh joint_states"
+        reason = f"{GAP}{ENCODERS}" if pauses and is_fresh else NO_ENCODERS
         self._scatter.take(estimate)
         scatter, disorder = self._scatter.seconds, self._scatter.is_disorder
         if disorder:

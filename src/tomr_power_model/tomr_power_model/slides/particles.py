@@ -309,8 +309,7 @@ class Particles:
             if apart:  # as much evidence in a time, however often power is measured
                 off = np.mean(apart, axis=0)
                 self._off[:, i] += share * (off - self._off[:, i])
-                square = np.log1p(self._off[:, i] ** 2 / s.tails)
-                logs -= 0.5 * (s.tails + 1.0) * s.trust * dt / s.time * square
+                logs += self._likelihood(dt, self._off[:, i])
         self._readings.clear()
         if self._turning is not None:
             rate, std = self._turning
@@ -322,13 +321,18 @@ class Particles:
                 (self._specific - self._felt.force) / self._felt.std, -s.farthest, s.farthest
             )
             self._felt_off += share * (off - self._felt_off)
-            square = np.log1p(self._felt_off**2 / s.tails).sum(axis=1)
-            logs -= 0.5 * (s.tails + 1.0) * s.trust * dt / s.time * square
+            logs += self._likelihood(dt, self._felt_off).sum(axis=1)
             self._felt = None
         weight = np.exp(logs - logs.max())
         self._weight = weight / weight.sum()
         if self._weight @ self._weight > 2.0 / s.particles:
             self._draw()
+
+    def _likelihood(self, dt: float, off: Array) -> Array:
+        """Logarithm of Student's distribution of what is off [standard deviations], as far as a
+        step counts."""
+        s = self._set
+        return -0.5 * (s.tails + 1.0) * s.trust * dt / s.time * np.log1p(off**2 / s.tails)
 
     def _apart(self, i: int, either: Pair, expected: Array) -> Array:
         """Standard deviations between expected forces [N] and the nearer one of the power's."""
