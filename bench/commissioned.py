@@ -1,14 +1,15 @@
 """Commissioned robots in MuJoCo whose descriptions lack physics: false alarms, faults, delays.
 
     .venv/bin/python bench/commissioned.py --out DIR [--robots 0 1 2 3] [--hours 1] [--drives 96]
-        [--ramps]
+        [--ramps] [--without-imu]
 
 Each robot is drawn from three families, every value up to 5 % off its robot.yaml, which besides
 lacks three effects of the vocabulary. It drives the plan of `tomr_commission` twice and a tour that
 is held out, is commissioned on these, and then drives tours with payloads, floors and bumps as in
 bench/diagnosis.py, healthy or with one of the six states' faults, of seeds that nothing else uses.
-With --ramps the healthy tours lead over slopes of up to five degrees most of the time. Scored as
-there, with commissioned.yaml. What is done is kept in DIR and not done again.
+With --ramps the healthy tours lead over slopes of up to five degrees most of the time. Robots have
+an IMU unless --without-imu is given, in which case DIR has to be another one. Scored as there, with
+commissioned.yaml. What is done is kept in DIR and not done again.
 """
 
 import argparse
@@ -40,7 +41,7 @@ from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_power_model.cli import run_main
 from tomr_power_model.robot import Robot, load_robot, read_node_sections, robot_from_parameters
 from tomr_sim_bridge.missions import load_mission
-from tomr_sim_bridge.missions.mission import Mission, parse_mission
+from tomr_sim_bridge.missions.mission import parse_mission
 from tomr_training.drives import Drive, another_drive, bumps, every_value
 from tomr_training.simulated_drive import healthy_twin, simulated_drive
 
@@ -61,6 +62,7 @@ _HIDDEN = (
 )
 _TOP_SPEED = 0.6  # m/s
 _DRIVE_SECONDS = 18.0  # mean length of a drive, at least
+IMU_TOPIC = "imu/data"
 _NODES = ("power_model", "power_residuals", "fault_classifier")
 
 
@@ -88,14 +90,8 @@ def made(number: int, folder: Path) -> Made:
     return Made(off, described, tuple(item.effect for item in case.effects))
 
 
-def _recorded(robot: Made, mission: Mission, seed: int, path: Path) -> Path:
-    if not path.exists():
-        record_mission(mission, robot.real, seed, path)
-    return path
-
-
-def commissioned(number: int, folder: Path) -> dict[str, object]:
-    """Record what a commissioning asks for, and commission."""
+def commissioned(number: int, folder: Path, without: tuple[str, ...] = ()) -> dict[str, object]:
+    """Record what a commissioning asks for, without some topics, and commission."""
     robot = made(number, folder)
     believed = load_robot(robot.described)
     plan = parse_mission(mission_text(believed, _TOP_SPEED), "plan")
@@ -104,11 +100,15 @@ def commissioned(number: int, folder: Path) -> dict[str, object]:
     seed = _FIRST_SEED + _ROBOT * number
     tours = [another_drive(first, seed + 10 + k).mission for k in range(4)]
     held = evolve(tours[0], phases=tuple(p for tour in tours for p in tour.phases), payload=0.0)
-    bags = [
-        _recorded(robot, mission, seed + 1, folder / "plan_1"),
-        _recorded(robot, evolve(mission, floor_friction=0.7), seed + 2, folder / "plan_2"),
-        _recorded(robot, held, seed + 3, folder / "held_out"),
-    ]
+    drives = {
+        "plan_1": mission,
+        "plan_2": evolve(mission, floor_friction=0.7),
+        "held_out": held,
+    }
+    bags = [folder / name for name in drives]
+    for k, (bag, driven) in enumerate(zip(bags, drives.values(), strict=True), start=1):
+        if not bag.exists():
+            record_mission(driven, robot.real, seed + k, bag, without)
     out = folder / "commissioned"
     before = process_time()
     given = ["--robot", str(robot.described), "--out", str(out), "--quiet"]
@@ -153,6 +153,7 @@ class Task:
     fault: str | None  # as `tour`
     folder: Path
     ramps: bool = False
+    without: tuple[str, ...] = ()  # topics
 
 
 def scored(task: Task) -> Outcome:
@@ -161,7 +162,7 @@ def scored(task: Task) -> Outcome:
     chosen = tour(task.number, task.folder, task.seed, task.fault)
     if task.ramps:
         chosen = over_ramps(chosen)
-    labelled = simulated_drive(chosen)
+    labelled = simulated_drive(chosen, task.without)
     named = named_by(kind, rebanded(labelled.frames, kind.bands), believed)
     if task.fault is None:
         return score_healthy(labelled, named)
@@ -185,12 +186,14 @@ def _main(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--drives", type=int, default=96, help="with a fault, of all together")
     parser.add_argument("--skip", type=int, default=0, help="of each robot's drives with a fault")
     parser.add_argument("--ramps", action="store_true", help="healthy tours lead over ramps")
+    parser.add_argument("--without-imu", action="store_true", help="robots that have none")
     parser.add_argument("--json", type=Path, help="write the report to this file as well")
     options = parser.parse_args(arguments)
+    without = (IMU_TOPIC,) if options.without_imu else ()
     folders = {number: options.out / f"robot_{number}" for number in options.robots}
     robots = []
     for number, folder in folders.items():
-        robots.append(commissioned(number, folder))
+        robots.append(commissioned(number, folder, without))
         print(json.dumps(robots[-1]), flush=True)
 
     def tasks(count: int, first: int, fault: str | None, ramps: bool = False) -> list[Task]:
@@ -198,7 +201,7 @@ def _main(arguments: Sequence[str] | None) -> int:
         for index in range(count):
             number, k = options.robots[index % len(folders)], index // len(folders)
             seed = _FIRST_SEED + _ROBOT * number + first + k
-            found.append(Task(number, seed, fault, folders[number], ramps))
+            found.append(Task(number, seed, fault, folders[number], ramps, without))
         return found
 
     healthy = math.ceil(options.hours * 3600.0 / _DRIVE_SECONDS)

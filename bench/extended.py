@@ -1,13 +1,14 @@
 """Faults beyond the paper's in MuJoCo, kinds that nobody knows, and pushes, scored with intervals.
 
     .venv/bin/python bench/extended.py [--drives 20] [--healthy-hours 0.5] [--json report.json]
-        [--commissioned DIR]
+        [--commissioned DIR [--without-imu]]
 
 So many drives of each kind of fault in docs/faults.md: robots, deviations of 5 % from their
 description, payloads, floors, bumps, missions and sensor noise as in bench/diagnosis.py, wheels,
 sizes and onsets at random, from seeds that nothing else uses. Healthy drives are shoved (up to
 3 N/kg for 0.2 s) and leaned on (up to 1 N/kg for seconds) as well. With --commissioned the robots
-are those that bench/commissioned.py --out DIR has commissioned, with their commissioned.yaml.
+are those that bench/commissioned.py --out DIR has commissioned, with their commissioned.yaml; and
+their drives without an IMU with --without-imu.
 
 A fault counts while it shows: power or speeds differ measurably from those of a twin of the same
 robot in the same drive without the fault (`tomr_training/labels.py`); one of a power sensor, while
@@ -28,7 +29,7 @@ from typing import Self
 
 import numpy as np
 from attrs import evolve, frozen
-from commissioned import commissioned_kind, tour
+from commissioned import IMU_TOPIC, commissioned_kind, tour
 from diagnosis import Kind as Diagnosed
 from diagnosis import rebanded
 from diagnosis_report import publish
@@ -150,16 +151,17 @@ class Fleet:
     """Whose drives are scored: robots at random, or those commissioned in the folders of DIR."""
 
     robots: tuple[Path, ...] = ()
+    without: tuple[str, ...] = ()  # topics
 
     @classmethod
-    def of(cls, commissioned: Path | None) -> Self:
+    def of(cls, commissioned: Path | None, without: tuple[str, ...] = ()) -> Self:
         """Raises InputError for a folder that holds no commissioned robot."""
         if commissioned is None:
-            return cls()
+            return cls(without=without)
         found = sorted(commissioned.glob("robot_*"), key=_number)
         if not found:
             raise InputError(f"{commissioned}: no robot_*; run bench/commissioned.py --out there")
-        return cls(tuple(found))
+        return cls(tuple(found), without)
 
     def drive(self, seed: int) -> Drive:
         """A healthy drive that depends on nothing but the seed and the robots."""
@@ -263,7 +265,7 @@ def spans(flags: Flags, first: int) -> tuple[tuple[float, float], ...]:
 def score_fault(fleet: Fleet, seed: int, name: str) -> Seen | None:
     """A faulty drive against its label; None where the fault never shows."""
     drive, size = faulty_drive(fleet.drive(seed), name)
-    labelled = simulated_drive(drive)
+    labelled = simulated_drive(drive, fleet.without)
     twin = healthy_twin(drive).of_ticks(labelled.first - 1 + np.arange(len(labelled.frames)))
     observable = spans(shows(drive, labelled, twin), labelled.first)
     if not observable:
@@ -287,7 +289,8 @@ def _label(drive: Drive, name: str, size: float) -> Label:
 def score_healthy(fleet: Fleet, seed: int) -> Seen:
     """A healthy drive with pushes: whatever is named is an alarm."""
     drive = pushed_drive(fleet.drive(seed))
-    return seen(said_of(fleet.kind(seed), drive, simulated_drive(drive)), START_NS, [], (0, 1))
+    labelled = simulated_drive(drive, fleet.without)
+    return seen(said_of(fleet.kind(seed), drive, labelled), START_NS, [], (0, 1))
 
 
 def _work(task: tuple[Fleet, int, str]) -> Seen | None:
@@ -325,10 +328,11 @@ def _main(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="of the test set")
     parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
     parser.add_argument("--commissioned", type=Path, help="DIR of bench/commissioned.py --out")
+    parser.add_argument("--without-imu", action="store_true", help="robots that have none")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--json", type=Path, help="write the report to this file as well")
     options = parser.parse_args(arguments)
-    fleet = Fleet.of(options.commissioned)
+    fleet = Fleet.of(options.commissioned, (IMU_TOPIC,) if options.without_imu else ())
     places = {name: number for number, name in enumerate(KINDS)}
     tasks = [
         (fleet, options.first_seed + 1000 * places[name] + drive, name)

@@ -17,7 +17,7 @@ from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.outside import NOTHING_ACTS, Outside, OutsideWatch
 from tomr_fault_diag.classifier.settings import ClassifierSettings
-from tomr_fault_diag.classifier.slides import SlideWatch, _is_plain
+from tomr_fault_diag.classifier.slides import SlideWatch, _explains, _is_plain
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.classifier.states import NORMAL, SLIP, STATES
 from tomr_fault_diag.residuals.frame import SPEEDS, UNKNOWN_FORCE, Residual, ResidualFrame
@@ -467,19 +467,36 @@ def test_a_slope_is_known_for_half_a_second_more_where_the_motion_changes() -> N
 
 
 @pytest.mark.parametrize(
-    ("mean", "std", "off", "plain"),
+    ("mean", "std", "off", "explains", "plain"),
     [
-        ((0.3, 0.4), 0.16, 1.1, True),
-        ((0.3, 0.4), 0.17, 1.1, False),  # three standard deviations
-        ((0.3, 0.4), 0.16, 1.3, False),  # a wheel's force is another
-        ((0.12, 0.12), 0.01, 0.0, False),  # hardly any
-        ((math.nan, 0.4), 0.16, 1.1, False),
+        ((0.3, 0.4), 0.16, 1.1, True, True),
+        ((0.3, 0.4), 0.17, 1.1, True, False),  # three standard deviations
+        ((0.3, 0.4), 0.16, 1.3, False, True),  # a wheel's force is another
+        ((0.12, 0.12), 0.01, 0.0, False, True),  # hardly any
+        ((math.nan, 0.4), 0.16, 1.1, False, False),
     ],
 )
 def test_which_force_is_plain(
-    mean: tuple[float, float], std: float, off: float, plain: bool
+    mean: tuple[float, float], std: float, off: float, explains: bool, plain: bool
 ) -> None:
-    assert _is_plain(Pull(np.array(mean), std, off)) is plain
+    pull = Pull(np.array(mean), std, off)
+    assert (_explains(pull), _is_plain(pull)) == (explains, plain)
+
+
+@pytest.mark.parametrize(
+    ("mean", "std", "off", "known"),
+    [(0.6, 0.1, 0.5, True), (0.6, 0.3, 0.5, False), (0.6, 0.1, 1.3, None), (0.1, 0.01, 0.5, None)],
+)
+def test_a_force_explains_before_it_is_known(
+    monkeypatch: pytest.MonkeyPatch, mean: float, std: float, off: float, known: bool | None
+) -> None:
+    """None: it explains nothing."""
+    watch = SlideWatch(ROBOT)
+    pull = Pull(np.array([mean, 0.0]), std, off)
+    monkeypatch.setattr(watch._particles, "pull", lambda: pull)
+    awake = frames(pushed(BODY.mass * np.array([0.4, 0.3, 0.0]), 0.0, 9.0), 1.0)
+    found = [watch.take(item) for item in awake][-1]
+    assert (found.slopes, found.force) == (known is not None, bool(known))
 
 
 @pytest.mark.parametrize(("slides", "force"), [(0.05, True), (0.5, False)])
@@ -491,7 +508,8 @@ def test_while_a_wheel_may_slide_no_force_explains_all(
     monkeypatch.setattr(watch._particles, "slides", lambda rims: said)
     monkeypatch.setattr(watch._particles, "pull", lambda: Pull(np.array([0.6, 0.0]), 0.1, 0.5))
     awake = frames(pushed(BODY.mass * np.array([0.4, 0.3, 0.0]), 0.0, 9.0), 1.0)
-    assert [watch.take(item).force for item in awake][-1] == force
+    found = [watch.take(item) for item in awake][-1]
+    assert (found.force, found.slopes) == (force, force)
 
 
 def test_a_clock_that_begins_at_0_shows_no_slope() -> None:
@@ -522,10 +540,18 @@ def test_what_drags_is_no_load_where_a_slope_explains_it() -> None:
         classifier.clear()
 
 
-@pytest.mark.parametrize(("force", "called"), [(True, "pushed"), (False, "unknown")])
-def test_what_is_far_off_on_a_slope_is_not_unknown(force: bool, called: str) -> None:
+@pytest.mark.parametrize(
+    ("seen", "called"),
+    [
+        (Contacts(0.0), "unknown"),
+        (Contacts(0.0, force=True), "pushed"),
+        (Contacts(0.0, slopes=True), "pushed"),
+        (Contacts(0.0, slopes=True, felt=True), "unknown"),  # an accelerometer feels none
+    ],
+)
+def test_what_is_far_off_on_a_slope_is_not_unknown(seen: Contacts, called: str) -> None:
     contacts = Mock(spec=SlideWatch)
-    contacts.take.return_value = Contacts(0.0, force=force)
+    contacts.take.return_value = seen
     judge = Mock(spec=WindowJudge, settings=ClassifierSettings())
     judge.judge.return_value = Opinion(np.eye(18)[0], True, None, STATES[NORMAL])
     classifier = FaultClassifier(judge, slides=contacts)

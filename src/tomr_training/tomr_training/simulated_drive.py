@@ -1,6 +1,6 @@
 """A drive in MuJoCo, seen by the diagnosis tick by tick, with the truth beside it."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
 import numpy as np
@@ -107,8 +107,8 @@ class LabelledDrive:
     first: int  # tick of the first frame: that of row k is first + k
 
 
-def simulated_drive(chosen: Drive) -> LabelledDrive:
-    """Run a drive through the simulator and the first two stages."""
+def simulated_drive(chosen: Drive, without: Collection[str] = ()) -> LabelledDrive:
+    """Run a drive through the simulator and the first two stages, without some topics."""
     predictor = PowerPredictor(chosen.believed, is_compiled=has_numba())
     stage = ResidualStage(chosen.believed)
     takers: dict[str, list[Callable[[Any, int], str | None]]] = {}
@@ -120,7 +120,7 @@ def simulated_drive(chosen: Drive) -> LabelledDrive:
     simulation = ProbedSimulation(chosen)
     frames: list[ResidualFrame] = []
     for sample in _samples(chosen, simulation):
-        if sample.topic not in takers:
+        if sample.topic not in takers or sample.topic in without:
             continue
         message = to_bag(sample.message)
         for take in takers[sample.topic]:

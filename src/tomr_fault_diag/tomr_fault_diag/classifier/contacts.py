@@ -33,14 +33,16 @@ class Contacts:
     `slides`: how likely a wheel does, NaN where that is not known; `lone`: the wheel 0..2 that
     alone bears more, and for longer, than any push from outside; `unmoved`: the one that alone
     bears more and shows no motion in two ticks; `force`: one on the body that stays, as on a slope,
-    explains what all hand on; `calm`: for long nothing has left its band that a slide would move;
-    `felt`: an accelerometer says so as well, which feels no more than what contacts hand on.
+    explains what all hand on; `slopes`: some such force does, which need not be known; `calm`: for
+    long nothing has left its band that a slide would move; `felt`: an accelerometer says so as
+    well, which feels no more than what contacts hand on.
     """
 
     slides: float = math.nan
     lone: int | None = None
     unmoved: int | None = None
     force: bool = False
+    slopes: bool = False
     calm: bool = False
     felt: bool = False
 

@@ -22,8 +22,9 @@ from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.severity.tick import MOVES, Tick
 from tomr_fault_diag.classifier.slope import shows_motion
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, ResidualFrame
+from tomr_power_model.messages.readings import NAN
 from tomr_power_model.model.ticks import NANOSECONDS, NEVER, to_ns
-from tomr_power_model.robot import Robot
+from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
 
@@ -63,6 +64,7 @@ class Outside:
     push: bool = False  # what a person may do, and no wheel
     may_be_push: bool = False  # the same, for all that the motion has shown
     fits_slope: bool = False  # a force that passes the centre explains it, and so may a wheel
+    felt: bool = False  # what an accelerometer feels explains it
 
 
 NOTHING_ACTS = Outside()
@@ -89,7 +91,7 @@ class OutsideWatch:
         self._looked_at = NEVER  # ns
         self._found_at = list(_NEVER_FOUND)  # ns, when each of what may be found last was
         self._yaw = 0.0  # rad
-        self._ticks: deque[tuple[int, Array, Array, Array, Array, float, bool]] = deque()
+        self._ticks: deque[tuple[int, Array, Array, Array, Array, float, float]] = deque()
         self._found = NOTHING_ACTS
 
     def _forget(self) -> None:
@@ -129,16 +131,18 @@ class OutsideWatch:
         if not off < self.settings.far:
             return
         shown, per_torque = self._torques(tick, follows=off < 1.0)
+        felt = np.zeros(WHEELS)
         is_felt = shows_motion(frame)
         if is_felt:  # gravity, or a slide
-            felt = [*(item.residual for item in frame.along), 0.0]
-            shown = shown - self._motors.per_newton @ felt
+            felt = self._motors.per_newton @ [*(item.residual for item in frame.along), 0.0]
         bands = np.array([frame.residuals[k].band for k in ENCODERS])
         powers = np.where(np.abs(tick.speed) > MOVES, np.sign(per_torque) / bands, 0.0)
         seen = per_torque * powers
-        shown = np.clip(seen * shown, -_MOST, _MOST)
-        if np.isfinite(shown).all() and np.isfinite(seen).all():
-            self._ticks.append((frame.stamp_ns, shown, seen, powers, twist, self._yaw, is_felt))
+        both = np.clip(seen * shown, -_MOST, _MOST)
+        shown = np.clip(seen * (shown - felt), -_MOST, _MOST)
+        if np.isfinite(shown).all() and np.isfinite(both).all() and np.isfinite(seen).all():
+            square = float((both**2).sum()) if is_felt else NAN
+            self._ticks.append((frame.stamp_ns, shown, seen, powers, twist, self._yaw, square))
         while self._ticks and self._ticks[0][0] < frame.stamp_ns - self.settings.windows[-1]:
             self._ticks.popleft()
 
@@ -164,19 +168,25 @@ class OutsideWatch:
         for length in self.settings.windows:
             first = int(np.searchsorted(stamps, self._newest - length))
             if len(stamps) - first >= self.settings.ticks:
-                shown, seen, powers, twist, yaw, felt = (column[first:] for column in columns)
+                shown, seen, powers, twist, yaw, squares = (column[first:] for column in columns)
                 window = Window(shown, seen, powers, twist, yaw, self._motors.per_newton)
-                lasts = bool(felt.all() and stamps[-1] - stamps[first] >= self.settings.longer)
-                for place, is_so in enumerate(astuple(self._judge(window, lasts=lasts))):
+                whole = float(squares.sum())  # NaN where not all ticks were felt
+                lasts = whole == whole and stamps[-1] - stamps[first] >= self.settings.longer
+                found = self._judge(window, whole, lasts=lasts)
+                for place, is_so in enumerate(astuple(found)):
                     self._found_at[place] = self._newest if is_so else self._found_at[place]
             if first == 0:
                 break
         self._found = Outside(*(self._newest - at <= self.settings.holds for at in self._found_at))
 
-    def _judge(self, window: Window, *, lasts: bool) -> Outside:
+    def _judge(self, window: Window, whole: float, *, lasts: bool) -> Outside:
+        """What acts in a window beyond what an accelerometer feels; `whole`: sum of squares with
+        that, NaN where none is heard; `lasts`: for longer than a person pushes."""
         s, total = self.settings, window.sum_of_squares
-        if total < s.mean_square * len(window.shown):
-            return NOTHING_ACTS
+        least = s.mean_square * len(window.shown)
+        felt = whole > least and total < s.fit * whole
+        if total < least:
+            return Outside(felt=felt)
         lone, torques = window.left_by_encoder(self._motors.to_twist), window.left_by_torques()
         drivers = window.left_by_power()
 
@@ -188,7 +198,7 @@ class OutsideWatch:
         pushed, force = window.left_by_push()
         dragged, drag = window.left_by_drag(self._hitches)
         if drag > s.drag and explains(dragged, lone, torques, drivers, pushed):
-            return Outside(load=True)
+            return Outside(load=True, felt=felt)
         may_be = explains(pushed, lone)
         sloping, pull = window.left_by_push(turns=False)
         # Where a wheel stands two residuals are left, which some force always explains.
@@ -199,6 +209,7 @@ class OutsideWatch:
             push=is_tried and not is_strong,
             may_be_push=may_be and not is_strong,
             fits_slope=explains(sloping) and pull < s.person,
+            felt=felt,
         )
 
 

@@ -74,7 +74,8 @@ class SlideWatch:
     def _rest(self) -> None:
         self._awake_until = 0  # ns
         self._last: Tick | None = None
-        self._pulled_at = NEVER  # ns, when a force last explained what all contacts hand on
+        # ns, when a force that is known, or some force, last explained what all contacts hand on.
+        self._pulled_at = self._explained_at = NEVER
         self._found = Contacts(0.0, calm=True)
         self._lone.clear()
 
@@ -126,10 +127,14 @@ class SlideWatch:
                 self._particles.feels(_felt(frame))
             self._particles.step((tick.stamp_ns - last.stamp_ns) / NANOSECONDS, rims)
             found = self._lone.take(tick, self._particles.slides(rims).any_probability)
-            if found.grips and _is_plain(self._particles.pull()):
-                self._pulled_at = tick.stamp_ns
-            holds = tick.stamp_ns - self._pulled_at <= _HOLDS
-            return evolve(found, force=holds, felt=is_felt)
+            pull = self._particles.pull()
+            if found.grips and _explains(pull):
+                self._explained_at = tick.stamp_ns
+                self._pulled_at = tick.stamp_ns if _is_plain(pull) else self._pulled_at
+            force, slopes = (
+                tick.stamp_ns - at <= _HOLDS for at in (self._pulled_at, self._explained_at)
+            )
+            return evolve(found, force=force, slopes=slopes, felt=is_felt)
 
     def _weigh(self, tick: Tick, rims: Array) -> None:
         """Hand on what the powers show of the contacts."""
@@ -181,6 +186,10 @@ def _is_outside(item: Residual) -> bool:
     return abs(item.residual) > item.band  # false where either is NaN
 
 
+def _explains(pull: Pull) -> bool:
+    """Whether some force stays, known or not, that explains what all contacts hand on."""
+    return float(np.hypot(*pull.mean)) > _STEEP and pull.off < _OFF
+
+
 def _is_plain(pull: Pull) -> bool:
-    """Whether a force stays that is known well, and explains what all contacts hand on."""
-    return float(np.hypot(*pull.mean)) > max(_STEEP, _PLAIN * pull.std) and pull.off < _OFF
+    return float(np.hypot(*pull.mean)) > _PLAIN * pull.std

@@ -255,10 +255,9 @@ class FaultClassifier:
     def _weigh(self, opinion: Opinion, misfit: Misfit, stamp: int, outside: Outside) -> None:
         """Name what the judge is sure of, or what it does not know."""
         leading = _called(opinion, misfit)
-        looks_so = opinion.leading is PUSHED and outside.fits_slope
         is_unnamed = self._state in _QUIET or self._state is UNKNOWN
-        if leading is UNKNOWN and is_unnamed and (outside.may_be_push or looks_so):
-            leading = PUSHED  # somebody who leans on the robot explains what is far off
+        if leading is UNKNOWN and is_unnamed and self._may_be_pushed(opinion, outside):
+            leading = PUSHED
         candidate = STATES[NORMAL] if leading in _WELL else leading
         if not _is_one_fault(candidate, self._candidate):
             self._candidate_since, self._sure_since = stamp, None
@@ -277,6 +276,14 @@ class FaultClassifier:
             self._enter(leading, self._candidate_since, opinion.wheel)
         elif self._state is None:
             self._enter(STALE, stamp, None)
+
+    def _may_be_pushed(self, opinion: Opinion, outside: Outside) -> bool:
+        """Whether somebody who leans on the robot, or a slope, explains what is far off."""
+        looks_so = opinion.leading is PUSHED and outside.fits_slope
+        is_felt = opinion.leading in _WELL and outside.felt
+        # Where nothing feels a slope, it need not be known which explains it.
+        slopes = self._contacts.slopes and not self._contacts.felt
+        return outside.may_be_push or looks_so or is_felt or slopes
 
     def _may_name(self, leading: State, wheel: int | None) -> bool:
         """Whether it is something new; a robot that stands shows no other fault than it had."""
