@@ -145,7 +145,14 @@ def test_a_slope_that_an_accelerometer_feels_acts_from_nowhere(azimuth: float) -
     assert all(item.felt for item in felt[20:])
 
 
+def test_what_is_felt_need_not_be_all() -> None:
+    """Three quarters of a steep slope leave a sixteenth of the squares, more than noise."""
+    items = found(frames(fixed(2.0), 8.0, sloping=0.75))
+    assert all(item.felt for item in items[20:])
+
+
 def test_only_what_an_accelerometer_feels_is_felt() -> None:
+    assert not any(item.felt for item in found(frames(fixed(0.2), 8.0, sloping=1.0)))  # in bands
     assert not any(item.felt for item in found(frames(fixed(0.7), 8.0)))  # without one
     assert not any(item.felt for item in found(frames(nothing, 8.0, sloping=1.0)))
     assert not any(item.felt for item in found(frames(fixed(0.7), 8.0, sloping=0.5)))
