@@ -93,7 +93,8 @@ def kinds() -> dict[str, Kind]:
 
 
 def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[ResidualFrame]:
-    """The same residuals in other bands than the usual; what was wider for its noise stays so."""
+    """The same residuals in other bands than the usual; what was wider for its noise stays so, and
+    what an IMU shows keeps the usual bands."""
     _, modelled = as_arrays(frames)
     compared = Compared(modelled, modelled)
     (_, usual), (_, band) = (compared.residuals(chosen) for chosen in (BandSettings(), bands))

@@ -275,9 +275,9 @@ def test_what_looks_like_a_push_and_may_be_a_slope_is_not_unknown() -> None:
 
 
 def test_what_an_accelerometer_feels_is_not_unknown() -> None:
-    assert judged(Looks(NORMAL), Outside(felt=True)) == ["normal", "pushed"]
-    assert judged(Sure(NORMAL), Outside(felt=True)) == ["normal", "pushed"]
-    assert judged(Looks(CONTROL), Outside(felt=True))[-1] == "unknown"
+    assert judged(Looks(NORMAL), Outside(fits_felt=True)) == ["normal", "pushed"]
+    assert judged(Sure(NORMAL), Outside(fits_felt=True)) == ["normal", "pushed"]
+    assert judged(Looks(CONTROL), Outside(fits_felt=True))[-1] == "unknown"
 
 
 def test_what_is_seen_later_to_be_a_push_is_unknown_no_longer() -> None:

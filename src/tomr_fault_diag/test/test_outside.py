@@ -141,24 +141,26 @@ def test_a_slope_that_an_accelerometer_feels_acts_from_nowhere(azimuth: float) -
     unknown = found(frames(fixed(0.7, azimuth), 8.0))
     assert unknown[-1].push
     felt = found(frames(fixed(0.7, azimuth), 8.0, sloping=1.0))
-    assert set(felt) == {NOTHING_ACTS, Outside(felt=True)}
-    assert all(item.felt for item in felt[20:])
+    assert set(felt) == {NOTHING_ACTS, Outside(fits_felt=True)}
+    assert all(item.fits_felt for item in felt[20:])
 
 
 def test_what_is_felt_need_not_be_all() -> None:
     """Three quarters of a steep slope leave a sixteenth of the squares, more than noise."""
     items = found(frames(fixed(2.0), 8.0, sloping=0.75))
-    assert all(item.felt for item in items[20:])
+    assert all(item.fits_felt for item in items[20:])
 
 
 def test_only_what_an_accelerometer_feels_is_felt() -> None:
-    assert not any(item.felt for item in found(frames(fixed(0.2), 8.0, sloping=1.0)))  # in bands
-    assert not any(item.felt for item in found(frames(fixed(0.7), 8.0)))  # without one
-    assert not any(item.felt for item in found(frames(nothing, 8.0, sloping=1.0)))
-    assert not any(item.felt for item in found(frames(fixed(0.7), 8.0, sloping=0.5)))
+    assert not any(
+        item.fits_felt for item in found(frames(fixed(0.2), 8.0, sloping=1.0))
+    )  # in bands
+    assert not any(item.fits_felt for item in found(frames(fixed(0.7), 8.0)))  # without one
+    assert not any(item.fits_felt for item in found(frames(nothing, 8.0, sloping=1.0)))
+    assert not any(item.fits_felt for item in found(frames(fixed(0.7), 8.0, sloping=0.5)))
     wheel = np.array([6.0, 0.0, 0.0])  # W
     items = frames(fixed(0.7), 8.0, lambda _: OBLIQUE, more=wheel, sloping=1.0)
-    assert not any(item.felt for item in found(items))
+    assert not any(item.fits_felt for item in found(items))
 
 
 def test_what_no_slope_is_and_no_person_does_is_a_load() -> None:

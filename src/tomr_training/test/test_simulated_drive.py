@@ -56,6 +56,14 @@ def test_a_twin_is_the_same_drive_without_its_fault(straight: Straight) -> None:
     assert change[45:].max() < 0.5
 
 
+def test_a_robot_may_have_no_imu(straight: Straight) -> None:
+    seen, without = simulated_drive(straight()), simulated_drive(straight(), ("imu/data",))
+    assert any(not frame.along[0].stale for frame in seen.frames)
+    assert all(one.stale for frame in without.frames for one in (frame.yaw, *frame.along))
+    # Nothing else is another.
+    assert [one.residuals for one in without.frames] == [one.residuals for one in seen.frames]
+
+
 def test_an_accelerometer_feels_the_slope_that_pulls_and_no_push(straight: Straight) -> None:
     """For half a second 0.6 m/s^2 along x, on wheels that hold the robot."""
     mass = straight().plant.mass

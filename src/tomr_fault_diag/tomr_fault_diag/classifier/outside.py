@@ -64,7 +64,7 @@ class Outside:
     push: bool = False  # what a person may do, and no wheel
     may_be_push: bool = False  # the same, for all that the motion has shown
     fits_slope: bool = False  # a force that passes the centre explains it, and so may a wheel
-    felt: bool = False  # what an accelerometer feels explains it
+    fits_felt: bool = False  # what an accelerometer feels explains it
 
 
 NOTHING_ACTS = Outside()
@@ -184,9 +184,9 @@ class OutsideWatch:
         that, NaN where none is heard; `lasts`: for longer than a person pushes."""
         s, total = self.settings, window.sum_of_squares
         least = s.mean_square * len(window.shown)
-        felt = whole > least and total < s.fit * whole
+        fits_felt = whole > least and total < s.fit * whole
         if total < least:
-            return Outside(felt=felt)
+            return Outside(fits_felt=fits_felt)
         lone, torques = window.left_by_encoder(self._motors.to_twist), window.left_by_torques()
         drivers = window.left_by_power()
 
@@ -198,7 +198,7 @@ class OutsideWatch:
         pushed, force = window.left_by_push()
         dragged, drag = window.left_by_drag(self._hitches)
         if drag > s.drag and explains(dragged, lone, torques, drivers, pushed):
-            return Outside(load=True, felt=felt)
+            return Outside(load=True, fits_felt=fits_felt)
         may_be = explains(pushed, lone)
         sloping, pull = window.left_by_push(turns=False)
         # Where a wheel stands two residuals are left, which some force always explains.
@@ -209,7 +209,7 @@ class OutsideWatch:
             push=is_tried and not is_strong,
             may_be_push=may_be and not is_strong,
             fits_slope=explains(sloping) and pull < s.person,
-            felt=felt,
+            fits_felt=fits_felt,
         )
 
 

@@ -192,4 +192,5 @@ def _explains(pull: Pull) -> bool:
 
 
 def _is_plain(pull: Pull) -> bool:
+    """Whether it is known which force that is."""
     return float(np.hypot(*pull.mean)) > _PLAIN * pull.std

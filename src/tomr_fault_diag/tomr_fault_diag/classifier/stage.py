@@ -280,7 +280,7 @@ class FaultClassifier:
     def _may_be_pushed(self, opinion: Opinion, outside: Outside) -> bool:
         """Whether somebody who leans on the robot, or a slope, explains what is far off."""
         looks_so = opinion.leading is PUSHED and outside.fits_slope
-        is_felt = opinion.leading in _WELL and outside.felt
+        is_felt = opinion.leading in _WELL and outside.fits_felt
         # Where nothing feels a slope, it need not be known which explains it.
         slopes = self._contacts.slopes and not self._contacts.felt
         return outside.may_be_push or looks_so or is_felt or slopes
