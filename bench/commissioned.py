@@ -47,8 +47,8 @@ from tomr_training.simulated_drive import healthy_twin, simulated_drive
 
 _FIRST_SEED = 90_000_000
 _ROBOT = 100_000  # seeds of one robot
-_FAULTY = 1000  # seeds of faulty drives follow so many later ...
-_HEALTHY = 50_000  # ... and those of healthy ones
+FAULTY = 1000  # seeds of faulty drives follow so many later ...
+HEALTHY = 50_000  # ... and those of healthy ones
 _OFF = 0.05
 _CONCEALED = 3
 _HIDDEN = (
@@ -77,7 +77,7 @@ class Made:
 
 def made(number: int, folder: Path) -> Made:
     """Robot `number`; it depends on nothing else."""
-    random = np.random.default_rng(_FIRST_SEED + _ROBOT * number)
+    random = np.random.default_rng(seed_of(number, 0))
     drawn = random.choice(len(_HIDDEN), _CONCEALED, replace=False)
     case = Case(f"robot_{number}", "named", tuple(_HIDDEN[k] for k in drawn))
     _, nominal = described_robot(case, random)
@@ -97,7 +97,7 @@ def commissioned(number: int, folder: Path, without: tuple[str, ...] = ()) -> di
     plan = parse_mission(mission_text(believed, _TOP_SPEED), "plan")
     mission = evolve(plan, stamp_jitter=0.0005, floor_friction=0.8)
     first = Drive(0, robot.real, believed, mission)
-    seed = _FIRST_SEED + _ROBOT * number
+    seed = seed_of(number, 0)
     tours = [another_drive(first, seed + 10 + k).mission for k in range(4)]
     held = evolve(tours[0], phases=tuple(p for tour in tours for p in tour.phases), payload=0.0)
     drives = {
@@ -142,6 +142,11 @@ def tour(number: int, folder: Path, seed: int, fault: str | None) -> Drive:
     random = np.random.default_rng([seed, 5])
     count = int(random.integers(0, 4))
     return evolve(chosen, bumps=bumps(believed, random, count, chosen.length))
+
+
+def seed_of(number: int, index: int) -> int:
+    """Of a drive of robot `number`; faulty ones begin with FAULTY, healthy ones with HEALTHY."""
+    return _FIRST_SEED + _ROBOT * number + index
 
 
 @frozen
@@ -200,13 +205,13 @@ def _main(arguments: Sequence[str] | None) -> int:
         found = []
         for index in range(count):
             number, k = options.robots[index % len(folders)], index // len(folders)
-            seed = _FIRST_SEED + _ROBOT * number + first + k
+            seed = seed_of(number, first + k)
             found.append(Task(number, seed, fault, folders[number], ramps, without))
         return found
 
     healthy = math.ceil(options.hours * 3600.0 / _DRIVE_SECONDS)
-    sick = _outcomes("faulty", tasks(options.drives, _FAULTY + options.skip, "fault"))
-    well = _outcomes("healthy", tasks(healthy, _HEALTHY, None, options.ramps))
+    sick = _outcomes("faulty", tasks(options.drives, FAULTY + options.skip, "fault"))
+    well = _outcomes("healthy", tasks(healthy, HEALTHY, None, options.ramps))
     if sick or well:
         publish({"robots": robots, "diagnosis": report(sick, well)}, options.json)
     return 0

@@ -121,12 +121,12 @@ def named_by(kind: Kind, frames: Sequence[ResidualFrame], robot: Robot) -> Codes
     for frame in frames:
         diagnosis = classifier.classify(frame)
         if diagnosis is not None:
-            state = _in_paper(diagnosis.state)
+            state = in_paper(diagnosis.state)
         named.append(state)
     return np.array(named)
 
 
-def _in_paper(state: State) -> int:
+def in_paper(state: State) -> int:
     """Which of the six a state belongs to, the one after them if to none."""
     if state.name in FAULTLESS:
         return NORMAL

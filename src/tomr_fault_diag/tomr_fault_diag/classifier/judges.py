@@ -28,12 +28,12 @@ from tomr_fault_diag.classifier.belief import (
     WEAKS,
     Belief,
     named_of,
-    of_states,
 )
-from tomr_fault_diag.classifier.evidence import ALONE, Beside, astray, said_by_forces, said_by_gyro
+from tomr_fault_diag.classifier.evidence import ALONE, Beside, said_by_forces, said_by_gyro
 from tomr_fault_diag.classifier.features import CHANNELS, WINDOW, channels_of, turning
 from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.observability import Unseen
+from tomr_fault_diag.classifier.rules import ALL_RULES, CREEPING, Moment, Rules
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.states import (
     CONTROL,
@@ -47,7 +47,7 @@ from tomr_fault_diag.classifier.states import (
     State,
 )
 from tomr_fault_diag.classifier.window_network import WindowNetwork
-from tomr_fault_diag.residuals.frame import INPUT_ORDERS, SPEEDS, ResidualFrame
+from tomr_fault_diag.residuals.frame import INPUT_ORDERS, ResidualFrame
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import WHEELS
 
@@ -72,23 +72,10 @@ _GROUPS: tuple[list[int], ...] = (
 )
 _CAUSES = (*DRAGGING, *DEGRADED, *STUCK)  # of a fault of a motor system
 _SLIP_MARGIN = 4.0  # that slip need be less striking: a short one shows in few windows
-# A description that is off looks like these: what a window says only slightly is not counted, for
-# it would say it again and again.
-_CREEPING = (DRAGS, WEAKS, METERS)
-_SLIGHT = 1.0
-# What a push leaves for so many ticks looks like slip to the network, and so do small residuals
-# within bands that are the robot's own, and slopes: it says so much less where neither forces nor a
-# gyro show one. A driver that lets go of what a push left in its integral looks like one without a
-# signal.
-_SHAKEN, _DOUBTED = 12, 2.0
-# What is seen to act on the body for seconds is so much likelier than what a window looks like.
-_SHARED, _LOADED = 10.0, 24.0
+_SHAKEN = 12  # ticks, for which a push still shows
 _REMEMBERED = 60  # ticks, in which a fault of a wheel that was named may be so again on a slope
 _MOST_GATHERED = 24.0  # nats: what ended long ago must not count for long
 GATHERED = 12.0  # nats, that small faults which last have shown, in place of a striking window
-_HIDDEN = (CONTROLS, ENCODERS, DRAGS, WEAKS)  # faults that an idle wheel does not show
-_FIRM = _HIDDEN[1:]  # faults that hold a wheel: one without its signal goes where others pull it
-_OF_A_WHEEL = (*_HIDDEN, METERS)
 
 
 @frozen
@@ -140,9 +127,12 @@ class WindowJudge:
     slower ones it sees again. Until a motor has been accused for a window no cause is named.
     """
 
-    def __init__(self, network: WindowNetwork, settings: ClassifierSettings) -> None:
+    def __init__(
+        self, network: WindowNetwork, settings: ClassifierSettings, rules: Rules = ALL_RULES
+    ) -> None:
         self.settings = settings
         self._network = network
+        self._rules = rules
         self._belief = Belief(settings.evidence_weight, settings.caution)
         self.clear()
 
@@ -174,39 +164,47 @@ class WindowJudge:
         slot = frame.stamp_ns // _TICK
         count = 1 if self._slot is None else slot - self._slot
         self._slot = slot
-        said = said_by_gyro(frame, beside.borne_out) + said_by_forces(frame, beside.contacts)
+        moment = Moment(
+            frame,
+            unseen,
+            beside,
+            commissioned=bool(self.settings.commissioned),
+            striking=self.settings.striking,
+            by_gyro=said_by_gyro(frame, beside.borne_out),
+            by_forces=said_by_forces(frame, beside.contacts),
+        )
         for _ in range(count):
-            self._opinion = self._step(frame, unseen, said, beside)
+            self._opinion = self._step(self._so_far(moment))
             # A size is fitted to what is new in a tick, however long it stands for.
-            beside = evolve(beside, lasting=np.zeros(HYPOTHESES))
+            moment = evolve(moment, beside=evolve(beside, lasting=np.zeros(HYPOTHESES)))
         return self._opinion
 
-    def _step(self, frame: ResidualFrame, unseen: Unseen, said: Array, beside: Beside) -> Opinion:
-        """Opinion after one more tick of the network; `said` by the gyro and the forces."""
+    def _so_far(self, moment: Moment) -> Moment:
+        """With what was concluded so far."""
+        is_well = self._best in _GROUPS[0]
+        is_unaccused = is_well or self._best == OTHER  # which accuses none
+        return evolve(
+            moment,
+            is_well=is_well,
+            may_be_slope=is_unaccused and self._since_accused > _REMEMBERED,
+            is_shaken=self._shaken > 0,
+        )
+
+    def _step(self, moment: Moment) -> Opinion:
+        """Opinion after one more tick of the network."""
         self._window[:-1] = self._window[1:]
-        self._window[-1] = channels_of(frame)
+        self._window[-1] = channels_of(moment.frame)
         self._lacking = max(self._lacking - 1, 0)
         if self._lacking:
             return self._opinion
-        likelihoods = self._seen(frame, unseen)
-        is_well = self._best in _GROUPS[0]
-        contacts = beside.contacts
-        grips = contacts.calm or (contacts.grips and is_well)
-        known = self.settings.commissioned or (contacts.felt and not contacts.calm)
-        if (self._shaken or (grips and known)) and said[SLIP] <= 0.0:
-            likelihoods[SLIP] -= _SHARED if grips and contacts.felt else _DOUBTED
-        if self._shaken and is_well:
-            likelihoods[CONTROLS] -= _DOUBTED
-        if not self._shaken:
-            likelihoods = self._with_lasting(likelihoods, beside.lasting)
-        likelihoods = _with_outside(of_states(likelihoods + said), beside)
-        is_unaccused = is_well or self._best == OTHER  # which accuses none
-        if contacts.force and is_unaccused and self._since_accused > _REMEMBERED:
-            # What a slope explains accuses no wheel; one that is accused already stays so.
-            likelihoods[CONTROLS.start : WEAKS.stop] -= _SHARED
+        likelihoods = self._rules.weigh(self._network.log_likelihoods(self._window), moment)
+        if not moment.is_shaken:
+            counted = self.settings.evidence_weight * moment.beside.lasting
+            self._gathered = np.clip(self._gathered + counted, 0.0, _MOST_GATHERED)
         shares = self._belief.update(likelihoods)
         self._shaken = _SHAKEN if shares[EXTERNAL] > 0.5 else max(self._shaken - 1, 0)
         striking = _ratios(likelihoods)
+        said = moment.by_gyro + moment.by_forces
         striking[ENCODERS] -= np.maximum(said[ENCODERS], 0.0)  # which alone accuses no encoder
         self._recent.append(striking)
         group = max(_GROUPS, key=lambda group: float(shares[group].sum()))
@@ -222,40 +220,6 @@ class WindowJudge:
         is_accused = sure and CONTROLS.start <= best < METERS.start
         self._since_accused = 0 if is_accused else self._since_accused + 1
         return Opinion(named_of(shares), sure, wheel, state)
-
-    def _seen(self, frame: ResidualFrame, unseen: Unseen) -> Array:
-        """Log-likelihoods (19,) of the window, as far as the motion shows anything."""
-        likelihoods = self._network.log_likelihoods(self._window)
-        blind = [kind.start + wheel for wheel, _ in unseen.blind for kind in _OF_A_WHEEL]
-        if int(np.argmax(likelihoods)) in blind:
-            likelihoods[:] = 0.0
-        likelihoods[blind] = likelihoods[NORMAL]
-        for idle in unseen.wheels:  # what an idle wheel hides it cannot refute either
-            faults = [kind.start + idle for kind in _HIDDEN]
-            likelihoods[faults] = np.maximum(likelihoods[faults], likelihoods[NORMAL])
-        for moved in unseen.moved:  # no fault turns a wheel that stands: somebody pushes
-            kinds = _FIRM if unseen.driven else _HIDDEN
-            likelihoods[[kind.start + moved for kind in kinds]] = likelihoods[NORMAL]
-        if all(frame.residuals[channel].stale for channel in SPEEDS):
-            likelihoods[ENCODERS] = likelihoods[ENCODERS].max()  # whose it is does not show
-        meters = [METERS.start + number for number in astray(frame)]
-        # No power sensor makes a wheel turn otherwise.
-        likelihoods[meters] = np.minimum(likelihoods[meters], likelihoods[NORMAL])
-        if unseen.everything:  # a robot that stands says the same again and again
-            slight = likelihoods - likelihoods[NORMAL] < self.settings.striking
-            likelihoods[slight] = likelihoods[NORMAL]
-        for kind in _CREEPING:
-            over = likelihoods[kind] - likelihoods[NORMAL]
-            plain = np.sign(over) * np.maximum(np.abs(over) - _SLIGHT, 0.0)
-            likelihoods[kind] = likelihoods[NORMAL] + plain
-        return likelihoods
-
-    def _with_lasting(self, likelihoods: Array, lasting: Array) -> Array:
-        """With small faults that last: a window that does not show them says nothing against."""
-        counted = self.settings.evidence_weight * lasting
-        self._gathered = np.clip(self._gathered + counted, 0.0, _MOST_GATHERED)
-        unseen = (lasting > 0.0) & (likelihoods < likelihoods[NORMAL])
-        return np.where(unseen, likelihoods[NORMAL], likelihoods) + lasting
 
     def _accuse(self, group: list[int]) -> None:
         """Note what leads; a moment of normal in between does not make a fault a new one."""
@@ -303,27 +267,13 @@ class WindowJudge:
         return best
 
 
-def _with_outside(likelihoods: Array, beside: Beside) -> Array:
-    """With what acts on the body: a window is short beside the seconds that show it."""
-    found, outside = likelihoods.copy(), beside.outside
-    if outside.push or outside.load:  # all wheels feel it: none is accused
-        found[CONTROLS.start : METERS.stop] -= _SHARED
-    if outside.may_be_push:
-        found[LOADED] -= _SHARED
-        if beside.contacts.grips:
-            found[SLIP] -= _SHARED
-    if outside.load:
-        found[LOADED] = likelihoods.max() + _LOADED
-    return found
-
-
 def _ratios(likelihoods: Array) -> Array:
     """How much a window says for each state, over what a healthy robot explains of it.
 
     Of what a description that is off looks like, a push explains the rest.
     """
     ratios = likelihoods - likelihoods[NORMAL]
-    for kind in _CREEPING:
+    for kind in CREEPING:
         ratios[kind] -= max(likelihoods[EXTERNAL] - likelihoods[NORMAL], 0.0)
     ratios[SLIP] += _SLIP_MARGIN
     return np.asarray(ratios)

@@ -1,0 +1,282 @@
+"""What each rule of the classifier is worth: the same drives diagnosed without it.
+
+    .venv/bin/python bench/ablation.py --keep DIR [--practice ROBOT ...]
+        [--commissioned DIR ...] [--without-imu DIR ...] [--only NAME ...]
+
+ROBOT describes the robot of `faults_practice` (what `bench/faults_practice.py explain` or
+`commission` made); the other DIRs are those of bench/commissioned.py, whose robots drive faulty
+tours and healthy ones over ramps. Residuals are kept in DIR, and what contacts and the body show is
+found once for all rules that do not change it. Without names all rules of the window and of the
+states are left out, one after the other, and the parts of the classifier beside them. A row tells
+what is right without it: a rule that changes nothing on drives it was not chosen on is not needed.
+"""
+
+import argparse
+import json
+import pickle
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import cache, partial
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from attrs import frozen
+from commissioned import FAULTY, HEALTHY, IMU_TOPIC, commissioned_kind, seed_of, tour
+from diagnosis import in_paper, rebanded, score_faulty, score_healthy
+from diagnosis_report import Outcome, report
+from faults.play import changes_of
+from faults.recordings import Recordings
+from ramps import over_ramps
+from rich.console import Console
+from rich.table import Table
+from stages import frames_of, pipeline_of
+from tqdm import tqdm
+
+from tomr_fault_diag.classifier.contacts import Contacts
+from tomr_fault_diag.classifier.judges import WindowJudge
+from tomr_fault_diag.classifier.lasting import LastingWatch
+from tomr_fault_diag.classifier.misfit import MisfitWatch
+from tomr_fault_diag.classifier.motors import Motors
+from tomr_fault_diag.classifier.outside import Outside, OutsideWatch
+from tomr_fault_diag.classifier.rules import ALL_RULES, STATE_RULES, WINDOW_RULES
+from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.classifier.slides import SlideWatch
+from tomr_fault_diag.classifier.slope import SlopeFilter
+from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
+from tomr_fault_diag.classifier.states import NORMAL
+from tomr_fault_diag.classifier.window_network import WindowNetwork
+from tomr_fault_diag.residuals.frame import ResidualFrame
+from tomr_power_model.cli import EXIT_OK, run_main
+from tomr_power_model.dynamics.body import Body
+from tomr_power_model.robot import Robot, load_robot
+from tomr_training.simulated_drive import healthy_twin, simulated_drive
+
+ALL = "all rules"
+SLIDES, OUTSIDE, SLOPE = "particles", "what acts on the body", "slopes taken out"
+BORNE_OUT, LASTING = "encoders a gyro bears out", "the watch for small faults"
+PARTS = (SLIDES, OUTSIDE, SLOPE, BORNE_OUT, LASTING)
+_SUMMARY = re.compile(
+    r"SUMMARY drives right (\S+) \(extended (\S+)\), accuracy over time (\S+), "
+    r"delay (\S+) s median (\S+) s p95, missed (\S+), false alarms (\S+)/h"
+)
+
+
+@frozen
+class Seen:
+    """Residuals of a drive, and who diagnoses them."""
+
+    frames: Sequence[ResidualFrame]
+    settings: ClassifierSettings
+    robot: Robot
+
+
+class _Kept:
+    """What a watch found of each tick, found once."""
+
+    def __init__(self, watch: SlideWatch | OutsideWatch, frames: Iterable[ResidualFrame]) -> None:
+        self._found: Mapping[int, Contacts | Outside] = {
+            frame.stamp_ns: watch.take(frame) for frame in frames
+        }
+
+    def clear(self) -> None:
+        """Nothing to forget."""
+
+    def take(self, frame: ResidualFrame) -> Contacts | Outside:
+        """What was found."""
+        return self._found[frame.stamp_ns]
+
+
+@cache
+def _network(weights: str) -> WindowNetwork:
+    return WindowNetwork.load(weights)
+
+
+def diagnosed(seen: Seen, names: Sequence[str]) -> dict[str, list[Diagnosis]]:
+    """What is said without each rule or part of these names."""
+    robot, settings = seen.robot, seen.settings
+    slides = cast(SlideWatch, _Kept(SlideWatch(robot), seen.frames))
+    outside = cast(OutsideWatch, _Kept(OutsideWatch(robot), seen.frames))
+    found = {}
+    for name in names:
+        rules = ALL_RULES if name in (ALL, *PARTS) else ALL_RULES.without(name)
+        small = settings.small_faults and name != LASTING
+        classifier = FaultClassifier(
+            WindowJudge(_network(settings.weights), settings, rules),
+            slides=None if name == SLIDES else slides,
+            outside=None if name == OUTSIDE else outside,
+            slope=None if name == SLOPE else SlopeFilter(robot),
+            lasting=LastingWatch(robot) if small else None,
+            misfits=MisfitWatch(Motors(robot).idle.tolist()),
+            turning=None if name == BORNE_OUT else Body.of(robot).to_twist[2],
+        )
+        said = (classifier.classify(frame) for frame in seen.frames)
+        found[name] = [diagnosis for diagnosis in said if diagnosis is not None]
+    return found
+
+
+def _kept(file: Path, make: Callable[[], Any]) -> Any:
+    """What a file holds, made where it is not there yet."""
+    if not file.exists():
+        file.write_bytes(pickle.dumps(make()))
+    return pickle.loads(file.read_bytes())
+
+
+@frozen
+class Practice:
+    """A recording of `faults_practice` with a description of its robot."""
+
+    bag: Path
+    robot: Path
+
+    def __call__(self, names: Sequence[str], keep: Path) -> dict[str, Any]:
+        """Changes of the state as the score wants them."""
+        settings = pipeline_of(self.robot).settings
+        digest = sha256(self.robot.read_bytes()).hexdigest()[:12]
+        file = keep / f"practice_{digest}_{self.bag.name}.pickle"
+        frames = _kept(file, lambda: frames_of(self.bag, self.robot, settings))
+        found = diagnosed(Seen(frames, settings.classifier, load_robot(self.robot)), names)
+        return {name: changes_of(said) for name, said in found.items()}
+
+
+@frozen
+class Tour:
+    """A tour of a commissioned robot in MuJoCo."""
+
+    folder: Path  # of all robots
+    number: int
+    index: int
+    fault: str | None
+    without: tuple[str, ...] = ()
+
+    def __call__(self, names: Sequence[str], keep: Path) -> dict[str, Outcome]:
+        """How it is diagnosed."""
+        folder = self.folder / f"robot_{self.number}"
+        seed = seed_of(self.number, (FAULTY if self.fault else HEALTHY) + self.index)
+        chosen = tour(self.number, folder, seed, self.fault)
+        chosen = chosen if self.fault else over_ramps(chosen)
+        kind, robot = commissioned_kind(folder)
+        file = keep / f"{self.folder.name}_{self.number}_{seed}.pickle"
+        labelled = _kept(file, partial(simulated_drive, chosen, self.without))
+        seen = Seen(rebanded(labelled.frames, kind.bands), kind.settings, robot)
+        twin = None
+        if self.fault:
+            rows = labelled.first - 1 + np.arange(len(labelled.frames))
+            made = keep / f"{self.folder.name}_{self.number}_{seed}_twin.pickle"
+            twin = _kept(made, lambda: healthy_twin(chosen).of_ticks(rows))
+        outcomes = {}
+        for name, said in diagnosed(seen, names).items():
+            named = _codes(seen.frames, said)
+            outcomes[name] = (
+                score_healthy(labelled, named)
+                if twin is None
+                else score_faulty(chosen, labelled, twin, named)
+            )
+        return outcomes
+
+
+def _codes(frames: Sequence[ResidualFrame], said: Sequence[Diagnosis]) -> Any:
+    """State that stands at each tick (n,), as the paper calls it."""
+    changes = {diagnosis.stamp_ns: in_paper(diagnosis.state) for diagnosis in said}
+    state, named = NORMAL, []
+    for frame in frames:
+        state = changes.get(frame.stamp_ns, state)
+        named.append(state)
+    return np.array(named)
+
+
+def _do(drive: Practice | Tour, names: Sequence[str], keep: Path) -> dict[str, Any]:
+    return drive(names, keep)
+
+
+def _run(
+    title: str, drives: Sequence[Practice | Tour], names: Sequence[str], keep: Path
+) -> list[dict[str, Any]]:
+    with ProcessPoolExecutor() as pool:
+        found = pool.map(partial(_do, names=names, keep=keep), drives)
+        return list(tqdm(found, total=len(drives), desc=title, unit="drive", disable=None))
+
+
+def practice(robot: Path, names: Sequence[str], keep: Path) -> Table:
+    """The recordings of `faults_practice` without each of the names."""
+    recordings = Recordings.find()
+    drives = (*recordings.drives("drives"), *recordings.drives("healthy_long"))
+    found = _run(str(robot), [Practice(drive.bag, robot) for drive in drives], names, keep)
+    head = ("right", "other", "of the time", "delay", "95 %", "missed", "false/h")
+    table = Table("without", *head, title=str(robot))
+    for name in names:
+        out = keep / "scored"
+        folder = out / recordings.robot
+        folder.mkdir(parents=True, exist_ok=True)
+        for drive, said in zip(drives, found, strict=True):
+            text = json.dumps(said[name]) + "\n"
+            (folder / f"{drive.identity}.json").write_text(text, encoding="utf-8")
+        command = [sys.executable, *map(str, (recordings.scorer, out, recordings.truth))]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        summary = _SUMMARY.search(done.stdout)
+        table.add_row(name, *(summary.groups() if summary else ("?",) * len(head)))
+    return table
+
+
+def tours(
+    folder: Path,
+    counts: tuple[int, int],
+    without: tuple[str, ...],
+    names: Sequence[str],
+    keep: Path,
+) -> Table:
+    """Commissioned robots without each of the names; `counts` of faulty and healthy tours each."""
+    numbers = sorted(int(path.name.removeprefix("robot_")) for path in folder.glob("robot_*"))
+
+    def several(fault: str | None, count: int) -> list[Tour]:
+        return [
+            Tour(folder, number, index, fault, without)
+            for number in numbers
+            for index in range(count)
+        ]
+
+    sick = _run(f"{folder}, faulty", several("fault", counts[0]), names, keep)
+    well = _run(f"{folder}, over ramps", several(None, counts[1]), names, keep)
+    title = f"{folder}, robots {', '.join(map(str, numbers))}"
+    table = Table("without", "right", "delay", "95 %", "never", "false", "h", title=title)
+    for name in names:
+        found: Any = report([item[name] for item in sick], [item[name] for item in well])
+        delay, alarms = found["delay_s"]["all"], found["false_alarms"]
+        never = f"{delay['never_named']} of {delay['onsets']}"
+        right = f"{found['observable_faults']['right']:.2%}"
+        cells = (right, delay["median"], delay["p95"], never, alarms["count"], alarms["hours"])
+        table.add_row(name, *map(str, cells))
+    return table
+
+
+def _main(arguments: Sequence[str] | None) -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    known = [ALL, *WINDOW_RULES, *STATE_RULES, *PARTS]
+    several: dict[str, Any] = {"type": Path, "nargs": "+", "default": [], "metavar": "DIR"}
+    parser.add_argument("--keep", type=Path, required=True, metavar="DIR", help="residuals")
+    parser.add_argument("--practice", **{**several, "metavar": "ROBOT"}, help="descriptions")
+    parser.add_argument("--commissioned", **several, help="robots with an IMU")
+    parser.add_argument("--without-imu", **several, help="robots that have none")
+    parser.add_argument("--only", nargs="+", default=known, choices=known, metavar="NAME")
+    parser.add_argument("--faulty", type=int, default=24, help="tours of each robot (default 24)")
+    parser.add_argument("--healthy", type=int, default=60, help="tours of each robot (default 60)")
+    options = parser.parse_args(arguments)
+    options.keep.mkdir(parents=True, exist_ok=True)
+    console, counts = Console(width=110), (options.faulty, options.healthy)
+    for robot in options.practice:
+        console.print(practice(robot, options.only, options.keep))
+    for folder in options.commissioned:
+        console.print(tours(folder, counts, (), options.only, options.keep))
+    for folder in options.without_imu:
+        console.print(tours(folder, counts, (IMU_TOPIC,), options.only, options.keep))
+    return EXIT_OK
+
+
+if __name__ == "__main__":
+    sys.exit(run_main(_main))
