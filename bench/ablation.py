@@ -29,6 +29,7 @@ from attrs import frozen
 from commissioned import FAULTY, HEALTHY, IMU_TOPIC, commissioned_kind, seed_of, tour
 from diagnosis import in_paper, rebanded, score_faulty, score_healthy
 from diagnosis_report import Outcome, report
+from extended import KINDS, Fleet, scenario_of, seeds_of, targets, tracked
 from faults.play import changes_of
 from faults.recordings import Recordings
 from ramps import over_ramps
@@ -50,12 +51,14 @@ from tomr_fault_diag.classifier.slope import SlopeFilter
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import NORMAL
 from tomr_fault_diag.classifier.window_network import WindowNetwork
+from tomr_fault_diag.diagnosis.score import Seen as ExtendedSeen
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.dynamics.body import Body
 from tomr_power_model.robot import Robot, load_robot
 from tomr_training.simulated_drive import healthy_twin, simulated_drive
 
+_FIRST_OTHER = 5_400_000  # seed
 ALL = "all rules"
 SLIDES, OUTSIDE, SLOPE = "particles", "what acts on the body", "slopes taken out"
 BORNE_OUT, LASTING = "encoders a gyro bears out", "the watch for small faults"
@@ -179,6 +182,37 @@ class Tour:
         return outcomes
 
 
+@frozen
+class Other:
+    """A drive of bench/extended.py: a fault beyond the six, or pushes where it has no name."""
+
+    fleet: Fleet
+    place: str  # of the fleet
+    seed: int
+    name: str
+
+    def __call__(self, names: Sequence[str], keep: Path) -> dict[str, ExtendedSeen | None]:
+        """What was said of it; None where its fault never shows."""
+        file = keep / f"{self.place}_{self.seed}_other.pickle"
+        case = _kept(file, partial(scenario_of, self.fleet, self.seed, self.name))
+        if case is None:
+            return dict.fromkeys(names)
+        kind, robot = self.fleet.kind(self.seed), case.drive.believed
+        frames = rebanded(case.labelled.frames, kind.bands)
+        found = {}
+        for name, said in diagnosed(Seen(frames, kind.settings, robot), names).items():
+            by_stamp = {diagnosis.stamp_ns: diagnosis for diagnosis in said}
+            found[name] = case.seen(tracked(frames, partial(_at, by_stamp)))
+        return found
+
+
+Work = Practice | Tour | Other
+
+
+def _at(said: Mapping[int, Diagnosis], frame: ResidualFrame) -> Diagnosis | None:
+    return said.get(frame.stamp_ns)
+
+
 def _codes(frames: Sequence[ResidualFrame], said: Sequence[Diagnosis]) -> Any:
     """State that stands at each tick (n,), as the paper calls it."""
     changes = {diagnosis.stamp_ns: in_paper(diagnosis.state) for diagnosis in said}
@@ -189,16 +223,20 @@ def _codes(frames: Sequence[ResidualFrame], said: Sequence[Diagnosis]) -> Any:
     return np.array(named)
 
 
-def _do(drive: Practice | Tour, names: Sequence[str], keep: Path) -> dict[str, Any]:
+def _do(drive: Work, names: Sequence[str], keep: Path) -> dict[str, Any]:
     return drive(names, keep)
 
 
 def _run(
-    title: str, drives: Sequence[Practice | Tour], names: Sequence[str], keep: Path
+    title: str, drives: Sequence[Work], names: Sequence[str], keep: Path
 ) -> list[dict[str, Any]]:
     with ProcessPoolExecutor() as pool:
         found = pool.map(partial(_do, names=names, keep=keep), drives)
         return list(tqdm(found, total=len(drives), desc=title, unit="drive", disable=None))
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{share:.0%}"
 
 
 def practice(robot: Path, names: Sequence[str], keep: Path) -> Table:
@@ -253,6 +291,40 @@ def tours(
     return table
 
 
+def others(
+    folder: Path,
+    counts: tuple[int, int],
+    without: tuple[str, ...],
+    names: Sequence[str],
+    keep: Path,
+) -> Table:
+    """The same of faults beyond the six; `counts` of drives of each kind, and of pushed ones."""
+    fleet = Fleet.of(folder, without)
+    drives = [
+        Other(fleet, folder.name, seed, name)
+        for seed, name in seeds_of(_FIRST_OTHER, *counts, list(KINDS))
+    ]
+    found = _run(f"{folder}, others", drives, names, keep)
+    head = ("known kinds", "wrong", "unknown kinds", "wrong", "alarms, pushed")
+    table = Table("without", *head, title=str(folder))
+    for name in names:
+        shown = [item[name] for item in found if item[name] is not None]
+        groups: Any = targets(shown)
+        cells = [
+            _percent(groups[group][key]["share"])
+            for group, key in (
+                ("extended states", "right"),
+                ("extended states", "a wrong fault"),
+                ("unknown kinds", "unknown or a fault"),
+                ("unknown kinds", "a wrong fault"),
+            )
+        ]
+        pushed = [item for drive, item in zip(drives, found, strict=True) if not drive.name]
+        alarms = sum(len(item[name].alarms) for item in pushed)
+        table.add_row(name, *cells, str(alarms))
+    return table
+
+
 def _main(arguments: Sequence[str] | None) -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -266,15 +338,22 @@ def _main(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--only", nargs="+", default=known, choices=known, metavar="NAME")
     parser.add_argument("--faulty", type=int, default=24, help="tours of each robot (default 24)")
     parser.add_argument("--healthy", type=int, default=60, help="tours of each robot (default 60)")
+    parser.add_argument("--others", type=int, default=0, help="of each kind of others (default 0)")
+    parser.add_argument("--pushed", type=int, default=0, help="healthy and pushed (default 0)")
     options = parser.parse_args(arguments)
     options.keep.mkdir(parents=True, exist_ok=True)
-    console, counts = Console(width=110), (options.faulty, options.healthy)
+    console = Console(width=110)
     for robot in options.practice:
         console.print(practice(robot, options.only, options.keep))
-    for folder in options.commissioned:
-        console.print(tours(folder, counts, (), options.only, options.keep))
-    for folder in options.without_imu:
-        console.print(tours(folder, counts, (IMU_TOPIC,), options.only, options.keep))
+    both = [*options.commissioned, *options.without_imu]
+    for folder in both:
+        without = () if folder in options.commissioned else (IMU_TOPIC,)
+        if options.faulty or options.healthy:
+            counts = (options.faulty, options.healthy)
+            console.print(tours(folder, counts, without, options.only, options.keep))
+        if options.others or options.pushed:
+            counts = (options.others, options.pushed)
+            console.print(others(folder, counts, without, options.only, options.keep))
     return EXIT_OK
 
 

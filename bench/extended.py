@@ -36,7 +36,7 @@ from diagnosis_report import publish
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.settings import ClassifierSettings
-from tomr_fault_diag.classifier.stage import FaultClassifier
+from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.diagnosis.labels import Label, simulated
 from tomr_fault_diag.diagnosis.score import (
     MISSED,
@@ -48,6 +48,7 @@ from tomr_fault_diag.diagnosis.score import (
     with_interval,
 )
 from tomr_fault_diag.diagnosis.track import Track, Tracker
+from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.cli import run_main
 from tomr_power_model.errors import InputError
@@ -227,11 +228,26 @@ def pushed_drive(drive: Drive) -> Drive:
     return evolve(drive, mission=evolve(drive.mission, faults=tuple(pushes)))
 
 
-def said_of(kind: Diagnosed, drive: Drive, labelled: LabelledDrive) -> Track:
-    """What a classifier says of each tick."""
-    classifier, tracker = FaultClassifier.of(kind.settings, drive.believed), Tracker(False)
-    for frame in rebanded(labelled.frames, kind.bands):
-        diagnosis = classifier.classify(frame)
+@frozen
+class Scenario:
+    """A drive as it was simulated, and what is wrong in it."""
+
+    drive: Drive
+    labelled: LabelledDrive
+    labels: tuple[Label, ...] = ()
+
+    def seen(self, track: Track) -> Seen:
+        """What was said of it against its labels."""
+        return seen(track, START_NS, self.labels, (0, 1))
+
+
+def tracked(
+    frames: Sequence[ResidualFrame], classify: Callable[[ResidualFrame], Diagnosis | None]
+) -> Track:
+    """What is said of each tick."""
+    tracker = Tracker(False)
+    for frame in frames:
+        diagnosis = classify(frame)
         if diagnosis is not None:
             tracker.diagnosis(diagnosis, math.nan)
         tracker.frame(frame)
@@ -262,8 +278,8 @@ def spans(flags: Flags, first: int) -> tuple[tuple[float, float], ...]:
     )
 
 
-def score_fault(fleet: Fleet, seed: int, name: str) -> Seen | None:
-    """A faulty drive against its label; None where the fault never shows."""
+def faulty(fleet: Fleet, seed: int, name: str) -> Scenario | None:
+    """A faulty drive and its label; None where the fault never shows."""
     drive, size = faulty_drive(fleet.drive(seed), name)
     labelled = simulated_drive(drive, fleet.without)
     twin = healthy_twin(drive).of_ticks(labelled.first - 1 + np.arange(len(labelled.frames)))
@@ -273,7 +289,7 @@ def score_fault(fleet: Fleet, seed: int, name: str) -> Seen | None:
     label = _label(drive, name, size)
     # The onset is when it first shows: what comes before, nobody could detect.
     label = evolve(label, onset=observable[0][0] - 4 * _PERIOD, observable=observable)
-    return seen(said_of(fleet.kind(seed), drive, labelled), START_NS, [label], (0, 1))
+    return Scenario(drive, labelled, (label,))
 
 
 def _label(drive: Drive, name: str, size: float) -> Label:
@@ -286,16 +302,34 @@ def _label(drive: Drive, name: str, size: float) -> Label:
     return evolve(label, accept=(*label.accept, *others, *(["unknown"] if more else [])))
 
 
-def score_healthy(fleet: Fleet, seed: int) -> Seen:
+def pushed(fleet: Fleet, seed: int) -> Scenario:
     """A healthy drive with pushes: whatever is named is an alarm."""
     drive = pushed_drive(fleet.drive(seed))
-    labelled = simulated_drive(drive, fleet.without)
-    return seen(said_of(fleet.kind(seed), drive, labelled), START_NS, [], (0, 1))
+    return Scenario(drive, simulated_drive(drive, fleet.without))
 
 
-def _work(task: tuple[Fleet, int, str]) -> Seen | None:
+def scenario_of(fleet: Fleet, seed: int, name: str) -> Scenario | None:
+    """Of a kind of fault, or healthy and pushed where there is no name."""
+    return faulty(fleet, seed, name) if name else pushed(fleet, seed)
+
+
+def seeds_of(first: int, drives: int, healthy: int, kinds: Sequence[str]) -> list[tuple[int, str]]:
+    """Seeds and kinds of so many drives of each, and of healthy ones."""
+    places = {name: number for number, name in enumerate(KINDS)}
+    faulty = [(first + 1000 * places[name] + k, name) for name in kinds for k in range(drives)]
+    return [*faulty, *((first + _HEALTHY + k, "") for k in range(healthy))]
+
+
+def scored(task: tuple[Fleet, int, str]) -> Seen | None:
+    """One drive; None where its fault never shows."""
     fleet, seed, name = task
-    return score_fault(fleet, seed, name) if name else score_healthy(fleet, seed)
+    case = scenario_of(fleet, seed, name)
+    if case is None:
+        return None
+    kind = fleet.kind(seed)
+    classifier = FaultClassifier.of(kind.settings, case.drive.believed)
+    frames = rebanded(case.labelled.frames, kind.bands)
+    return case.seen(tracked(frames, classifier.classify))
 
 
 def targets(found: Sequence[Seen]) -> dict[str, object]:
@@ -333,22 +367,17 @@ def _main(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--json", type=Path, help="write the report to this file as well")
     options = parser.parse_args(arguments)
     fleet = Fleet.of(options.commissioned, (IMU_TOPIC,) if options.without_imu else ())
-    places = {name: number for number, name in enumerate(KINDS)}
-    tasks = [
-        (fleet, options.first_seed + 1000 * places[name] + drive, name)
-        for name in options.kinds
-        for drive in range(options.drives)
-    ]
     healthy = round(options.healthy_hours * 3600.0 / _DRIVE_SECONDS)
-    tasks += [(fleet, options.first_seed + _HEALTHY + drive, "") for drive in range(healthy)]
+    seeds = seeds_of(options.first_seed, options.drives, healthy, options.kinds)
+    tasks = [(fleet, seed, name) for seed, name in seeds]
     with ProcessPoolExecutor(options.jobs) as pool:
-        played = pool.map(_work, tasks)
+        played = pool.map(scored, tasks)
         found = list(tqdm(played, total=len(tasks), unit="drive", disable=None))
-    scored = [item for item in found if item is not None]
+    shown = [item for item in found if item is not None]
     report = {
-        "never_showed": len(found) - len(scored),
-        "targets": targets(scored),
-        **Scores(tuple(scored)).as_dict(),
+        "never_showed": len(found) - len(shown),
+        "targets": targets(shown),
+        **Scores(tuple(shown)).as_dict(),
     }
     publish(report, options.json)
     return 0

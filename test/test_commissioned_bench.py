@@ -72,9 +72,9 @@ def test_other_faults_are_simulated_alike(
     robots = Fleet.of(None, without)
     with patch("extended.simulated_drive", side_effect=Simulated) as simulate:
         with pytest.raises(Simulated):
-            extended.score_healthy(robots, 4_000_000)
+            extended.pushed(robots, 4_000_000)
         with pytest.raises(Simulated):
-            extended.score_fault(robots, 4_000_000, "windy")
+            extended.faulty(robots, 4_000_000, "windy")
     assert [call.args[1] for call in simulate.call_args_list] == [without] * 2
 
 

@@ -12,7 +12,7 @@ sys.path.append(str(Path(__file__).resolve().parent.parent / "bench"))
 
 from commissioned import made
 from diagnosis import Kind as Diagnosed
-from extended import KINDS, Fleet, faulty_drive, pushed_drive, said_of, spans, targets
+from extended import KINDS, Fleet, Scenario, faulty_drive, pushed_drive, scored, spans, targets
 
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.diagnosis.score import Case, Seen
@@ -76,9 +76,12 @@ def test_residuals_are_judged_in_the_bands_of_the_robot() -> None:
     power, speed = Residual(0.0, 2.0, 4.0), Residual(0.0, 0.2, 5.0, "rad/s")
     frame = ResidualFrame(START_NS, (*[power] * 4, *[speed] * 3, *[power] * 3))
     seen = Mock(side_effect=lambda frame: None)
-    labelled = Mock(frames=(frame,))
-    with patch("extended.FaultClassifier.of", return_value=Mock(classify=seen)):
-        said_of(Diagnosed(ClassifierSettings(), BandSettings(power=9.0)), Mock(), labelled)
+    fleet = Mock(kind=lambda seed: Diagnosed(ClassifierSettings(), BandSettings(power=9.0)))
+    with (
+        patch("extended.FaultClassifier.of", return_value=Mock(classify=seen)),
+        patch("extended.scenario_of", return_value=Scenario(Mock(), Mock(frames=(frame,)))),
+    ):
+        scored((fleet, 1, ""))
     ((judged,),) = (call.args for call in seen.call_args_list)
     assert [item.band for item in judged.residuals[:4]] == [9.0] * 4
 
