@@ -54,15 +54,14 @@ from tomr_fault_diag.classifier.window_network import WindowNetwork
 from tomr_fault_diag.diagnosis.score import Seen as ExtendedSeen
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_power_model.cli import EXIT_OK, run_main
-from tomr_power_model.dynamics.body import Body
 from tomr_power_model.robot import Robot, load_robot
 from tomr_training.simulated_drive import healthy_twin, simulated_drive
 
 _FIRST_OTHER = 5_400_000  # seed
 ALL = "all rules"
 SLIDES, OUTSIDE, SLOPE = "particles", "what acts on the body", "slopes taken out"
-BORNE_OUT, LASTING = "encoders a gyro bears out", "the watch for small faults"
-PARTS = (SLIDES, OUTSIDE, SLOPE, BORNE_OUT, LASTING)
+LASTING = "the watch for small faults"
+PARTS = (SLIDES, OUTSIDE, SLOPE, LASTING)
 _SUMMARY = re.compile(
     r"SUMMARY drives right (\S+) \(extended (\S+)\), accuracy over time (\S+), "
     r"delay (\S+) s median (\S+) s p95, missed (\S+), false alarms (\S+)/h"
@@ -115,7 +114,6 @@ def diagnosed(seen: Seen, names: Sequence[str]) -> dict[str, list[Diagnosis]]:
             slope=None if name == SLOPE else SlopeFilter(robot),
             lasting=LastingWatch(robot) if small else None,
             misfits=MisfitWatch(Motors(robot).idle.tolist()),
-            turning=None if name == BORNE_OUT else Body.of(robot).to_twist[2],
         )
         said = (classifier.classify(frame) for frame in seen.frames)
         found[name] = [diagnosis for diagnosis in said if diagnosis is not None]
@@ -197,7 +195,7 @@ class Other:
         case = _kept(file, partial(scenario_of, self.fleet, self.seed, self.name))
         if case is None:
             return dict.fromkeys(names)
-        kind, robot = self.fleet.kind(self.seed), case.drive.believed
+        kind, robot = self.fleet.kind(self.seed), self.fleet.drive(self.seed).believed
         frames = rebanded(case.labelled.frames, kind.bands)
         found = {}
         for name, said in diagnosed(Seen(frames, kind.settings, robot), names).items():

@@ -232,7 +232,6 @@ def pushed_drive(drive: Drive) -> Drive:
 class Scenario:
     """A drive as it was simulated, and what is wrong in it."""
 
-    drive: Drive
     labelled: LabelledDrive
     labels: tuple[Label, ...] = ()
 
@@ -289,7 +288,7 @@ def faulty(fleet: Fleet, seed: int, name: str) -> Scenario | None:
     label = _label(drive, name, size)
     # The onset is when it first shows: what comes before, nobody could detect.
     label = evolve(label, onset=observable[0][0] - 4 * _PERIOD, observable=observable)
-    return Scenario(drive, labelled, (label,))
+    return Scenario(labelled, (label,))
 
 
 def _label(drive: Drive, name: str, size: float) -> Label:
@@ -305,7 +304,7 @@ def _label(drive: Drive, name: str, size: float) -> Label:
 def pushed(fleet: Fleet, seed: int) -> Scenario:
     """A healthy drive with pushes: whatever is named is an alarm."""
     drive = pushed_drive(fleet.drive(seed))
-    return Scenario(drive, simulated_drive(drive, fleet.without))
+    return Scenario(simulated_drive(drive, fleet.without))
 
 
 def scenario_of(fleet: Fleet, seed: int, name: str) -> Scenario | None:
@@ -327,7 +326,7 @@ def scored(task: tuple[Fleet, int, str]) -> Seen | None:
     if case is None:
         return None
     kind = fleet.kind(seed)
-    classifier = FaultClassifier.of(kind.settings, case.drive.believed)
+    classifier = FaultClassifier.of(kind.settings, fleet.drive(seed).believed)
     frames = rebanded(case.labelled.frames, kind.bands)
     return case.seen(tracked(frames, classifier.classify))
 

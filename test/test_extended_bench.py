@@ -79,7 +79,7 @@ def test_residuals_are_judged_in_the_bands_of_the_robot() -> None:
     fleet = Mock(kind=lambda seed: Diagnosed(ClassifierSettings(), BandSettings(power=9.0)))
     with (
         patch("extended.FaultClassifier.of", return_value=Mock(classify=seen)),
-        patch("extended.scenario_of", return_value=Scenario(Mock(), Mock(frames=(frame,)))),
+        patch("extended.scenario_of", return_value=Scenario(Mock(frames=(frame,)))),
     ):
         scored((fleet, 1, ""))
     ((judged,),) = (call.args for call in seen.call_args_list)

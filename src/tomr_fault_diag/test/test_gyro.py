@@ -2,20 +2,18 @@
 
 import math
 from collections.abc import Callable
-from typing import cast
 
 import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_fault_diag.classifier.belief import ENCODERS, HYPOTHESES, OTHER
-from tomr_fault_diag.classifier.evidence import Beside, borne_out, said_by_gyro
+from tomr_fault_diag.classifier.belief import ENCODERS, OTHER
+from tomr_fault_diag.classifier.evidence import said_by_gyro
 from tomr_fault_diag.classifier.judges import WindowJudge, make_judge
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
-from tomr_fault_diag.classifier.states import MOTOR, NORMAL, SLIP, STATES, State
-from tomr_fault_diag.classifier.window_network import WindowNetwork
+from tomr_fault_diag.classifier.states import SLIP
 from tomr_fault_diag.residuals.frame import (
     NO_IMU,
     NOT_BELIEVED,
@@ -247,57 +245,3 @@ def test_a_body_that_turns_otherwise_than_its_wheels_say_slips() -> None:
 @pytest.mark.parametrize("yaw", [0.0, 0.19, math.nan])
 def test_within_the_band_or_without_a_gyro_nothing_is_said(yaw: float) -> None:
     assert named(yaw) == ["normal"]
-
-
-@pytest.mark.parametrize(
-    ("turning", "yaw", "off", "wheels"),
-    [
-        # Of 3, 4 and 5 rad/s a fifth lost is 0.75, 1 and 1.25 rad/s more; 0.3 rad/s is plain.
-        (0.5, 0.0, 0.0, (0, 1, 2)),
-        (-0.5, 0.19, 0.0, (0, 1, 2)),
-        (0.31, 0.0, 0.0, (1, 2)),
-        (0.23, 0.0, 0.0, ()),
-        (0.5, 0.21, 0.0, ()),
-        (0.5, math.nan, 0.0, ()),
-        (0.5, 0.0, 0.21, (1, 2)),
-    ],
-)
-def test_encoders_that_a_gyro_bears_out_by_hand(
-    turning: float, yaw: float, off: float, wheels: tuple[int, ...]
-) -> None:
-    frame = healthy_frame(yaw, off)
-    assert borne_out(frame, np.full(3, turning)) == wheels
-    said = said_by_gyro(frame, wheels)[ENCODERS]
-    assert [number for number in range(3) if said[number] < 0.0] == list(wheels)
-
-
-class Lost:
-    """A network to which the encoder of wheel 1 is lost."""
-
-    def log_likelihoods(self, window: np.ndarray) -> np.ndarray:
-        found = np.full(HYPOTHESES, -20.0)
-        found[ENCODERS.start], found[NORMAL] = 0.0, -2.0
-        return found
-
-
-@pytest.mark.parametrize(("yaw", "state"), [(0.0, STATES[NORMAL]), (math.nan, STATES[MOTOR])])
-def test_an_encoder_is_not_lost_where_the_body_turns_as_it_shows(yaw: float, state: State) -> None:
-    judge = WindowJudge(cast(WindowNetwork, Lost()), ClassifierSettings(striking=1.0))
-    classifier = FaultClassifier.around(judge, ROBOT)
-    for tick in range(400):
-        fast = healthy_frame(yaw)
-        fast = evolve(fast, yaw=evolve(fast.yaw, band=0.1))
-        speeds = [evolve(fast.residuals[channel], modelled=9.0) for channel in SPEEDS]
-        residuals = [*fast.residuals]
-        residuals[SPEEDS.start : SPEEDS.stop] = speeds
-        now = BASE + 50 * tick * MS
-        classifier.classify(evolve(fast, residuals=tuple(residuals), stamp_ns=now))
-    assert classifier._state is state
-
-
-def test_what_a_gyro_clears_is_not_striking_for_it() -> None:
-    judge = WindowJudge(cast(WindowNetwork, Lost()), ClassifierSettings())
-    for tick in range(60):
-        frame = evolve(healthy_frame(0.0), stamp_ns=BASE + 50 * tick * MS)
-        judge.judge(frame, 50 * MS, Unseen(), Beside(borne_out=(0,)))
-    assert judge._recent[-1][ENCODERS.start] < 0.0

@@ -15,16 +15,13 @@ from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.misfit import is_far
 from tomr_fault_diag.classifier.outside import NOTHING_ACTS, Outside
 from tomr_fault_diag.classifier.states import SLIP
-from tomr_fault_diag.residuals.frame import SPEEDS, ResidualFrame, measured_speed
+from tomr_fault_diag.residuals.frame import SPEEDS, ResidualFrame
 
 Array = NDArray[np.float64]
 
 _PER_BAND = 8.0  # that a gyro says for slip, for each band beyond the first
 _PER_ODDS = 3.0  # times the log odds of a slide, that forces say for it
 _MOST = 10.0  # that either says in a tick
-_AGAINST = -3.0  # that a gyro says of an encoder that counts all
-_LEAST_LOST = 0.2  # of an encoder's counts, of one that is lost
-_PLAINLY = 1.5  # bands of the yaw rate, by which that would show
 _LEAST_DOUBT = 1e-6  # of a slide
 _MISCOUNTS = 0.7  # of what forces say for slip: for an encoder that loses counts
 _CERTAIN = 24.0  # against all that leaves a wheel turning
@@ -36,7 +33,6 @@ class Beside:
 
     contacts: Contacts = NOTHING
     outside: Outside = NOTHING_ACTS
-    borne_out: tuple[int, ...] = ()  # wheels 0..2 whose encoders a gyro bears out
     lasting: Array = field(factory=lambda: np.zeros(HYPOTHESES))  # by small faults that last
 
 
@@ -48,30 +44,14 @@ def astray(frame: ResidualFrame) -> list[int]:
     return [wheel for wheel, index in enumerate(SPEEDS) if is_far(frame.residuals[index])]
 
 
-def borne_out(frame: ResidualFrame, turning: Array) -> tuple[int, ...]:
-    """Wheels whose encoders a gyro bears out: had one lost a fifth of its counts, its driver would
-    turn it as much faster, and it the body. `turning`: yaw rate per wheel speed, (3,)."""
-    yaw = frame.yaw
-    if not abs(yaw.residual) < yaw.band:  # nor where it is NaN
-        return ()
-    more = _LEAST_LOST / (1.0 - _LEAST_LOST) * np.abs(turning) / yaw.band
-    return tuple(
-        wheel
-        for wheel, speed in enumerate(frame.residuals[channel] for channel in SPEEDS)
-        if abs(speed.residual) < speed.band and abs(measured_speed(speed)) * more[wheel] > _PLAINLY
-    )
-
-
-def said_by_gyro(frame: ResidualFrame, cleared: tuple[int, ...] = ()) -> Array:
+def said_by_gyro(frame: ResidualFrame) -> Array:
     """Of the body's yaw rate; 0 within the band, and without a gyro.
 
     Slip makes it another one, and need not; so does an encoder that shows too little, by turning
     the body on as its wheel does. Where an encoder shows what it should not the others are not in
-    doubt: a wheel that is slow in truth turns the body as it shows. `cleared`: wheels whose
-    encoders it bears out.
+    doubt: a wheel that is slow in truth turns the body as it shows.
     """
     said, yaw = np.zeros(HYPOTHESES), frame.yaw
-    said[[ENCODERS.start + wheel for wheel in cleared]] = _AGAINST
     beyond = abs(yaw.residual) / yaw.band - 1.0
     if not beyond > 0.0:  # nor where it is NaN
         return said

@@ -170,7 +170,7 @@ class WindowJudge:
             beside,
             commissioned=bool(self.settings.commissioned),
             striking=self.settings.striking,
-            by_gyro=said_by_gyro(frame, beside.borne_out),
+            by_gyro=said_by_gyro(frame),
             by_forces=said_by_forces(frame, beside.contacts),
         )
         for _ in range(count):

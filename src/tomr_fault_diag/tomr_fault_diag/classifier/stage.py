@@ -2,12 +2,10 @@
 
 from typing import Self
 
-import numpy as np
 from attrs import evolve, field, frozen
-from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.contacts import NOTHING
-from tomr_fault_diag.classifier.evidence import Beside, borne_out
+from tomr_fault_diag.classifier.evidence import Beside
 from tomr_fault_diag.classifier.judges import Judge, Opinion, make_judge
 from tomr_fault_diag.classifier.lasting import LastingWatch
 from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
@@ -36,10 +34,7 @@ from tomr_fault_diag.classifier.states import (
 )
 from tomr_fault_diag.classifier.sufficiency import Sufficiency, SufficiencyWatch
 from tomr_fault_diag.residuals.frame import GAP, MOTORS, NO_COMMAND, ResidualFrame
-from tomr_power_model.dynamics.body import Body
 from tomr_power_model.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @frozen
@@ -86,14 +81,12 @@ class FaultClassifier:
         slope: SlopeFilter | None = None,
         lasting: LastingWatch | None = None,
         misfits: MisfitWatch | None = None,
-        turning: Array | None = None,
     ) -> None:
         """Without `severity` it is not stated how bad a fault is, nor what has changed slowly;
         without `slides` residuals alone show a slip, without `outside` a load; without `slope` what
         an accelerometer feels of one stays in the residuals; without `lasting`
         small faults are not looked for; without `misfits` it is not known what a motor draws that
-        is not driven; without `turning`, the yaw rate per wheel speed (3,), a gyro bears no
-        encoder out."""
+        is not driven."""
         self._judge = judge
         self._lasting = lasting
         self._severity = severity
@@ -102,7 +95,6 @@ class FaultClassifier:
         self._slope = slope
         self._motion = MotionWatch()
         self._misfits = misfits or MisfitWatch()
-        self._turning = turning
         self._data = SufficiencyWatch()
         self.clear()
 
@@ -122,7 +114,6 @@ class FaultClassifier:
             slope=SlopeFilter(robot),
             lasting=LastingWatch(robot) if judge.settings.small_faults else None,
             misfits=MisfitWatch(Motors(robot).idle.tolist()),
-            turning=Body.of(robot).to_twist[2],
         )
 
     @property
@@ -242,8 +233,7 @@ class FaultClassifier:
             self._enter(DISOBEYS, frame.stamp_ns, None)
             return
         is_well = self._state is STATES[NORMAL]
-        cleared = () if self._turning is None else borne_out(frame, self._turning)
-        beside = Beside(contacts, outside, cleared)
+        beside = Beside(contacts, outside)
         if self._lasting is not None:
             beside = evolve(beside, lasting=self._lasting.take(raw, is_well))
         self._opinion = self._judge.judge(frame, elapsed, self._unseen, beside)
