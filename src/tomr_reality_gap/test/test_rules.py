@@ -32,6 +32,11 @@ def test_an_interval_holds_noise_simulator_and_what_the_simulation_shows() -> No
     assert found.value - found.low == pytest.approx(1.96 * 0.5)
 
 
+def test_what_is_not_named_may_move_a_value_by_so_much() -> None:
+    found = estimate_of(0.5, 0.3, offset=0.0, shift=1.96 * 0.4)
+    assert found.high - found.value == pytest.approx(1.96 * 0.5)
+
+
 def test_an_interval_ends_at_the_bounds_and_an_angle_turns() -> None:
     found = estimate_of(0.1, 1.0, offset=0.1, bounds=(0.0, 1.5))
     assert (found.low, found.high) == (0.0, 1.5)

@@ -18,6 +18,7 @@ from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection, finding_cost
 from tomr_reality_gap.fit.jacobian import Jacobian, linearise
 from tomr_reality_gap.fit.simulator_baseline import Offsets, SimulatorBaseline
+from tomr_reality_gap.fit.structure import additions_of, structural_shifts
 from tomr_reality_gap.fit.uncertainty import own_sigma
 from tomr_reality_gap.fit.unmodelled import Unmodelled
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
@@ -62,6 +63,13 @@ class AnalysisResult:
     def own_sigma(self) -> Array:
         """Standard deviations of the parameters of the best model's hypotheses, in their units."""
         return own_sigma(self.dataset, self.found, self.jacobian)
+
+    @cached_property
+    def structural_shifts(self) -> Array:
+        """How far these may be off for what shows and has no name, in their units."""
+        offsets = np.array(self.found.best.model.own_offsets)
+        added = additions_of(self.dataset, self.found, self.jacobian, self.candidates)
+        return structural_shifts(tuple(added), offsets)
 
     @cached_property
     def runs(self) -> tuple[Run, ...]:

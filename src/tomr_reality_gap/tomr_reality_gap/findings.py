@@ -100,13 +100,15 @@ class Findings:
         model = self.analysis.found.best.model
         hypothesis, offsets = model.hypotheses[number], model.offsets[number]
         first = sum(len(item.parameters) for item in model.hypotheses[:number])
-        sigma = self.analysis.own_sigma[first : first + len(offsets)].tolist()
+        own = slice(first, first + len(offsets))
+        sigma = self.analysis.own_sigma[own].tolist()
+        shifts = self.analysis.structural_shifts[own].tolist()
         shared = self.analysis.shared[number] if self.analysis.shared else (0.0,) * len(offsets)
         nuisances = zip(model.nuisances, model.nuisance_offsets, strict=True)
         nuisance = {parameter.keys[0]: offset for parameter, offset in nuisances}
         found = {}
-        for item, whole, theirs, width in zip(
-            hypothesis.parameters, offsets, shared, sigma, strict=True
+        for item, whole, theirs, width, shift in zip(
+            hypothesis.parameters, offsets, shared, sigma, shifts, strict=True
         ):
             starts = []
             for key in item.keys:
@@ -118,6 +120,7 @@ class Findings:
                 width,
                 offset=whole - theirs,
                 baseline=theirs,
+                shift=shift,
                 unit=item.unit,
                 bounds=bounds_of(item.keys[0]),
             )

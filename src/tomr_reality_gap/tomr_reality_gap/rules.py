@@ -42,15 +42,18 @@ def estimate_of(
     *,
     offset: float,
     baseline: float = 0.0,
+    shift: float = 0.0,
     unit: str = "",
     bounds: tuple[float, float] = (-math.inf, math.inf),
 ) -> Estimate:
     """A value with its 95 % interval.
 
     The simulator is not exact either: a part of the offset from the description is never known, nor
-    all of what the user's simulation shows of it (`baseline`).
+    all of what the user's simulation shows of it (`baseline`). `shift`: how far what shows and has
+    no name may move it.
     """
-    half = HALF_WIDTH * math.hypot(sigma, SIMULATOR.parameter * offset, 0.5 * baseline)
+    known = HALF_WIDTH * math.hypot(sigma, SIMULATOR.parameter * offset, 0.5 * baseline)
+    half = math.hypot(known, shift)
     if unit == "rad":
         value = math.remainder(value, 2.0 * math.pi)
     return Estimate(value, max(value - half, bounds[0]), min(value + half, bounds[1]), unit)

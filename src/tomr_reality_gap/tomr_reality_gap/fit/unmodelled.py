@@ -26,6 +26,7 @@ from tomr_reality_gap.fit.laws import Evidence, laws_of
 from tomr_reality_gap.fit.learnt import Table
 from tomr_reality_gap.fit.polish import changes_of, polished
 from tomr_reality_gap.fit.remainder import Remainder, predicted_share, whitened
+from tomr_reality_gap.fit.supplied import is_supplied
 
 Array = NDArray[np.float64]
 
@@ -118,6 +119,10 @@ def unmodelled_effect(
         alike = [item for item in alike if item.share > best.share - _ALIKE]
         return _most(rest, [best, *alike], robot, motions)
     found = fitted(rest, best, robot, motions)
+    if found.family.acts == "driver":
+        drawn = best.table.columns(rest.dataset, robot, motions)
+        if not is_supplied(rest, [whitened(part, rest.weight) for part in drawn]):
+            return None  # sensors show what nobody draws
     # Few stretches may not meet again, but a law that holds for all is one.
     for item in [item for item in tried if item.table.family.is_strange and item is not best]:
         other = fitted(rest, evolve(item, share=item.best), robot, motions)
