@@ -9,7 +9,7 @@ import pytest
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot
 from tomr_reality_gap import verdict
 from tomr_reality_gap.analysis import detection_limits
-from tomr_reality_gap.findings import log_odds_of
+from tomr_reality_gap.findings import Findings, log_odds_of
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.refine import FittedModel
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
@@ -97,3 +97,20 @@ def test_the_smallest_that_would_have_been_seen_brings_just_its_cost() -> None:
         ("friction.viscous", "all_wheels", f"coefficient {expected:.2g} N m s"),
         ("friction.quadratic", "all_wheels", "coefficient 0.5 N m s"),
     )
+
+
+def test_a_value_is_as_sure_as_noise_and_what_is_not_named_leave_it() -> None:
+    """The second of two findings; the simulator is exact to 2 % of no offset at all."""
+    size = Parameter("torque", ("made",), "N m", 0.5)
+    model = Model(ParameterisedRobot({"made": 1.0}, "made"), (), ())
+    for effect in ("first", "second"):
+        model = model.joined(Hypothesis(effect, ("body",), (size,)))
+    analysis = SimpleNamespace(
+        found=SimpleNamespace(best=SimpleNamespace(model=model)),
+        base=model.base,
+        own_sigma=np.array([9.0, 0.3]),
+        structural_shifts=np.array([9.0, 1.96 * 0.4]),
+        shared=(),
+    )
+    found = Findings(analysis, (), {})._parameters(1)["torque"]  # type: ignore[arg-type]
+    assert (found.value, found.high) == (1.0, pytest.approx(1.0 + 1.96 * 0.5))

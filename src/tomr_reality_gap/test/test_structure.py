@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from tomr_power_model.estimation.parameter import Parameter
 from tomr_reality_gap.fit.structure import Addition, additions_of, structural_shifts
@@ -70,6 +71,14 @@ def test_a_value_is_off_by_what_it_makes_up_for() -> None:
     # offsets cost before and after.
     prior = 0.5 * (3.0**2 - 2.7**2 - 0.5**2)
     assert found.gain == pytest.approx(0.5 * 40.0**2 - np.log(80.0) + prior, abs=0.01)
+
+
+def test_what_is_less_likely_beforehand_gains_less() -> None:
+    likely, unlikely = (
+        _additions(evolve(_hypothesis("unnamed"), log_prior=prior), size=0.5)[0].gain
+        for prior in (0.0, -5.0)
+    )
+    assert likely - unlikely == pytest.approx(5.0)
 
 
 def test_what_shows_otherwise_moves_nothing() -> None:

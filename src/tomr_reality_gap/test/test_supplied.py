@@ -58,4 +58,5 @@ def test_a_total_that_is_slow_noise_itself_bears_nothing_out() -> None:
 
 def test_without_a_total_or_with_a_coarse_one_nobody_can_tell() -> None:
     assert is_supplied(*_rest(DRAWN, np.zeros(COUNT), kinds="mmm"))
-    assert is_supplied(*_rest(0.05 * DRAWN, np.zeros(COUNT), noise=50.0))
+    assert is_supplied(*_rest(DRAWN, -0.5 * DRAWN.sum(axis=0), noise=300.0))
+    assert not is_supplied(*_rest(DRAWN, -0.5 * DRAWN.sum(axis=0)))

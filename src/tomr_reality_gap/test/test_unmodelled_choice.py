@@ -14,7 +14,7 @@ from tomr_reality_gap.fit.unmodelled import Tried, unmodelled_effect
 PLACE, SPEED, TIME = "force.place", "torque.speed", "supply.time"
 SIGNED = "torque.signed_speed"
 FLOOR = "torque.place"
-DRIVER = "driver.speed"
+DRIVER, DRAWS = "driver.speed", "driver.time"
 
 
 def _chosen(
@@ -25,8 +25,13 @@ def _chosen(
     is_sure: bool = False,
     moments: Mapping[str, float] = MappingProxyType({}),
     explained: Mapping[str, float] = MappingProxyType({}),
+    is_supplied: bool = True,
 ) -> str | None:
     """The family that is fitted; what depends on place is a law that explains `law`."""
+
+    class Tabled(SimpleNamespace):
+        def columns(self, *_: object) -> list[object]:
+            return []
 
     def fitted(rest: object, item: SimpleNamespace, *_: object) -> SimpleNamespace:
         family = item.table.family
@@ -36,11 +41,12 @@ def _chosen(
         )
 
     tried = [
-        Tried(SimpleNamespace(family=FAMILIES[name]), share, moments.get(name, -1.0))  # type: ignore[arg-type]
+        Tried(Tabled(family=FAMILIES[name]), share, moments.get(name, -1.0))  # type: ignore[arg-type]
         for name, share in sorted(shares.items(), key=lambda item: -item[1])
     ]
     monkeypatch.setattr(unmodelled, "families_tried", lambda *_, **__: tried)
     monkeypatch.setattr(unmodelled, "fitted", fitted)
+    monkeypatch.setattr(unmodelled, "is_supplied", lambda *_: is_supplied)
     rest = SimpleNamespace(dataset=SimpleNamespace(simulations=()))
     found = unmodelled_effect(rest, None, None, is_sure=is_sure)  # type: ignore[arg-type]
     return None if found is None else found.family.family_id
@@ -68,6 +74,23 @@ def test_what_predicts_stretches_is_repeatable_and_what_only_follows_time_is_not
     monkeypatch: pytest.MonkeyPatch, shares: dict[str, float], expected: str | None
 ) -> None:
     assert _chosen(monkeypatch, shares) == expected
+
+
+@pytest.mark.parametrize(
+    ("shares", "is_supplied", "expected"),
+    [
+        ({DRAWS: 0.9}, True, DRAWS),
+        ({DRAWS: 0.9}, False, None),  # sensors show what nobody draws
+        ({TIME: 0.9}, False, TIME),  # what the total alone shows
+    ],
+)
+def test_what_drivers_draw_now_and_then_the_supply_gives(
+    monkeypatch: pytest.MonkeyPatch,
+    shares: dict[str, float],
+    is_supplied: bool,
+    expected: str | None,
+) -> None:
+    assert _chosen(monkeypatch, shares, is_supplied=is_supplied) == expected
 
 
 def test_where_something_is_there_for_sure_little_is_named_as_well(
