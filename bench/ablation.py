@@ -24,10 +24,9 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, cast
 
-import numpy as np
 from attrs import frozen
-from commissioned import FAULTY, HEALTHY, IMU_TOPIC, commissioned_kind, seed_of, tour
-from diagnosis import in_paper, rebanded, score_faulty, score_healthy
+from commissioned import FAULTY, HEALTHY, IMU_TOPIC, commissioned_kind, file_of, seed_of, tour
+from diagnosis import codes_of, rebanded, score_faulty, score_healthy, twin_of
 from diagnosis_report import Outcome, report
 from extended import KINDS, Fleet, scenario_of, seeds_of, targets, tracked
 from faults.play import changes_of
@@ -49,13 +48,12 @@ from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.slides import SlideWatch
 from tomr_fault_diag.classifier.slope import SlopeFilter
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
-from tomr_fault_diag.classifier.states import NORMAL
 from tomr_fault_diag.classifier.window_network import WindowNetwork
 from tomr_fault_diag.diagnosis.score import Seen as ExtendedSeen
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.robot import Robot, load_robot
-from tomr_training.simulated_drive import healthy_twin, simulated_drive
+from tomr_training.simulated_drive import simulated_drive
 
 _FIRST_OTHER = 5_400_000  # seed
 ALL = "all rules"
@@ -66,6 +64,9 @@ _SUMMARY = re.compile(
     r"SUMMARY drives right (\S+) \(extended (\S+)\), accuracy over time (\S+), "
     r"delay (\S+) s median (\S+) s p95, missed (\S+), false alarms (\S+)/h"
 )
+
+
+Said = Mapping[int, Diagnosis]  # by stamp [ns]
 
 
 @frozen
@@ -98,12 +99,12 @@ def _network(weights: str) -> WindowNetwork:
     return WindowNetwork.load(weights)
 
 
-def diagnosed(seen: Seen, names: Sequence[str]) -> dict[str, list[Diagnosis]]:
+def diagnosed(seen: Seen, names: Sequence[str]) -> dict[str, Said]:
     """What is said without each rule or part of these names."""
     robot, settings = seen.robot, seen.settings
     slides = cast(SlideWatch, _Kept(SlideWatch(robot), seen.frames))
     outside = cast(OutsideWatch, _Kept(OutsideWatch(robot), seen.frames))
-    found = {}
+    found: dict[str, Said] = {}
     for name in names:
         rules = ALL_RULES if name in (ALL, *PARTS) else ALL_RULES.without(name)
         small = settings.small_faults and name != LASTING
@@ -116,12 +117,17 @@ def diagnosed(seen: Seen, names: Sequence[str]) -> dict[str, list[Diagnosis]]:
             misfits=MisfitWatch(Motors(robot).idle.tolist()),
         )
         said = (classifier.classify(frame) for frame in seen.frames)
-        found[name] = [diagnosis for diagnosis in said if diagnosis is not None]
+        found[name] = {one.stamp_ns: one for one in said if one is not None}
     return found
 
 
-def _kept(file: Path, make: Callable[[], Any]) -> Any:
-    """What a file holds, made where it is not there yet."""
+def _at(said: Said, frame: ResidualFrame) -> Diagnosis | None:
+    return said.get(frame.stamp_ns)
+
+
+def kept(keep: Path, robot: Path, name: str, make: Callable[[], Any]) -> Any:
+    """What is kept of a drive of the robot in a file, made where it is not there yet."""
+    file = keep / f"{sha256(robot.read_bytes()).hexdigest()[:12]}_{name}.pickle"
     if not file.exists():
         file.write_bytes(pickle.dumps(make()))
     return pickle.loads(file.read_bytes())
@@ -137,11 +143,10 @@ class Practice:
     def __call__(self, names: Sequence[str], keep: Path) -> dict[str, Any]:
         """Changes of the state as the score wants them."""
         settings = pipeline_of(self.robot).settings
-        digest = sha256(self.robot.read_bytes()).hexdigest()[:12]
-        file = keep / f"practice_{digest}_{self.bag.name}.pickle"
-        frames = _kept(file, lambda: frames_of(self.bag, self.robot, settings))
+        make = partial(frames_of, self.bag, self.robot, settings)
+        frames = kept(keep, self.robot, self.bag.name, make)
         found = diagnosed(Seen(frames, settings.classifier, load_robot(self.robot)), names)
-        return {name: changes_of(said) for name, said in found.items()}
+        return {name: changes_of(said.values()) for name, said in found.items()}
 
 
 @frozen
@@ -161,17 +166,15 @@ class Tour:
         chosen = tour(self.number, folder, seed, self.fault)
         chosen = chosen if self.fault else over_ramps(chosen)
         kind, robot = commissioned_kind(folder)
-        file = keep / f"{self.folder.name}_{self.number}_{seed}.pickle"
-        labelled = _kept(file, partial(simulated_drive, chosen, self.without))
-        seen = Seen(rebanded(labelled.frames, kind.bands), kind.settings, robot)
+        source = file_of(folder)
+        labelled = kept(keep, source, f"{seed}", partial(simulated_drive, chosen, self.without))
         twin = None
         if self.fault:
-            rows = labelled.first - 1 + np.arange(len(labelled.frames))
-            made = keep / f"{self.folder.name}_{self.number}_{seed}_twin.pickle"
-            twin = _kept(made, lambda: healthy_twin(chosen).of_ticks(rows))
+            twin = kept(keep, source, f"{seed}_twin", partial(twin_of, chosen, labelled))
+        seen = Seen(rebanded(labelled.frames, kind.bands), kind.settings, robot)
         outcomes = {}
         for name, said in diagnosed(seen, names).items():
-            named = _codes(seen.frames, said)
+            named = codes_of(seen.frames, partial(_at, said))
             outcomes[name] = (
                 score_healthy(labelled, named)
                 if twin is None
@@ -185,67 +188,58 @@ class Other:
     """A drive of bench/extended.py: a fault beyond the six, or pushes where it has no name."""
 
     fleet: Fleet
-    place: str  # of the fleet
     seed: int
     name: str
 
     def __call__(self, names: Sequence[str], keep: Path) -> dict[str, ExtendedSeen | None]:
         """What was said of it; None where its fault never shows."""
-        file = keep / f"{self.place}_{self.seed}_other.pickle"
-        case = _kept(file, partial(scenario_of, self.fleet, self.seed, self.name))
+        source = file_of(self.fleet.folder(self.seed))
+        make = partial(scenario_of, self.fleet, self.seed, self.name)
+        case = kept(keep, source, f"{self.seed}_other", make)
         if case is None:
             return dict.fromkeys(names)
         kind, robot = self.fleet.kind(self.seed), self.fleet.drive(self.seed).believed
         frames = rebanded(case.labelled.frames, kind.bands)
         found = {}
         for name, said in diagnosed(Seen(frames, kind.settings, robot), names).items():
-            by_stamp = {diagnosis.stamp_ns: diagnosis for diagnosis in said}
-            found[name] = case.seen(tracked(frames, partial(_at, by_stamp)))
+            found[name] = case.seen(tracked(frames, partial(_at, said)))
         return found
 
 
 Work = Practice | Tour | Other
 
 
-def _at(said: Mapping[int, Diagnosis], frame: ResidualFrame) -> Diagnosis | None:
-    return said.get(frame.stamp_ns)
-
-
-def _codes(frames: Sequence[ResidualFrame], said: Sequence[Diagnosis]) -> Any:
-    """State that stands at each tick (n,), as the paper calls it."""
-    changes = {diagnosis.stamp_ns: in_paper(diagnosis.state) for diagnosis in said}
-    state, named = NORMAL, []
-    for frame in frames:
-        state = changes.get(frame.stamp_ns, state)
-        named.append(state)
-    return np.array(named)
-
-
 def _do(drive: Work, names: Sequence[str], keep: Path) -> dict[str, Any]:
     return drive(names, keep)
 
 
-def _run(
-    title: str, drives: Sequence[Work], names: Sequence[str], keep: Path
-) -> list[dict[str, Any]]:
-    with ProcessPoolExecutor() as pool:
-        found = pool.map(partial(_do, names=names, keep=keep), drives)
-        return list(tqdm(found, total=len(drives), desc=title, unit="drive", disable=None))
+@frozen
+class Ablation:
+    """What is left out, and where residuals are kept."""
+
+    names: Sequence[str]
+    keep: Path
+
+    def run(self, title: str, drives: Sequence[Work]) -> list[dict[str, Any]]:
+        """What each drive is worth, by name."""
+        with ProcessPoolExecutor() as pool:
+            found = pool.map(partial(_do, names=self.names, keep=self.keep), drives)
+            return list(tqdm(found, total=len(drives), desc=title, unit="drive", disable=None))
 
 
 def _percent(share: float | None) -> str:
     return "-" if share is None else f"{share:.0%}"
 
 
-def practice(robot: Path, names: Sequence[str], keep: Path) -> Table:
+def practice(ablation: Ablation, robot: Path) -> Table:
     """The recordings of `faults_practice` without each of the names."""
     recordings = Recordings.find()
     drives = (*recordings.drives("drives"), *recordings.drives("healthy_long"))
-    found = _run(str(robot), [Practice(drive.bag, robot) for drive in drives], names, keep)
+    found = ablation.run(str(robot), [Practice(drive.bag, robot) for drive in drives])
     head = ("right", "other", "of the time", "delay", "95 %", "missed", "false/h")
     table = Table("without", *head, title=str(robot))
-    for name in names:
-        out = keep / "scored"
+    for name in ablation.names:
+        out = ablation.keep / "scored"
         folder = out / recordings.robot
         folder.mkdir(parents=True, exist_ok=True)
         for drive, said in zip(drives, found, strict=True):
@@ -259,11 +253,7 @@ def practice(robot: Path, names: Sequence[str], keep: Path) -> Table:
 
 
 def tours(
-    folder: Path,
-    counts: tuple[int, int],
-    without: tuple[str, ...],
-    names: Sequence[str],
-    keep: Path,
+    ablation: Ablation, folder: Path, counts: tuple[int, int], without: tuple[str, ...]
 ) -> Table:
     """Commissioned robots without each of the names; `counts` of faulty and healthy tours each."""
     numbers = sorted(int(path.name.removeprefix("robot_")) for path in folder.glob("robot_*"))
@@ -275,11 +265,11 @@ def tours(
             for index in range(count)
         ]
 
-    sick = _run(f"{folder}, faulty", several("fault", counts[0]), names, keep)
-    well = _run(f"{folder}, over ramps", several(None, counts[1]), names, keep)
+    sick = ablation.run(f"{folder}, faulty", several("fault", counts[0]))
+    well = ablation.run(f"{folder}, over ramps", several(None, counts[1]))
     title = f"{folder}, robots {', '.join(map(str, numbers))}"
     table = Table("without", "right", "delay", "95 %", "never", "false", "h", title=title)
-    for name in names:
+    for name in ablation.names:
         found: Any = report([item[name] for item in sick], [item[name] for item in well])
         delay, alarms = found["delay_s"]["all"], found["false_alarms"]
         never = f"{delay['never_named']} of {delay['onsets']}"
@@ -290,22 +280,17 @@ def tours(
 
 
 def others(
-    folder: Path,
-    counts: tuple[int, int],
-    without: tuple[str, ...],
-    names: Sequence[str],
-    keep: Path,
+    ablation: Ablation, folder: Path, counts: tuple[int, int], without: tuple[str, ...]
 ) -> Table:
     """The same of faults beyond the six; `counts` of drives of each kind, and of pushed ones."""
     fleet = Fleet.of(folder, without)
     drives = [
-        Other(fleet, folder.name, seed, name)
-        for seed, name in seeds_of(_FIRST_OTHER, *counts, list(KINDS))
+        Other(fleet, seed, name) for seed, name in seeds_of(_FIRST_OTHER, *counts, list(KINDS))
     ]
-    found = _run(f"{folder}, others", drives, names, keep)
+    found = ablation.run(f"{folder}, others", drives)
     head = ("known kinds", "wrong", "unknown kinds", "wrong", "alarms, pushed")
     table = Table("without", *head, title=str(folder))
-    for name in names:
+    for name in ablation.names:
         shown = [item[name] for item in found if item[name] is not None]
         groups: Any = targets(shown)
         cells = [
@@ -340,18 +325,18 @@ def _main(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--pushed", type=int, default=0, help="healthy and pushed (default 0)")
     options = parser.parse_args(arguments)
     options.keep.mkdir(parents=True, exist_ok=True)
-    console = Console(width=110)
+    console, ablation = Console(width=110), Ablation(options.only, options.keep)
     for robot in options.practice:
-        console.print(practice(robot, options.only, options.keep))
-    both = [*options.commissioned, *options.without_imu]
-    for folder in both:
-        without = () if folder in options.commissioned else (IMU_TOPIC,)
+        console.print(practice(ablation, robot))
+    fleets: list[tuple[Path, tuple[str, ...]]] = [(folder, ()) for folder in options.commissioned]
+    fleets += [(folder, (IMU_TOPIC,)) for folder in options.without_imu]
+    for folder, without in fleets:
         if options.faulty or options.healthy:
             counts = (options.faulty, options.healthy)
-            console.print(tours(folder, counts, without, options.only, options.keep))
+            console.print(tours(ablation, folder, counts, without))
         if options.others or options.pushed:
             counts = (options.others, options.pushed)
-            console.print(others(folder, counts, without, options.only, options.keep))
+            console.print(others(ablation, folder, counts, without))
     return EXIT_OK
 
 

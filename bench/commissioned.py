@@ -29,7 +29,7 @@ from concealed.catalogue import ALL, SUPPLY, Case, Concealed
 from concealed.concealing import hidden_of, real_parameters
 from concealed.robots import described as described_robot
 from concealed.robots import description_text
-from diagnosis import Kind, named_by, rebanded, score_faulty, score_healthy
+from diagnosis import Kind, named_by, rebanded, score_faulty, score_healthy, twin_of
 from diagnosis_report import Outcome, publish, report
 from ramps import over_ramps
 from record import record_mission
@@ -43,7 +43,7 @@ from tomr_power_model.robot import Robot, load_robot, read_node_sections, robot_
 from tomr_sim_bridge.missions import load_mission
 from tomr_sim_bridge.missions.mission import parse_mission
 from tomr_training.drives import Drive, another_drive, bumps, every_value
-from tomr_training.simulated_drive import healthy_twin, simulated_drive
+from tomr_training.simulated_drive import simulated_drive
 
 _FIRST_SEED = 90_000_000
 _ROBOT = 100_000  # seeds of one robot
@@ -127,10 +127,15 @@ def commissioned(number: int, folder: Path, without: tuple[str, ...] = ()) -> di
     }
 
 
+def file_of(folder: Path) -> Path:
+    """What the commissioning of a robot wrote."""
+    return folder / "commissioned" / "commissioned.yaml"
+
+
 @cache
 def commissioned_kind(folder: Path) -> tuple[Kind, Robot]:
     """The classifier of the robot commissioned in a folder, and the robot as it is believed."""
-    source = str(folder / "commissioned" / "commissioned.yaml")
+    source = str(file_of(folder))
     settings = DiagnosisSettings.of(read_node_sections(source, _NODES), source)
     return Kind(settings.classifier, settings.residuals.bands), load_robot(source)
 
@@ -171,8 +176,7 @@ def scored(task: Task) -> Outcome:
     named = named_by(kind, rebanded(labelled.frames, kind.bands), believed)
     if task.fault is None:
         return score_healthy(labelled, named)
-    rows = labelled.first - 1 + np.arange(len(labelled.frames))
-    return score_faulty(chosen, labelled, healthy_twin(chosen).of_ticks(rows), named)
+    return score_faulty(chosen, labelled, twin_of(chosen, labelled), named)
 
 
 def _outcomes(title: str, tasks: Sequence[Task]) -> list[Outcome]:

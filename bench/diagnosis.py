@@ -41,7 +41,7 @@ from stages import as_arrays
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.settings import ClassifierSettings
-from tomr_fault_diag.classifier.stage import FaultClassifier
+from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import FAULTLESS, NORMAL, SLIP, State
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
@@ -116,17 +116,28 @@ def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[Resid
 
 def named_by(kind: Kind, frames: Sequence[ResidualFrame], robot: Robot) -> Codes:
     """State that stands at each tick (n,), as the paper calls it; what names no fault is normal."""
-    classifier = FaultClassifier.of(kind.settings, robot)
+    return codes_of(frames, FaultClassifier.of(kind.settings, robot).classify)
+
+
+def codes_of(
+    frames: Sequence[ResidualFrame], classify: Callable[[ResidualFrame], Diagnosis | None]
+) -> Codes:
+    """The same of what is said of each tick."""
     state, named = NORMAL, []
     for frame in frames:
-        diagnosis = classifier.classify(frame)
+        diagnosis = classify(frame)
         if diagnosis is not None:
-            state = in_paper(diagnosis.state)
+            state = _in_paper(diagnosis.state)
         named.append(state)
     return np.array(named)
 
 
-def in_paper(state: State) -> int:
+def twin_of(drive: Drive, labelled: LabelledDrive) -> GroundTruth:
+    """What is true of the same drive without its fault, at the same ticks."""
+    return healthy_twin(drive).of_ticks(labelled.first - 1 + np.arange(len(labelled.frames)))
+
+
+def _in_paper(state: State) -> int:
     """Which of the six a state belongs to, the one after them if to none."""
     if state.name in FAULTLESS:
         return NORMAL
@@ -242,8 +253,7 @@ def seen(
     labelled = simulated_drive(drive)
     twin = None
     if drive.mission.faults:
-        rows = labelled.first - 1 + np.arange(len(labelled.frames))
-        twin = healthy_twin(drive).of_ticks(rows)
+        twin = twin_of(drive, labelled)
     if kept is not None:
         kept.write_bytes(pickle.dumps((labelled, twin)))
     return drive, labelled, twin

@@ -31,7 +31,7 @@ import numpy as np
 from attrs import evolve, frozen
 from commissioned import IMU_TOPIC, commissioned_kind, tour
 from diagnosis import Kind as Diagnosed
-from diagnosis import rebanded
+from diagnosis import rebanded, twin_of
 from diagnosis_report import publish
 from tqdm import tqdm
 
@@ -61,7 +61,6 @@ from tomr_training.simulated_drive import (
     PERIOD_NS,
     START_NS,
     LabelledDrive,
-    healthy_twin,
     simulated_drive,
 )
 
@@ -168,16 +167,17 @@ class Fleet:
         """A healthy drive that depends on nothing but the seed and the robots."""
         if not self.robots:
             return random_drive(shipped_robot("reference"), seed, None)
-        folder = self._folder(seed)
+        folder = self.folder(seed)
         return tour(_number(folder), folder, seed, None)
 
     def kind(self, seed: int) -> Diagnosed:
         """The classifier of the robot of that drive."""
         if not self.robots:
             return Diagnosed(ClassifierSettings(), BandSettings())
-        return commissioned_kind(self._folder(seed))[0]
+        return commissioned_kind(self.folder(seed))[0]
 
-    def _folder(self, seed: int) -> Path:
+    def folder(self, seed: int) -> Path:
+        """Of the commissioned robot of that drive."""
         return self.robots[seed % len(self.robots)]
 
 
@@ -281,8 +281,7 @@ def faulty(fleet: Fleet, seed: int, name: str) -> Scenario | None:
     """A faulty drive and its label; None where the fault never shows."""
     drive, size = faulty_drive(fleet.drive(seed), name)
     labelled = simulated_drive(drive, fleet.without)
-    twin = healthy_twin(drive).of_ticks(labelled.first - 1 + np.arange(len(labelled.frames)))
-    observable = spans(shows(drive, labelled, twin), labelled.first)
+    observable = spans(shows(drive, labelled, twin_of(drive, labelled)), labelled.first)
     if not observable:
         return None
     label = _label(drive, name, size)

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from tomr_power_model.estimation.linear_gaussian import Gram, Matrix, product, solve
 from tomr_power_model.estimation.noise import rows_of
-from tomr_power_model.estimation.statistics import robust_scale
+from tomr_power_model.estimation.statistics import autocorrelation_time, robust_scale
 from tomr_reality_gap.fit.dataset import Dataset
 
 Array = NDArray[np.float64]
 
+_LAGS, _NEGLIGIBLE = 80, 0.03  # of an autocorrelation
 _STRETCHES = 8  # of a recording, each left out once
 _MOMENT = 0.25  # s: of every four one is left out
 _MOMENTS = 4
@@ -70,6 +71,16 @@ def _scatter(value: Array, residual: Array, quantum: float) -> float:
 def whitened(columns: Matrix, weight: Array) -> NDArray[np.float32]:
     """Columns (n, p) times weights (n,)."""
     return np.asarray(columns * weight.astype(np.float32)[:, None], dtype=np.float32)
+
+
+def inflations(dataset: Dataset, left: Array) -> list[tuple[slice, float]]:
+    """By channel: variance of what is left over that of its noise, times its correlation time."""
+    found = []
+    for part in rows_of(dataset.channels):
+        lags = min(_LAGS, (part.stop - part.start) // 4 + 1)
+        time = autocorrelation_time([left[part]], lags, _NEGLIGIBLE)
+        found.append((part, max(float(np.mean(left[part] ** 2)), 1.0) * time))
+    return found
 
 
 def predicted_share(rest: Remainder, columns: Sequence[Matrix], labels: NDArray[np.intp]) -> float:

@@ -12,14 +12,12 @@ from numpy.typing import NDArray
 
 from tomr_power_model.estimation.linear_gaussian import Gram, Matrix, product, solve
 from tomr_power_model.estimation.noise import rows_of
-from tomr_power_model.estimation.statistics import autocorrelation_time
-from tomr_reality_gap.fit.remainder import Remainder
+from tomr_reality_gap.fit.remainder import Remainder, inflations
 
 Array = NDArray[np.float64]
 
 _SHARE = 0.5  # of what the term adds to the total
 _SURELY = 1.0  # standard deviations of the share that shows
-_LAGS = 80
 
 
 def is_supplied(rest: Remainder, columns: Sequence[Matrix]) -> bool:
@@ -30,25 +28,21 @@ def is_supplied(rest: Remainder, columns: Sequence[Matrix]) -> bool:
         columns: of the term, whitened, (n, p) each.
     """
     channels = rest.dataset.channels
-    totals = [
-        rows
-        for channel, rows in zip(channels, rows_of(channels), strict=True)
-        if channel.kind == "total"
-    ]
+    is_total = [channel.kind == "total" for channel in channels]
     elsewhere = np.ones(len(rest.residual))
-    for rows in totals:
-        elsewhere[rows] = 0.0
+    for rows, is_one in zip(rows_of(channels), is_total, strict=True):
+        elsewhere[rows] = float(not is_one)
     joined, q = rest.beside(columns), rest.base.shape[1]
     mean = solve(Gram.of(joined, rest.residual, elsewhere), range(joined.shape[1])).mean
+    change = product(joined[:, q:], mean[q:])
+    left = rest.residual - product(joined[:, :q], mean[:q])
     shown, information, variance = 0.0, 0.0, 0.0
-    for rows in totals:
-        added = product(joined[rows, q:], mean[q:])
-        left = rest.residual[rows] - product(joined[rows, :q], mean[:q])
-        lags = min(_LAGS, len(left) // 4 + 1)
-        scatter = max(float(np.mean(left**2)), 1.0) * autocorrelation_time([left], lags, 0.03)
-        own = float(added @ added)
-        shown, information = shown + float(added @ left), information + own
-        variance += own * scatter
+    for (rows, inflation), is_one in zip(inflations(rest.dataset, left), is_total, strict=True):
+        if is_one:
+            own = float(change[rows] @ change[rows])
+            shown += float(change[rows] @ left[rows])
+            information += own
+            variance += own * inflation
     if information <= 0.0:
         return True
     return bool(shown + _SURELY * np.sqrt(variance) > _SHARE * information)

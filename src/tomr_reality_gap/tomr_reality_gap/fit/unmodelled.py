@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from tomr_power_model.effects.scales import Scales
 from tomr_power_model.estimation.linear_gaussian import Gram, Matrix, product, solve
 from tomr_power_model.estimation.noise import rows_of
-from tomr_power_model.estimation.statistics import autocorrelation_time
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_power_model.unmodelled import FAMILIES, Family, LearntTerm, Motion
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
@@ -25,7 +24,7 @@ from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.laws import Evidence, laws_of
 from tomr_reality_gap.fit.learnt import Table
 from tomr_reality_gap.fit.polish import changes_of, polished
-from tomr_reality_gap.fit.remainder import Remainder, predicted_share, whitened
+from tomr_reality_gap.fit.remainder import Remainder, inflations, predicted_share, whitened
 from tomr_reality_gap.fit.supplied import is_supplied
 
 Array = NDArray[np.float64]
@@ -34,7 +33,6 @@ _CLEARLY = 0.005  # of the squares that are left, that other wheels must explain
 _WHEEL_SHARE = 0.1  # of the wheel that shows most
 _NAMED = 0.3  # share of what is left that a term must predict
 _SMALL = 0.02  # of a channel's standard deviation: less is not worth a word
-_LAGS = 80
 _LAW = 0.8  # of the squares that are left: a law that explains so much is no chance
 _AS_MUCH = 0.95  # of what a wider family predicts
 _ALIKE = 0.02  # shares that say no more for one family than for another
@@ -332,25 +330,15 @@ def _normal_equations(rest: Remainder, columns: Sequence[Matrix], left: Array) -
     return Evidence(
         gram.matrix[q:, q:] - cross.T @ known[:, :-1],
         gram.vector[q:] - cross.T @ known[:, -1],
-        max(float(np.mean([factor for _, factor in _inflations(rest.dataset, left)])), 1.0),
+        max(float(np.mean([factor for _, factor in inflations(rest.dataset, left)])), 1.0),
     )
-
-
-def _inflations(dataset: Dataset, left: Array) -> list[tuple[slice, float]]:
-    """By channel: variance of what is left over that of its noise, times its correlation time."""
-    found = []
-    for part in rows_of(dataset.channels):
-        lags = min(_LAGS, (part.stop - part.start) // 4 + 1)
-        time = autocorrelation_time([left[part]], lags, 0.03)
-        found.append((part, max(float(np.mean(left[part] ** 2)), 1.0) * time))
-    return found
 
 
 def _evidence(dataset: Dataset, before: Array, after: Array) -> float:
     """Log likelihood gained, each sample counted by what of it is not known from the last ones."""
     return sum(
         0.5 * float(before[part] @ before[part] - after[part] @ after[part]) / factor
-        for part, factor in _inflations(dataset, after)
+        for part, factor in inflations(dataset, after)
     )
 
 
