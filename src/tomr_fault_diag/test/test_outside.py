@@ -277,6 +277,29 @@ def test_what_bands_hide_is_nothing() -> None:
     assert set(found(widened(item, 4.0) for item in frames(cart(0.8, -0.2)))) == {NOTHING_ACTS}
 
 
+@pytest.mark.parametrize("wrench", [cart(1.2, -0.2), fixed(0.8)])
+def test_bands_ten_times_narrower_change_nothing(wrench: Wrench) -> None:
+    """However many bands three motors are off, what they say together is the same."""
+    wide, narrow = (
+        found(widened(item, band) for item in frames(wrench)) for band in (BAND, 0.1 * BAND)
+    )
+    assert [item.load for item in narrow] == [item.load for item in wide]
+    assert [item.push for item in narrow] == [item.push for item in wide]
+
+
+def test_a_drag_that_is_another_in_each_tick_is_no_load() -> None:
+    """As a wheel that runs away makes the others feel, by tens to hundreds of bands."""
+    random = np.random.default_rng(5)
+
+    def erratic(time: float, twist: Array, yaw: float) -> Array:
+        return cart(float(np.exp(random.uniform(0.0, 3.0))), -0.2)(time, twist, yaw)
+
+    items = list(frames(erratic))
+    largest = [max(abs(entry.residual) for entry in item.residuals[:4]) for item in items]
+    assert np.median(largest) > 10.0 * BAND
+    assert first(found(widened(item, 0.1 * BAND) for item in items)) == math.inf
+
+
 def halved(item: ResidualFrame) -> ResidualFrame:
     """Half of what the motors show beyond their encoders is explained by the commands."""
     motors = [

@@ -290,6 +290,16 @@ def test_a_push_is_no_load_either_where_a_fault_was_believed() -> None:
     assert belief.shares[LOADED] < 1e-6
 
 
+@pytest.mark.parametrize("caution", [9.0, 12.0])
+def test_one_fault_does_not_become_another(caution: float) -> None:
+    """Wheels that one makes slide may look like a fault of theirs; a second one is as rare."""
+    belief, first, second = Belief(0.5, caution), ENCODERS.start + 1, ENCODERS.start + 2
+    belief.shares = np.eye(len(STATE_OF))[first]
+    belief.update(_against_all_but(second, 10.0))
+    odds = belief.shares[second] / belief.shares[first]
+    assert np.log10(odds / np.exp(5.0)) == pytest.approx(-caution, abs=0.2)
+
+
 @pytest.mark.parametrize("state", [SLIP, LOADED])
 @pytest.mark.parametrize(
     ("fault", "decades"), [(CONTROLS.start, -9), (ENCODERS.start, -9), (WEAKS.start + 1, -13)]

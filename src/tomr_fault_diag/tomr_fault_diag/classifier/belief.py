@@ -4,8 +4,9 @@
 
 with l_k the log-likelihood of the newest window if k holds, relative to the likeliest. Windows
 overlap and so say the same several times over: `weight` < 1. That a fault comes on within a tick is
-10^-caution likely: so many decades of evidence must speak for it before it is believed. What cannot
-be distinguished from normal in this motion has l = 0 and leaves the belief as it is.
+10^-caution likely, and no likelier beside another: so many decades of evidence must speak for it
+before it is believed. What cannot be distinguished from normal in this motion has l = 0 and leaves
+the belief as it is.
 
 A force from outside is one hypothesis of the network and two states here: pushes are frequent and
 soon over, loads are as rare as faults and stay. What looks like one fault now and like another
@@ -61,7 +62,6 @@ _SLIP_ENDING = 5e-3  # ... and that a slippery place is left
 _CAUGHT_UP = 0.15  # ... and that the wheel has caught up
 _PUSH = 1e-3  # that somebody pushes, and ...
 _PUSH_ENDING = 0.15  # ... that it is over: a push of 6 s is as unlikely as a load
-_OTHER = 1e-6  # and that one fault becomes another
 _STRANGE = 1e-2  # of a fault of no known kind, over that of a known one
 _SLIPPERY = 1e5  # of slip, over that of other faults: it may be over soon
 _SLOW = 1e-4  # of what a description that is off looks like, all the time
@@ -106,15 +106,14 @@ def of_states(likelihoods: Array) -> Array:
 def _transitions(onset: float) -> Array:
     """P(j -> k)."""
     onset = min(onset, _PUSH)  # a fault, slip as well, is no likelier than a push
-    moves = np.full((_STATES, _STATES), _OTHER)
+    # What shows more of itself was there from the first: one fault does not become another, and a
+    # second one is as rare as the first.
+    moves = np.full((_STATES, _STATES), onset)
     moves[:, LOADED] *= onset / _PUSH  # as rare beside a push as it is without a fault
     moves[:, NORMAL] = _ENDING
     moves[SLIP, NORMAL] = _SLIP_ENDING
     moves[[NORMAL, EXTERNAL]] = onset
     moves[[NORMAL, EXTERNAL], SLIP] = min(_SLIPPERY * onset, _PUSH)
-    # A floor, or a load, is there beside a fault: it does not turn out to be one.
-    for state in (SLIP, LOADED):
-        moves[state, CONTROLS.start : METERS.stop] = onset
     for kind in (DRAGS, WEAKS, METERS):
         moves[[NORMAL, EXTERNAL, SLIP, LOADED, *_CATCHES_UP], kind] *= _SLOW
     moves[:, OTHER] *= _STRANGE
