@@ -8,7 +8,7 @@ from attrs import evolve
 from scipy.signal import lfilter
 from scipy.stats import norm
 
-from tomr_commission.alarm import Tail, _is_heavier, alarm_level, block_peaks
+from tomr_commission.alarm import Tail, _is_exponential, alarm_level, block_peaks
 from tomr_commission.evidence import MOST_CAUTION, SURE
 from tomr_commission.request import AlarmChoice
 
@@ -127,12 +127,29 @@ def test_a_few_peaks_beyond_the_cap_are_not_hidden_by_many_small_ones(rare: int)
     assert level.is_enough is (rare < 3)
 
 
-def test_a_tail_begins_higher_by_halves_while_it_is_heavy_and_has_peaks_enough() -> None:
+def quantiles(scale: float, count: int) -> np.ndarray:
+    """Exponential peaks that are spread as evenly as they can be."""
+    return np.asarray(-scale * np.log((np.arange(count) + 0.5) / count))
+
+
+def test_a_tail_begins_higher_by_halves_while_it_is_not_exponential_and_has_peaks_enough() -> None:
     """A quarter, or its half, of peaks that grow by the same factor, or by the same sum."""
     steep, few = (np.geomspace(1e-9, 30.0, count).tolist() for count in (400, 52))
-    even = np.linspace(0.1, 30.0, 400).tolist()
-    made = [Tail.of("", peaks, 30.0, CHOICE) for peaks in (steep, few, even)]
-    assert [tail.above for tail in made] == [50, 13, 100]
+    even, plain = np.linspace(0.1, 30.0, 400).tolist(), quantiles(2.0, 400)
+    made = [Tail.of("", peaks, 30.0, CHOICE) for peaks in (steep, few, even, plain)]
+    assert [tail.above for tail in made] == [50, 13, 13, 100]
+
+
+def test_one_low_peak_tells_nothing_of_how_high_ones_go_on() -> None:
+    """Eighty of 6 decades and more, of which one in e is a decade beyond another."""
+    high = [*[0.0] * 309, *(6.0 + quantiles(1.0, 80))]
+    with_it, without = (
+        alarm_level([Tail.of("", [*high, low], 30.0, CHOICE)], 0.05, 0.0, CHOICE).needed
+        for low in (3.3, 0.0)
+    )
+    assert with_it == pytest.approx(without, abs=1.0)
+    # 30 an hour, 80 of 390 beyond 6, e^-x of these x beyond it: 6 + ln(600 * 80 / 390) = 10.8.
+    assert 10.8 < with_it + SURE < 14.0
 
 
 def test_peaks_at_the_cap_count_for_the_scale_by_their_length_alone() -> None:
@@ -145,18 +162,20 @@ def test_peaks_at_the_cap_count_for_the_scale_by_their_length_alone() -> None:
 
 @pytest.mark.parametrize("without", [59, 60, 61, 80, 370, 3000])  # a quarter of 79 or 80: 20
 def test_where_most_events_leave_nothing_the_tail_begins_at_the_lowest_peak(without: int) -> None:
-    """Twenty peaks of 6 to 7.9 decades, the usual scale of 4 as four more."""
-    peaks = [*[0.0] * without, *(6.0 + 0.1 * np.arange(20))]
+    """Twenty peaks of 6 decades and more, the usual scale of 4 as four more."""
+    peaks = [*[0.0] * without, *(6.0 + quantiles(1.0, 20))]
     tail = Tail.of("shoves", peaks, 30.0, CHOICE)
-    assert (tail.threshold, tail.above) == (6.0, 19)
-    assert tail.scale == pytest.approx((4 * 4.0 + 0.1 * 190) / 23)
+    lowest = min(quantiles(1.0, 20))
+    assert (tail.threshold, tail.above) == (6.0 + lowest, 19)
+    excess = float((quantiles(1.0, 20) - lowest).sum())
+    assert tail.scale == pytest.approx((4 * 4.0 + excess) / 23)
     assert alarm_level([tail], 0.05, 0.0, CHOICE).needed < 16.0
 
 
-def test_exponential_excesses_are_taken_for_heavier_once_in_twenty() -> None:
+def test_exponential_excesses_are_taken_for_others_once_in_twenty() -> None:
     random = np.random.default_rng(0)
-    heavier = np.mean([_is_heavier(random.exponential(2.0, 100)) for _ in range(1000)])
-    assert heavier == pytest.approx(0.05, abs=0.02)
+    others = np.mean([not _is_exponential(random.exponential(2.0, 100)) for _ in range(1000)])
+    assert others == pytest.approx(0.05, abs=0.02)
 
 
 @pytest.mark.parametrize(

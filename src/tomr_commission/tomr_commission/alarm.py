@@ -9,12 +9,13 @@ where the classifier is exact), so that
 
 What the peaks leave open of P (Jeffreys) and of the scale (gamma, a usual scale counting as a few
 peaks) is drawn by chance, and the level is taken at which so many of the draws as `confidence` says
-have the chosen rate or less. Where the peaks over u have a heavier tail (their coefficient of
-variation is over 1 at the 5 % level: del Castillo, Daoudi & Lockhart 2014), u is raised to the
-highest half of them, and so on: what is rare may have another cause than what is frequent. Where
-most events leave no evidence at all, u is the lowest peak. A source without any peak has no tail to
-extrapolate: it counts as nothing, and the report says for how long it was watched. A generalised
-Pareto tail is fitted beside, and its shape reported.
+have the chosen rate or less. Where the peaks over u are not exponential (their coefficient of
+variation is not 1, at the 5 % level: del Castillo, Daoudi & Lockhart 2014), u is raised to the
+highest half of them, and so on: of a heavier tail what is rare may have another cause than what is
+frequent, and of a lighter one most peaks lie far above u, which says nothing of how it goes on.
+Where most events leave no evidence at all, u is the lowest peak. A source without any peak has no
+tail to extrapolate: it counts as nothing, and the report says for how long it was watched. A
+generalised Pareto tail is fitted beside, and its shape reported.
 """
 
 import math
@@ -35,7 +36,7 @@ _CAP = MOST_CAUTION + SURE  # decades: higher peaks are known to be higher, no m
 _USUAL_SCALE, _USUAL_WEIGHT = 4.0, 4  # decades of a tail, and the peaks that this counts as
 _DRAWS, _SEED = 4000, 1
 _LEAST_RATE = 1e-12
-_FIVE_PERCENT = 1.645  # quantile of a standard normal, one-sided
+_FIVE_PERCENT = 1.96  # quantile of a standard normal, two-sided
 
 
 @frozen
@@ -108,16 +109,16 @@ def _tail_of(values: Array, choice: AlarmChoice) -> tuple[float, Array]:
             break
         threshold, over = higher, peaks
         # Peaks at the cap count as what they are at least: they are what a rare cause looks like.
-        if not _is_heavier(over - threshold):
+        if _is_exponential(over - threshold):
             break
         share /= 2.0
     return threshold, over
 
 
-def _is_heavier(excesses: Array) -> bool:
-    """Whether they vary by more than exponential ones would, at the 5 % level."""
+def _is_exponential(excesses: Array) -> bool:
+    """Whether they vary as much as exponential ones do, at the 5 % level."""
     variation = float(excesses.std(ddof=1) / excesses.mean())
-    return math.sqrt(len(excesses)) * (variation - 1.0) > _FIVE_PERCENT
+    return math.sqrt(len(excesses)) * abs(variation - 1.0) < _FIVE_PERCENT
 
 
 @frozen
