@@ -277,14 +277,27 @@ def test_what_bands_hide_is_nothing() -> None:
     assert set(found(widened(item, 4.0) for item in frames(cart(0.8, -0.2)))) == {NOTHING_ACTS}
 
 
-@pytest.mark.parametrize("wrench", [cart(1.2, -0.2), fixed(0.8)])
-def test_bands_ten_times_narrower_change_nothing(wrench: Wrench) -> None:
+@pytest.mark.parametrize(
+    ("wrench", "sloping"), [(cart(1.2, -0.2), math.nan), (fixed(0.8), math.nan), (fixed(0.8), 0.5)]
+)
+def test_bands_fifty_times_narrower_change_nothing(wrench: Wrench, sloping: float) -> None:
     """However many bands three motors are off, what they say together is the same."""
     wide, narrow = (
-        found(widened(item, band) for item in frames(wrench)) for band in (BAND, 0.1 * BAND)
+        found(widened(item, band) for item in frames(wrench, sloping=sloping))
+        for band in (BAND, 0.02 * BAND)
     )
-    assert [item.load for item in narrow] == [item.load for item in wide]
-    assert [item.push for item in narrow] == [item.push for item in wide]
+    for name in ("load", "push", "fits_felt"):
+        assert [getattr(item, name) for item in narrow] == [getattr(item, name) for item in wide]
+
+
+@pytest.mark.parametrize("watts", [1e30, 1e200, 1e300])
+def test_what_no_motor_draws_breaks_nothing(watts: float) -> None:
+    items = list(frames(cart(1.2, -0.2), seconds=3.0))
+    entry = Residual(watts, BAND, 5.0)
+    shown = items[30].residuals
+    items[30] = evolve(items[30], residuals=(shown[0], *[entry] * 3, *shown[4:7], *[entry] * 3))
+    with np.errstate(over="raise", invalid="raise"):
+        assert len(found(iter(items))) == len(items)
 
 
 def test_a_drag_that_is_another_in_each_tick_is_no_load() -> None:

@@ -20,7 +20,7 @@ _RIDGE = 1e-6  # of a normal matrix
 
 @frozen
 class Window:
-    """Ticks of a motion, each with its weight, by which bands are multiplied."""
+    """Ticks of a motion."""
 
     shown: Array  # torques beyond what is expected, in bands, (n, 3)
     seen: Array  # bands per N m, 0 of a wheel that stands, (n, 3)

@@ -31,7 +31,6 @@ Array = NDArray[np.float64]
 _SLOT = to_ns(0.05)  # of faster ticks the first in each is taken
 _DIRECTIONS = 8  # in which a hitch may lie ...
 _PLACES = (1.0, 2.0)  # ... so many radii of the robot from its centre, or there
-_MOST = 20.0  # bands of one motor that count in full
 
 
 @frozen
@@ -138,14 +137,11 @@ class OutsideWatch:
         bands = np.array([frame.residuals[k].band for k in ENCODERS])
         powers = np.where(np.abs(tick.speed) > MOVES, np.sign(per_torque) / bands, 0.0)
         seen = per_torque * powers
+        # In full: what motors show together is lost if that of one is cut.
         both, shown = seen * shown, seen * (shown - felt)
-        largest = float(np.abs([both, shown]).max())
-        if np.isfinite(largest):
-            # A tick counts for less as a whole: what motors show together is lost if one is cut.
-            weight = _MOST / max(_MOST, largest)
-            square = float(((weight * both) ** 2).sum()) if is_felt else NAN
-            columns = (weight * shown, weight * seen, weight * powers)
-            self._ticks.append((frame.stamp_ns, *columns, twist, self._yaw, square))
+        if np.isfinite([both, shown, seen]).all():
+            square = float((both**2).sum()) if is_felt else NAN
+            self._ticks.append((frame.stamp_ns, shown, seen, powers, twist, self._yaw, square))
         while self._ticks and self._ticks[0][0] < frame.stamp_ns - self.settings.windows[-1]:
             self._ticks.popleft()
 
