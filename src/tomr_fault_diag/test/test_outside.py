@@ -300,6 +300,12 @@ def test_what_no_motor_draws_breaks_nothing(watts: float) -> None:
         assert len(found(iter(items))) == len(items)
 
 
+def test_a_tick_without_bands_hides_no_cart() -> None:
+    items = list(frames(cart(1.2, -0.2)))
+    items[20] = widened(items[20], math.nan)
+    assert first(found(iter(items))) < 2.0
+
+
 def test_a_drag_that_is_another_in_each_tick_is_no_load() -> None:
     """As a wheel that runs away makes the others feel, by tens to hundreds of bands."""
     random = np.random.default_rng(5)
