@@ -5,7 +5,7 @@ import pytest
 from odometry_drives import ROBOT, START
 
 from tomr_odometry.estimator import SlipOdometry
-from tomr_odometry.kernel import GYRO, RIM, VX
+from tomr_odometry.kernel import ACCELEROMETER, GYRO, RIM, VX
 
 SECOND = 1_000_000_000
 
@@ -49,7 +49,7 @@ def test_an_imu_shows_its_biases_where_the_robot_stands(
     has_imu: bool, seconds: float, is_sure: bool
 ) -> None:
     core = standing(has_imu, seconds)
-    assert core._has_stood == is_sure
+    assert core._beginning.has_stood == is_sure
     core._travel = np.array([1.0, 0.0])
     item = core._estimate(core._time)
     # Else wheels may slide unseen.
@@ -71,7 +71,7 @@ def test_how_far_a_robot_came_in_a_leap_of_the_clock(seconds: float, spread: flo
 @pytest.mark.parametrize("has_stood", [False, True])
 def test_biases_that_no_imu_has_are_a_start_that_misled(has_stood: bool) -> None:
     core = standing(has_imu=True, seconds=0.1)
-    core._has_stood, core._is_aided, core._trusted = has_stood, True, 2.0
+    core._is_aided, core._beginning.has_stood, core._beginning._trusted = True, has_stood, 2.0
     core._x[0], core._x[VX], core._x[GYRO] = 3.0, 0.5, 0.1
     core._x[RIM : RIM + 3], core._P[1, 1] = 7.0, 100.0
     ways = np.stack([np.full(3, 7.0), np.full(3, 1e-6)])
@@ -83,7 +83,37 @@ def test_biases_that_no_imu_has_are_a_start_that_misled(has_stood: bool) -> None
     assert (np.sqrt(core._P[0, 0]) > 0.9) != has_stood  # 2 s at 0.5 m/s
     assert core._P[1, 1] > 99.0
     assert (np.sqrt(core._P[VX, VX]) > 0.4) != has_stood
-    assert core._trusted == pytest.approx(2.001 if has_stood else 0.0)
+    assert core._beginning._trusted == (2.0 if has_stood else 0.0)
+
+
+def test_an_imu_alone_drifts_by_what_its_bias_is_off_by() -> None:
+    core = standing(has_imu=True)
+    aided, off = core._aided, float(np.sqrt(core._P[ACCELEROMETER, ACCELEROMETER]))
+    P = core._P
+    for _ in range(400):
+        P = aided._go_adrift(P, is_sliding=True, dt=0.01)
+    assert aided.drift == pytest.approx(4.0 * off)
+    assert np.sqrt(P[0, 0] - core._P[0, 0]) == pytest.approx(0.5 * off * 4.0**2, rel=0.01)
+    assert np.sqrt(P[1, 1] - core._P[1, 1]) == pytest.approx(0.5 * off * 4.0**2, rel=0.01)
+    item = core._estimate(core._time)
+    assert np.sqrt(item.twist_covariance[1, 1]) == pytest.approx(4.0 * off, rel=0.05)
+    assert np.sqrt(item.twist_covariance[2, 2]) < 0.05
+    for _ in range(50):  # a moment of grip may be none
+        P = aided._go_adrift(P, is_sliding=False, dt=0.01)
+    assert aided.drift == pytest.approx(2.5 * off)
+    for _ in range(100):
+        P = aided._go_adrift(P, is_sliding=False, dt=0.01)
+    assert aided.drift == 0.0
+    assert aided._go_adrift(P, is_sliding=False, dt=0.01) is P
+    again = aided._go_adrift(P, is_sliding=True, dt=0.01)
+    assert again[0, 0] - P[0, 0] == pytest.approx((1e-4 * off) ** 2, rel=0.01)
+
+
+def test_a_robot_that_stands_is_not_adrift() -> None:
+    core = standing(has_imu=True)
+    core._aided._adrift = 4.0
+    core._aided._stand(core._x, core._P, core._mode)
+    assert core._aided._adrift == 0.0
 
 
 def test_an_imu_that_comes_back_looks_back_on_nothing() -> None:

@@ -1,5 +1,6 @@
 """The filter's Jacobians are those of its equations, and creep and slope have their signs."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -108,6 +109,30 @@ def test_a_wheel_known_to_slide_slides_whatever_its_rim_does() -> None:
     assert mode[[0, 2]].max() < 1e-3
     loose = doubt.diagonal()[RIM : RIM + 3] - 1e-8
     assert loose == pytest.approx((mode[:3] - 1e-6) * NOISE.slide**2 * NOISE.slide_time * DT)
+
+
+@pytest.mark.parametrize(("since", "counted"), [(0.0, 1.0), (0.019, 1.0), (0.021, 1.0 / 3.0)])
+def test_steps_that_speak_for_grip_soon_after_a_slide_are_one(since: float, counted: float) -> None:
+    mode = np.array([0.5, 0.5, 0.5, since])
+    loose = 0.5 * NOISE.slide**2 * NOISE.slide_time * DT
+    doubt = (loose + 1e-8) * np.eye(SIZE)
+    still = np.array([[0.0] * 3, [1e-8] * 3])
+    judge(np.zeros(SIZE), doubt, NOISE, mode, still, DT, NONE)
+    grips = 1e-8 + 2.0 * 1e-8  # m^2, with the encoders' twice over
+    odds = math.sqrt(grips / (grips + (NOISE.slide * DT) ** 2)) ** counted
+    prior = 0.5 * (1.0 - NOISE.grip_rate * DT) + 0.5 * NOISE.slip_rate * DT
+    assert mode[:3] == pytest.approx(prior * odds / (prior * odds + 1.0 - prior))
+
+
+def test_what_speaks_for_a_slide_counts_at_once() -> None:
+    found = []
+    for since in (0.0, 1.0):
+        mode = np.array([1e-6, 1e-6, 1e-6, since])
+        apart = np.array([[4e-3] * 3, [1e-8] * 3])
+        judge(np.zeros(SIZE), 1e-7 * np.eye(SIZE), NOISE, mode, apart, DT, NONE)
+        found.append(mode[:3].copy())
+    assert found[0].min() > 0.9
+    assert found[1] == pytest.approx(found[0])
 
 
 @pytest.mark.parametrize(

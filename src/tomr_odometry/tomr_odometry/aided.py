@@ -30,6 +30,7 @@ from tomr_power_model.slides.body import ContactBody
 Array = NDArray[np.float64]
 _CALM_TIME = 0.1  # s, over which the IMU is averaged
 _CALM_FORCE, _CALM_TURNING = 0.1, 0.02  # m/s^2, rad/s: no sliding wheel brakes a body that little
+_REGAINED = 3.0  # times as fast as it is lost
 _STANDING = 0.3  # s of both, after which a robot stands whose wheels do
 _STANDS = 0.01  # m/s, rad/s: how surely
 _NONE = np.zeros(WHEELS, dtype=bool)
@@ -48,6 +49,9 @@ class Aided:
         self._felt = [0.0, 0.0, 0.0]  # m/s^2, m/s^2, rad/s, less what the robot would feel at rest
         self._calm = 0.0  # s
         self._lost = 0.0  # s, since all wheels gripped
+        self._adrift = 0.0  # s, for which the velocity has been the accelerometer's
+        self._spread = 0.0  # m, what its bias made of that
+        self.drift = 0.0  # m/s, the same of the velocity
 
     def step(
         self, x: Array, P: Array, mode: Array, given: Inputs, rims: Rims, *,
@@ -69,7 +73,25 @@ class Aided:
                 x[:], P, mode[:] = self._hindsight.again(slid)
             if rims.stands and self._calm > _STANDING:
                 P = self._stand(x, P, mode)
-        self._lost = self._lost + given.dt if mode[:3].max() > SLIDES else 0.0
+        is_sliding = bool(mode[:3].max() > SLIDES)
+        self._lost = self._lost + given.dt if is_sliding else 0.0
+        return self._go_adrift(P, is_sliding, given.dt)
+
+    def _go_adrift(self, P: Array, is_sliding: bool, dt: float) -> Array:
+        """While wheels slide the accelerometer's bias adds up; returns the covariance.
+
+        A wheel that slid and seems to grip makes the filter sure of the velocity. It may as well be
+        one that slides along just as fast as the filter is wrong, so this stands beside it.
+        """
+        self._adrift = max(self._adrift + (dt if is_sliding else -_REGAINED * dt), 0.0)
+        self.drift = self._adrift * math.sqrt(P[ACCELEROMETER, ACCELEROMETER])
+        if self._adrift == 0.0:
+            self._spread = 0.0
+            return P
+        before, self._spread = self._spread, self._spread + self.drift * dt
+        P = P.copy()
+        for place in (X, Y):
+            P[place, place] += self._spread**2 - before**2
         return P
 
     def _feel(self, x: Array, given: Inputs) -> None:
@@ -97,6 +119,7 @@ class Aided:
             for place, off in ((X, self._lost), (Y, self._lost), (VX, 1.0), (VY, 1.0)):
                 P[place, place] += (speed * min(off, DOUBTED)) ** 2
             self._hindsight.clear()  # it looks back on that velocity
+        self._adrift = 0.0
         mode[:3] = 1.0 - SURE
         rows, twist = np.eye(SIZE)[VX : WZ + 1], x[VX : WZ + 1]
         return correct(x, P, rows, -twist, np.full(3, _STANDS**2), math.inf, CREEP)

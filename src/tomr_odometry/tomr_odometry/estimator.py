@@ -15,7 +15,7 @@ from tomr_odometry.kernel import AX, CREEP, GYRO, RIM, SLOPE, VX, WZ, YAW, step
 from tomr_odometry.lifted import Lifted
 from tomr_odometry.rims import Rims
 from tomr_odometry.settings import OdometrySettings
-from tomr_odometry.start import DOUBTED, is_incredible, start, start_again
+from tomr_odometry.start import Beginning, start
 from tomr_odometry.traction import Traction, Tractions
 from tomr_odometry.unaided import FEWEST_POWERS, Unaided
 from tomr_power_model.drive.sources import PowerReading
@@ -34,7 +34,7 @@ _UNKNOWN_WAY = 1e4  # m^2
 _FRESH_NS = to_ns(0.25)  # how long a sensor may be silent
 _NO_IMU = np.full(6, np.nan)
 _NONE_SLIDES = np.zeros(WHEELS, dtype=bool)
-_NOTHING, _EACH = np.zeros((3, 3)), np.eye(3)
+_ALONG, _EACH = np.diag([1.0, 1.0, 0.0]), np.eye(3)
 _TURNING = 0.02  # m/s: below it there is no slip ratio
 _CREEPING = 0.05  # m/s, the same of creep: a ratio to a wheel that hardly turns says nothing
 _SEEN = 0.01  # m/s, the least sliding that is one
@@ -42,7 +42,6 @@ _SLIDES_ON = 2.0  # s, for which a slide may go on unseen
 _GRID_NS = to_ns(1.0)  # of data, between two maps of the floor
 _TRACTION_TIME = 0.3  # s, over which traction is averaged where creep depends on it
 _AHEAD = 0.25  # s, for which the motion of the last encoder sample is taken to go on
-_REST = 0.3  # s of standstill, in which an IMU shows its biases
 _LOST_SPEED = 1.0  # m/s, by which a robot without encoders may be off
 _LOST_MOST = 10.0  # s, after which it may be off no further
 _FASTEST = 30.0  # m/s, of a rim
@@ -81,8 +80,7 @@ class SlipOdometry:
         self._queues: dict[str, deque[tuple[int, str, tuple[float, ...]]]] = {}
         self._time = 0  # of the filter's state [ns]
         self._mode = np.zeros(4)
-        self._trusted = 0.0  # s, since the state was doubted last
-        self._has_stood = False  # long enough for the IMU to show its biases
+        self._beginning = Beginning(self.settings.creep)
         self._x, self._P = start(self.settings.noise, self.settings.creep)
         self._rims = Rims(self._radius)
         self._stamps = RecentStamps()
@@ -195,7 +193,6 @@ class SlipOdometry:
         ways[1] += noise.rim**2
         self._tractions.encoders(time, counted)
         if self._time:
-            self._has_stood |= self._is_aided and self._rims.rest > _REST
             self._step(time, ways)
         self._time = time
 
@@ -271,23 +268,19 @@ class SlipOdometry:
             )  # fmt: skip
             return
         is_carried = time < self._lifted.until
-        noise = self.settings.noise if self._has_stood else self._unsure
+        noise = self.settings.noise if self._beginning.has_stood else self._unsure
         if is_carried:
             noise = noise._replace(accelerometer=_TILTED)
         given = Inputs(1e-9 * time, dt, noise, used, rims, inertial)
         self._P = self._aided.step(
             self._x, self._P, self._mode, given, self._rims,
-            is_known=self._has_stood and not is_carried,
+            is_known=self._beginning.has_stood and not is_carried,
         )  # fmt: skip
         if not np.isnan(inertial).all():
             self._seen = self._x[VX : WZ + 1].copy()
-        self._trusted += dt
-        if not self._has_stood and is_incredible(self._x, noise):
-            # The wheels slid from the start while they were taken for gripping.
-            since = min(self._trusted, DOUBTED)
-            self._x, self._P = start_again(noise, self.settings.creep, (self._x, self._P), since)
-            self._mode[:] = 1.0
-            self._trusted = 0.0
+        self._x, self._P = self._beginning.step(
+            (self._x, self._P), self._mode, given, self._rims.rest, is_carried
+        )
 
     def _estimate(self, tick: int) -> Estimate:
         x, P, body = self._x, self._P, self._body
@@ -350,8 +343,8 @@ class SlipOdometry:
 
     def _unseen(self) -> Array:
         """Variance of a velocity that nothing but the wheels shows."""
-        if self._is_aided and self._has_stood:
-            return _NOTHING
+        if self._is_aided and self._beginning.has_stood:
+            return self._aided.drift**2 * _ALONG
         noise, travel = self._unsure, math.hypot(*self._travel)
         # What makes the pose spread as it does where slides last so long.
         unseen = np.square((noise.way, noise.way, noise.turn)) * travel**2 / _SLIDES_ON

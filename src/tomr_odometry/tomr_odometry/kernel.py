@@ -28,6 +28,7 @@ SIZE = 18
 _ONE = np.eye(SIZE)
 _DIAGONAL = np.diag_indices(SIZE)
 SURE = 1.0 - 1e-6  # probability that counts as one
+RECENT = 0.02  # of a slide, beyond which it was a moment ago
 TAILS = 2.0  # of the encoders' variance, where sliding is looked for
 
 
@@ -51,11 +52,12 @@ class Noise(NamedTuple):
     slide_time: float = 0.1  # s, over which sliding stays the same
     slip_rate: float = 0.05  # 1/s, at which wheels lose grip
     grip_rate: float = 3.0  # 1/s, at which they find it again
+    regrip_time: float = 0.03  # s, over which steps that speak for grip after a slide are one
     way: float = 0.005  # m/s/sqrt(Hz) per m/s of travel, of the pose
     turn: float = 0.005  # rad/s/sqrt(Hz) per m/s, of the heading
     unaided_way: float = 1.0  # the same without an IMU
     unaided_turn: float = 0.3
-    slid: float = 0.1  # m/s/sqrt(Hz), of the pose while a wheel slides
+    slid: float = 0.03  # m/s/sqrt(Hz), of the pose while a wheel slides
     slid_yaw: float = 0.04  # rad/s/sqrt(Hz)
     walk_bias: float = 2e-3  # m/s^2/sqrt(s)
     walk_gyro: float = 1e-4
@@ -140,6 +142,8 @@ def judge(x: Array, P: Array, n: Noise, mode: Array, rims: Array, dt: float, sli
         slides = grips + wide
         exponent = min(0.5 * apart[i] * apart[i] * (1.0 / grips - 1.0 / slides), 50.0)
         odds = math.sqrt(grips / slides) * math.exp(exponent)
+        if odds < 1.0 and mode[3] > RECENT:
+            odds **= min(dt / n.regrip_time, 1.0)
         prior = was * (1.0 - n.grip_rate * dt) + (1.0 - was) * n.slip_rate * dt
         now = prior * odds / (prior * odds + 1.0 - prior)
         now = SURE if slid[i] else min(max(now, 1.0 - SURE), SURE)

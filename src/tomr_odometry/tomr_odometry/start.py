@@ -1,8 +1,12 @@
-"""The state with which the filter begins."""
+"""The state with which the filter begins, and how it finds out that it began wrongly."""
+
+import math
 
 import numpy as np
 
 from tomr_odometry.creep import Creep
+from tomr_odometry.estimate import SLIDES
+from tomr_odometry.hindsight import Inputs
 from tomr_odometry.kernel import (
     ACCELEROMETER,
     AW,
@@ -14,14 +18,18 @@ from tomr_odometry.kernel import (
     SIZE,
     SLOPE,
     VX,
+    VY,
     WZ,
+    YAW,
     Array,
     Noise,
     X,
     Y,
 )
+from tomr_odometry.standstill import Felt, Standstill
 from tomr_power_model.robot import WHEELS
 
+REST = 0.3  # s of standstill, in which an IMU shows its biases
 DOUBTED = 5.0  # s, over which a velocity that turns out wrong is taken to have been so at most
 _INCREDIBLE = 2.5  # standard deviations of a bias
 
@@ -60,3 +68,71 @@ def start_again(
     for place, std in ((X, speed * since), (Y, speed * since), (VX, speed), (VX + 1, speed)):
         P[place, place] += std**2
     return x, P
+
+
+def rested(x: Array, P: Array, n: Noise, felt: Felt) -> tuple[Array, Array]:
+    """After a standstill in which the IMU felt nothing but its biases; state and covariance.
+
+    What had been made of the IMU before is forgotten: the robot may have slid then.
+    """
+    x, P = x.copy(), P.copy()
+    known = [*range(VX, AW + 1), *range(ACCELEROMETER, SLOPE + 2)]
+    x[known] = 0.0
+    P[known] = P[:, known] = 0.0
+    felt_by = [GYRO, ACCELEROMETER, ACCELEROMETER + 1]
+    x[felt_by] = felt.mean
+    noise = np.array([n.gyro, n.accelerometer, n.accelerometer]) ** 2 / felt.samples
+    # What a slope makes it feel, it is not off by.
+    c, s = math.cos(x[YAW]), math.sin(x[YAW])
+    into = np.zeros((SIZE, 2))
+    into[SLOPE : SLOPE + 2] = np.eye(2)
+    into[ACCELEROMETER : ACCELEROMETER + 2] = [[c, s], [-s, c]]
+    P += n.slope**2 * into @ into.T
+    P[felt_by, felt_by] += noise
+    P[[VX, VY, WZ], [VX, VY, WZ]] = n.start_twist**2
+    P[[AW, AX, AY], [AW, AX, AY]] = noise
+    return x, P
+
+
+class Beginning:
+    """The time until a standstill has shown the IMU's biases: wheels may slide from the start."""
+
+    def __init__(self, creep: Creep) -> None:
+        self._creep, self._standstill = creep, Standstill(REST)
+        self.has_stood = False
+        self._trusted = 0.0  # s, since the state was doubted last
+
+    def step(
+        self, state: tuple[Array, Array], mode: Array, given: Inputs, rest: float, is_carried: bool
+    ) -> tuple[Array, Array]:
+        """After a step of the filter; `mode` in place; state and covariance.
+
+        rest: for how long the wheels have stood [s].
+        """
+        if self.has_stood:
+            return state
+        self._trusted += given.dt
+        felt = self._felt(given, rest, is_carried)
+        if felt is not None and felt.is_steady:
+            at_rest = rested(*state, given.noise, felt)
+            if not is_incredible(at_rest[0], given.noise):
+                self.has_stood = True
+                mode[:] = 0.0
+                return at_rest
+        # Wheels stand, and the robot does not.
+        is_sliding = felt is not None and not felt.is_steady
+        was_sure = is_sliding and mode[:3].min() < SLIDES
+        if was_sure or is_incredible(state[0], given.noise):
+            state = start_again(given.noise, self._creep, state, min(self._trusted, DOUBTED))
+            mode[:] = 1.0
+            self._trusted = 0.0
+        elif is_sliding:
+            mode[:] = 1.0
+        return state
+
+    def _felt(self, given: Inputs, rest: float, is_carried: bool) -> Felt | None:
+        if is_carried:
+            self._standstill.clear()
+            return None
+        self._standstill.take(given.time, given.inertial)
+        return self._standstill.felt(given.noise) if rest > REST else None
