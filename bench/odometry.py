@@ -2,7 +2,6 @@
 
     .venv/bin/python bench/odometry.py robotino [--every 3] [--bags DIR]
     .venv/bin/python bench/odometry.py slips --out corrected
-    .venv/bin/python bench/odometry.py bound [--all]
     .venv/bin/python bench/odometry.py healthy
 
 robotino: the creep of each floor learnt on every second heading and scored on the others; learnt on
@@ -11,9 +10,6 @@ each other; the ratio that of the medians, with its 95 % interval by bootstrap o
 by more than 2 %, 5 mm and 0.5 % of the way. The estimator itself is run on some of the drives.
 
 slips: `tomr_odometry` on every drive of slips_practice; its scorer prints the figures.
-
-bound: those drives without IMU, by one that knows which wheels slide when, the floor's traction,
-slope and drag and the robot's parameters: what it still lacks is what pushes and how slides begin.
 
 healthy: the healthy drives of faults_practice with their IMU and without it: how much slip is
 reported, how far from that of the wheels the pose ends, and the CPU, reading included.
@@ -44,14 +40,13 @@ from tomr_odometry.learn.cli import learnt_text
 from tomr_odometry.learn.drives import Leg, read_legs
 from tomr_odometry.learn.fit import Batch, fit_creep
 from tomr_odometry.offline import estimates
-from tomr_odometry.reference import reference_of, wheel_path
+from tomr_odometry.reference import wheel_path
 from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.summary import end_error, estimated_path
 from tomr_power_model.cli import run_main
-from tomr_power_model.messages.types import ODOMETRY
 from tomr_power_model.recordings import open_recording
-from tomr_power_model.robot import GRAVITY, Robot, load_robot
-from tomr_power_model.slides.body import STICKING, ContactBody, body_of
+from tomr_power_model.robot import load_robot
+from tomr_power_model.slides.body import body_of
 from tomr_power_model.topics.inputs import Complaints
 from tomr_sim_bridge.cli.import_robotino import import_robotino
 
@@ -222,111 +217,6 @@ def slips(options: argparse.Namespace) -> int:
     return 0
 
 
-def _is_within(spells: Sequence[Sequence[float]], times: Array) -> NDArray[np.bool_]:
-    within = np.zeros(len(times), dtype=bool)
-    for begin, end in spells:
-        within |= (times >= begin) & (times <= end)
-    return within
-
-
-def _advanced(
-    body: ContactBody, twist: Array, force: Array, pull: Array, drag: float, dt: float
-) -> Array:
-    """Twist after dt by the forces of the contacts [N] and the pull of a slope [N]."""
-    along = np.tanh(body.along @ twist / STICKING) * body.load
-    wrench = body.rows.T @ force + pull - drag * (body.along.T @ along)
-    turning = twist[2] * np.array([twist[1], -twist[0], 0.0])
-    return np.asarray(twist + dt * (np.linalg.solve(body.inertia, wrench) + turning))
-
-
-def _floor(
-    floor: Mapping[str, float], yaw: float, body: ContactBody, robot: Robot
-) -> tuple[Array, float]:
-    """Pull of a slope on the body [N], and the rollers' drag."""
-    fall = body.mass * GRAVITY * np.sin(floor.get("slope", 0.0))
-    heading = floor.get("azimuth", 0.0) - yaw
-    described = robot.everywhere("contact.roller_drag", "coefficient")[0]
-    pull = fall * np.array([np.cos(heading), np.sin(heading), 0.0])
-    return pull, floor.get("roller_drag", described)
-
-
-def bound_of(bag: Path, truth: Path, robot: Robot) -> dict[str, float]:
-    """Without IMU, by one that knows which wheels slide and all of floor and robot.
-
-    Wheels that grip hold the twist; those that slide pull with all the traction that there is.
-    """
-    known = json.loads(truth.read_text())
-    settings = OdometrySettings(use_imu=False)
-    with open_recording(bag) as recording:
-        items = list(estimates(recording, robot, SlipOdometry(robot, settings), Complaints()))
-    with open_recording(truth.parent / "truth_odom" / bag.name) as recording:
-        (topic,) = [name for name, kind in recording.topics.items() if kind == ODOMETRY]
-        true = reference_of(recording, topic)
-    body, _ = body_of(robot)
-    stamps = np.array([item.stamp_ns for item in items], dtype=np.int64)
-    times = np.asarray(1e-9 * (stamps - int(known["t0_ns"])), dtype=np.float64)
-    slides = np.stack([_is_within(spells, times) for spells in known["slipping"]], axis=1)
-    poses, floor = true.at(stamps), known["floor"]
-    twist, pose, plain = items[0].twist.copy(), poses[0].copy(), poses[0].copy()
-    errors = []
-    for k in range(1, len(items)):
-        dt = min(1e-9 * float(stamps[k] - stamps[k - 1]), 0.1)
-        by_wheels = items[k].twist  # without an IMU the estimator's is that of the wheels
-        limit = floor.get("patch_friction", floor["friction"]) * body.load
-        force = slides[k] * limit * np.tanh(body.rows @ (by_wheels - twist) / STICKING)
-        twist = _advanced(body, twist, force, *_floor(floor, pose[2], body, robot), dt)
-        grips = body.rows[~slides[k]]
-        if len(grips):
-            light = np.linalg.solve(body.inertia, grips.T)
-            twist = twist + light @ np.linalg.solve(grips @ light, grips @ (by_wheels - twist))
-        pose, plain = _moved(pose, twist, dt), _moved(plain, by_wheels, dt)
-        c, s = np.cos(poses[k, 2]), np.sin(poses[k, 2])
-        step = (poses[k] - poses[k - 1]) / dt
-        real = np.array([c * step[0] + s * step[1], c * step[1] - s * step[0]])
-        if slides[k].any():
-            errors.append([twist[:2] - real, by_wheels[:2] - real])
-    off = np.array(errors).reshape(-1, 2, 2)
-    speeds = np.sqrt(np.mean(np.sum(off**2, axis=2), axis=0)) if len(off) else np.full(2, np.nan)
-    ends = [float(np.hypot(*(end[:2] - poses[-1, :2]))) for end in (pose, plain)]
-    way = float(np.hypot(*(np.diff(poses[:, :2], axis=0).T)).sum())
-    return {"ours": ends[0], "plain": ends[1], "way": way, "v": speeds[0], "v_plain": speeds[1]}
-
-
-def _moved(pose: Array, twist: Array, dt: float) -> Array:
-    yaw = pose[2] + 0.5 * dt * twist[2]
-    c, s = np.cos(yaw), np.sin(yaw)
-    x, y, turn = dt * twist
-    return np.asarray(pose + np.array([c * x - s * y, s * x + c * y, turn]))
-
-
-def bound(options: argparse.Namespace) -> int:
-    """How good an estimator without IMU can be that knows the true parameters."""
-    folder = recordings() / "slips_practice"
-    if not folder.exists():
-        print(f"skipped: {folder} is absent; set TOMR_RECORDINGS")
-        return 0
-    rows = []
-    for robot in sorted(path.parent for path in folder.glob("slips/*/robot.yaml")):
-        known = load_robot(robot / "robot.yaml")
-        for bag in sorted((robot / "drives").iterdir()):
-            truth = folder / "slips_truth" / robot.name / f"{bag.name}.json"
-            if json.loads(truth.read_text())["imu"] and not options.all:
-                continue
-            rows.append(found := bound_of(bag, truth, known))
-            print(
-                f"{bag.name}: end {found['plain']:.3f} -> {found['ours']:.3f} m on "
-                f"{found['way']:.1f} m; while slipping {found['v_plain']:.3f} -> "
-                f"{found['v']:.3f} m/s",
-                flush=True,
-            )
-    ends = np.array([[row["ours"], row["plain"], row["way"]] for row in rows]).T
-    print(", ".join(f"{name} {value:.3g}" for name, value in ratio(*ends).items()))
-    speeds = np.array([[row["v"], row["v_plain"]] for row in rows])
-    pooled = np.sqrt(np.nanmean(speeds**2, axis=0))
-    print(f"velocity while slipping over plain's: {pooled[0] / pooled[1]:.2f}")
-    return 0
-
-
 def healthy(options: argparse.Namespace) -> int:
     """What is made of drives in which no wheel slides."""
     folder = recordings() / "faults_practice" / "faults" / "practice"
@@ -368,9 +258,6 @@ def _main(arguments: Sequence[str] | None) -> int:
     other.add_argument("--out", type=Path, required=True, metavar="DIR")
     other.add_argument("scorer", nargs="*", help="further arguments of the scorer, after --")
     other.set_defaults(run=slips)
-    last = commands.add_parser("bound")
-    last.add_argument("--all", action="store_true", help="drives with an IMU, too, without it")
-    last.set_defaults(run=bound)
     commands.add_parser("healthy").set_defaults(run=healthy)
     options = parser.parse_args(arguments)
     return int(options.run(options))

@@ -154,7 +154,7 @@ def _estimated(bag: Path, robot: Robot, settings: OdometrySettings, seed: int) -
         return list(estimates(recording, robot, core, Complaints()))
 
 
-def _slip_error(ours: Array, sliding: Array, rims: Array) -> float:
+def slip_error(ours: Array, sliding: Array, rims: Array) -> float:
     """Distance of ratios to the range of the true ones within 0.1 s, RMS, from 5 cm/s on."""
     larger = np.maximum(np.abs(rims), np.abs(rims - sliding))
     true = np.where(larger > 0.02, sliding / np.maximum(larger, 0.02), 0.0)
@@ -211,7 +211,7 @@ def met(bag: Path, description: Path, use_imu: bool) -> Met:
         way=float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum()),
         reported=float(reported[slides].mean()) if slides.any() else math.nan,
         false=float(reported[~slides].mean()),
-        slip=_slip_error(np.array([item.slip for item in ours]), sliding, (off[0] + real) @ rows.T),
+        slip=slip_error(np.array([item.slip for item in ours]), sliding, (off[0] + real) @ rows.T),
         inside=_inside(ours, poses),
     )
 

@@ -28,7 +28,6 @@ SIZE = 18
 _ONE = np.eye(SIZE)
 _DIAGONAL = np.diag_indices(SIZE)
 SURE = 1.0 - 1e-6  # probability that counts as one
-RECENT = 0.02  # of a slide, beyond which it was a moment ago
 TAILS = 2.0  # of the encoders' variance, where sliding is looked for
 
 
@@ -47,7 +46,7 @@ class Noise(NamedTuple):
     grip_share: float = 5e-4  # of its speed, the same
     doubt: float = 10.0  # factor on both where a wheel slid a moment ago
     doubt_time: float = 0.5  # s, over which that is forgotten
-    learns: float = 0.2  # doubt, beyond which a slide is no time to learn biases in
+    recent: float = 0.2  # doubt, beyond which a slide was a moment ago
     slide: float = 0.4  # m/s, of sliding
     slide_time: float = 0.1  # s, over which sliding stays the same
     slip_rate: float = 0.05  # 1/s, at which wheels lose grip
@@ -142,7 +141,7 @@ def judge(x: Array, P: Array, n: Noise, mode: Array, rims: Array, dt: float, sli
         slides = grips + wide
         exponent = min(0.5 * apart[i] * apart[i] * (1.0 / grips - 1.0 / slides), 50.0)
         odds = math.sqrt(grips / slides) * math.exp(exponent)
-        if odds < 1.0 and mode[3] > RECENT:
+        if odds < 1.0 and mode[3] > n.recent:
             odds **= min(dt / n.regrip_time, 1.0)
         prior = was * (1.0 - n.grip_rate * dt) + (1.0 - was) * n.slip_rate * dt
         now = prior * odds / (prior * odds + 1.0 - prior)
@@ -216,7 +215,7 @@ def held_of(n: Noise, mode: Array) -> int:
     a wrong bias while a slide may not have been noticed."""
     if n.slip_rate == 0.0:
         return SIZE
-    return CREEP if mode[3] > n.learns else ACCELEROMETER
+    return CREEP if mode[3] > n.recent else ACCELEROMETER
 
 
 def step(
