@@ -116,3 +116,22 @@ def test_a_robot_that_speeds_up_while_its_wheels_stand_slides() -> None:
 
 def test_it_stands_later_on() -> None:
     assert begun([*(0.01 * step for step in range(60)), *[0.1] * 40])[0].has_stood
+
+
+def test_a_robot_that_begins_to_slide_before_its_wheels_turn_does_not_stand() -> None:
+    still, slides = [0.1] * 60, [0.1 + 0.02 * step for step in range(20)]
+    assert begun(still)[0].has_stood
+    beginning, x, _, mode = begun([*still, *slides])
+    assert not beginning.has_stood
+    assert (mode == 1.0).all()
+    assert x[ACCELEROMETER] == 0.0
+
+
+def test_the_beginning_is_over_once_the_wheels_turn() -> None:
+    beginning, x, P, mode = begun([0.1] * 60)
+    for step, rest in enumerate([0.0] + [1.0] * 60):
+        felt = np.array([0.0, 0.0, 0.0, 0.05 * step, 0.0, 9.81])
+        given = Inputs(0.6 + 0.01 * step, 0.01, NOISE, np.zeros(3), np.zeros((2, 3)), felt)
+        assert beginning.step((x, P), mode, given, rest, False)[1] is P
+    assert beginning.has_stood
+    assert not mode.any()

@@ -95,11 +95,12 @@ def rested(x: Array, P: Array, n: Noise, felt: Felt) -> tuple[Array, Array]:
 
 
 class Beginning:
-    """The time until a standstill has shown the IMU's biases: wheels may slide from the start."""
+    """The first standstill, which shows the IMU's biases: until then wheels may slide."""
 
     def __init__(self, creep: Creep) -> None:
         self._creep, self._standstill = creep, Standstill(REST)
         self.has_stood = False
+        self._is_over = False
         self._trusted = 0.0  # s, since the state was doubted last
 
     def step(
@@ -109,24 +110,27 @@ class Beginning:
 
         rest: for how long the wheels have stood [s].
         """
-        if self.has_stood:
+        # As long as the wheels stand the robot may still begin to slide.
+        self._is_over |= self.has_stood and rest <= REST
+        if self._is_over:
             return state
         self._trusted += given.dt
         felt = self._felt(given, rest, is_carried)
-        if felt is not None and felt.is_steady:
+        is_steady = felt is not None and felt.is_steady
+        if felt is not None and is_steady and not self.has_stood:
             at_rest = rested(*state, given.noise, felt)
             if not is_incredible(at_rest[0], given.noise):
                 self.has_stood = True
                 mode[:] = 0.0
                 return at_rest
-        # Wheels stand, and the robot does not.
-        is_sliding = felt is not None and not felt.is_steady
+        is_sliding = felt is not None and not is_steady  # the wheels stand, and the robot does not
         was_sure = is_sliding and mode[:3].min() < SLIDES
-        if was_sure or is_incredible(state[0], given.noise):
+        is_wrong = not self.has_stood and is_incredible(state[0], given.noise)
+        self.has_stood &= not is_sliding
+        if was_sure or is_wrong:
             state = start_again(given.noise, self._creep, state, min(self._trusted, DOUBTED))
-            mode[:] = 1.0
             self._trusted = 0.0
-        elif is_sliding:
+        if is_sliding or is_wrong:
             mode[:] = 1.0
         return state
 
