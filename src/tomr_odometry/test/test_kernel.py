@@ -25,7 +25,9 @@ from tomr_odometry.kernel import (
     judge,
     motion_rows,
     predict,
+    step,
 )
+from tomr_odometry.start import start
 from tomr_power_model.robot import shipped_robot
 from tomr_power_model.slides.body import body_of
 
@@ -109,6 +111,18 @@ def test_a_wheel_known_to_slide_slides_whatever_its_rim_does() -> None:
     assert mode[[0, 2]].max() < 1e-3
     loose = doubt.diagonal()[RIM : RIM + 3] - 1e-8
     assert loose == pytest.approx((mode[:3] - 1e-6) * NOISE.slide**2 * NOISE.slide_time * DT)
+
+
+def test_contacts_that_chatter_slow_a_robot_down_by_what_is_felt_on_average() -> None:
+    (x, P), mode = start(NOISE, Creep()), np.full(4, 1.0)
+    x[VX] = 0.5
+    slid, used, rims = np.ones(3, dtype=bool), np.zeros(3), np.zeros((2, 3))
+    rims[1] = 1e-9
+    for k in range(30):
+        force = -2.0 + (4.5 if k % 2 else -4.5)
+        felt = np.array([0.0, 0.0, 0.0, force, 0.0, 9.81])
+        P = step(x, P, BODY, NOISE, mode, used, DT, rims, felt, slid)
+    assert x[VX] == pytest.approx(0.5 - 0.3 * 2.0, abs=0.06)
 
 
 @pytest.mark.parametrize(("since", "counted"), [(0.0, 1.0), (0.199, 1.0), (0.201, 1.0 / 3.0)])

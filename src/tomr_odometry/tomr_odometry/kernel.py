@@ -63,7 +63,8 @@ class Noise(NamedTuple):
     walk_slope: float = 2e-4
     accelerometer: float = 0.06  # m/s^2
     gyro: float = 4e-3  # rad/s
-    gate: float = 100.0  # squared normalised innovation of the IMU, beyond which it counts less
+    gate: float = 1000.0  # squared normalised innovation of the IMU, beyond which it counts less:
+    # far out, as contacts that chatter are felt one way and the other and have to cancel
     jitter: float = 1e-4  # s, of the encoders' stamps
     rim: float = 3e-5  # m, of a rim besides the quantum
 
