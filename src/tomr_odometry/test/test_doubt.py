@@ -5,6 +5,7 @@ import pytest
 from odometry_drives import ROBOT, START
 
 from tomr_odometry.estimator import SlipOdometry
+from tomr_odometry.hindsight import Inputs
 from tomr_odometry.kernel import ACCELEROMETER, GYRO, RIM, VX
 
 SECOND = 1_000_000_000
@@ -88,10 +89,9 @@ def test_biases_that_no_imu_has_are_a_start_that_misled(has_stood: bool) -> None
 
 def test_an_imu_alone_drifts_by_what_its_bias_is_off_by() -> None:
     core = standing(has_imu=True)
-    aided, off = core._aided, float(np.sqrt(core._P[ACCELEROMETER, ACCELEROMETER]))
-    P = core._P
+    aided, off, P = core._aided, 0.02, core._P
     for _ in range(400):
-        P = aided._go_adrift(P, is_sliding=True, dt=0.01)
+        P = aided._go_adrift(P, is_adrift=True, off=0.02, dt=0.01)
     assert aided.drift == pytest.approx(4.0 * off)
     assert np.sqrt(P[0, 0] - core._P[0, 0]) == pytest.approx(0.5 * off * 4.0**2, rel=0.01)
     assert np.sqrt(P[1, 1] - core._P[1, 1]) == pytest.approx(0.5 * off * 4.0**2, rel=0.01)
@@ -99,14 +99,33 @@ def test_an_imu_alone_drifts_by_what_its_bias_is_off_by() -> None:
     assert np.sqrt(item.twist_covariance[1, 1]) == pytest.approx(4.0 * off, rel=0.05)
     assert np.sqrt(item.twist_covariance[2, 2]) < 0.05
     for _ in range(50):  # a moment of grip may be none
-        P = aided._go_adrift(P, is_sliding=False, dt=0.01)
+        P = aided._go_adrift(P, is_adrift=False, off=0.02, dt=0.01)
     assert aided.drift == pytest.approx(2.5 * off)
     for _ in range(100):
-        P = aided._go_adrift(P, is_sliding=False, dt=0.01)
+        P = aided._go_adrift(P, is_adrift=False, off=0.02, dt=0.01)
     assert aided.drift == 0.0
-    assert aided._go_adrift(P, is_sliding=False, dt=0.01) is P
-    again = aided._go_adrift(P, is_sliding=True, dt=0.01)
+    assert aided._go_adrift(P, is_adrift=False, off=0.02, dt=0.01) is P
+    again = aided._go_adrift(P, is_adrift=True, off=0.02, dt=0.01)
     assert again[0, 0] - P[0, 0] == pytest.approx((1e-4 * off) ** 2, rel=0.01)
+
+
+@pytest.mark.parametrize("is_known", [True, False])
+@pytest.mark.parametrize("is_sliding", [True, False])
+def test_until_a_standstill_what_is_taken_for_a_bias_may_be_a_motion(
+    is_known: bool, is_sliding: bool
+) -> None:
+    core = standing(has_imu=True)
+    x, P, mode = core._x, core._P, np.full(4, float(is_sliding))
+    x[ACCELEROMETER : ACCELEROMETER + 2] = 0.3, -0.4
+    force = np.array([0.0, 0.0, 0.0, 0.3, -0.4, 9.81])
+    ways = np.stack([x[RIM : RIM + 3], np.full(3, 1e-9)])
+    noise = core.settings.noise
+    given = Inputs(1e-9 * core._time, 0.01, noise, np.zeros(3), ways, force)
+    core._aided._calm = -10.0  # it may be anything but a stand
+    core._aided.step(x, P, mode, given, core._rims, is_known=is_known)
+    off = np.sqrt(P[ACCELEROMETER, ACCELEROMETER])
+    expected = 0.01 * (off if is_known else 0.5) if is_sliding or not is_known else 0.0
+    assert core._aided.drift == pytest.approx(expected, rel=0.05)
 
 
 def test_a_robot_that_stands_is_not_adrift() -> None:

@@ -75,16 +75,20 @@ class Aided:
                 P = self._stand(x, P, mode)
         is_sliding = bool(mode[:3].max() > SLIDES)
         self._lost = self._lost + given.dt if is_sliding else 0.0
-        return self._go_adrift(P, is_sliding, given.dt)
+        # As long as no standstill has shown the biases, what is taken for one may be a motion.
+        biases = x[ACCELEROMETER : ACCELEROMETER + 2]
+        off = float(P[ACCELEROMETER, ACCELEROMETER]) + (0.0 if is_known else float(biases @ biases))
+        return self._go_adrift(P, is_sliding or not is_known, math.sqrt(off), given.dt)
 
-    def _go_adrift(self, P: Array, is_sliding: bool, dt: float) -> Array:
-        """While wheels slide the accelerometer's bias adds up; returns the covariance.
+    def _go_adrift(self, P: Array, is_adrift: bool, off: float, dt: float) -> Array:
+        """While wheels slide, what the bias is off by adds up; returns the covariance.
 
         A wheel that slid and seems to grip makes the filter sure of the velocity. It may as well be
         one that slides along just as fast as the filter is wrong, so this stands beside it.
+        off: what the accelerometer's bias may be off by, standard deviation [m/s^2].
         """
-        self._adrift = max(self._adrift + (dt if is_sliding else -_REGAINED * dt), 0.0)
-        self.drift = self._adrift * math.sqrt(P[ACCELEROMETER, ACCELEROMETER])
+        self._adrift = max(self._adrift + (dt if is_adrift else -_REGAINED * dt), 0.0)
+        self.drift = self._adrift * off
         if self._adrift == 0.0:
             self._spread = 0.0
             return P

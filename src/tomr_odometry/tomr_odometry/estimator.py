@@ -342,13 +342,14 @@ class SlipOdometry:
         )
 
     def _unseen(self) -> Array:
-        """Variance of a velocity that nothing but the wheels shows."""
+        """Variance of a velocity that nothing but the wheels shows, or an IMU alone."""
+        adrift = self._aided.drift**2 * _ALONG
         if self._is_aided and self._beginning.has_stood:
-            return self._aided.drift**2 * _ALONG
+            return adrift
         noise, travel = self._unsure, math.hypot(*self._travel)
         # What makes the pose spread as it does where slides last so long.
         unseen = np.square((noise.way, noise.way, noise.turn)) * travel**2 / _SLIDES_ON
-        return self._by_power.covariance + np.diag(unseen)
+        return self._by_power.covariance + np.diag(unseen) + adrift
 
     def _sensors(self, tick: int) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:
         """Sensors that are silent, and what is used of each."""
