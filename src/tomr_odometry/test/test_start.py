@@ -109,7 +109,7 @@ def test_a_robot_that_speeds_up_while_its_wheels_stand_slides() -> None:
     assert x[ACCELEROMETER] == 0.0
     # The velocity may be wrong altogether, since the start.
     assert math.sqrt(P[VX, VX]) == pytest.approx(0.32, rel=0.01)
-    assert math.sqrt(P[X, X]) == pytest.approx(0.32 * 0.25, rel=0.1)
+    assert math.sqrt(P[X, X]) == pytest.approx(0.32 * 0.44, rel=0.05)
     # It is doubted once: what is learnt since then stays.
     assert begun([*growing, 0.8])[2] == pytest.approx(P)
 
@@ -119,8 +119,10 @@ def test_it_stands_later_on() -> None:
 
 
 def test_a_robot_that_begins_to_slide_before_its_wheels_turn_does_not_stand() -> None:
-    still, slides = [0.1] * 60, [0.1 + 0.02 * step for step in range(20)]
+    still, slides = [0.1] * 60, [0.1 + 0.02 * step for step in range(40)]
     assert begun(still)[0].has_stood
+    # A robot that sets off feels that before coarse encoders count.
+    assert begun([*still, *slides[:20]])[0].has_stood
     beginning, x, _, mode = begun([*still, *slides])
     assert not beginning.has_stood
     assert (mode == 1.0).all()

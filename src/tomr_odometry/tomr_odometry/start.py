@@ -30,6 +30,7 @@ from tomr_odometry.standstill import Felt, Standstill
 from tomr_power_model.robot import WHEELS
 
 REST = 0.3  # s of standstill, in which an IMU shows its biases
+_ONSET = 0.2  # s, in which coarse encoders count as well if the wheels begin to turn
 DOUBTED = 5.0  # s, over which a velocity that turns out wrong is taken to have been so at most
 _INCREDIBLE = 2.5  # standard deviations of a bias
 
@@ -101,6 +102,7 @@ class Beginning:
         self._creep, self._standstill = creep, Standstill(REST)
         self.has_stood = False
         self._is_over = False
+        self._unsteady = 0.0  # s, for which the robot has not felt the same while its wheels stand
         self._trusted = 0.0  # s, since the state was doubted last
 
     def step(
@@ -123,7 +125,8 @@ class Beginning:
                 self.has_stood = True
                 mode[:] = 0.0
                 return at_rest
-        is_sliding = felt is not None and not is_steady  # the wheels stand, and the robot does not
+        self._unsteady = self._unsteady + given.dt if felt is not None and not is_steady else 0.0
+        is_sliding = self._unsteady > _ONSET  # the wheels stand, and the robot does not
         was_sure = is_sliding and mode[:3].min() < SLIDES
         is_wrong = not self.has_stood and is_incredible(state[0], given.noise)
         self.has_stood &= not is_sliding
