@@ -98,6 +98,9 @@ def test_an_imu_alone_drifts_by_what_its_bias_is_off_by() -> None:
     item = core._estimate(core._time)
     assert np.sqrt(item.twist_covariance[1, 1]) == pytest.approx(4.0 * off, rel=0.05)
     assert np.sqrt(item.twist_covariance[2, 2]) < 0.05
+    core._beginning.has_stood = False
+    unsure = core._estimate(core._time)
+    assert np.sqrt(unsure.twist_covariance[1, 1]) == pytest.approx(4.0 * off, rel=0.05)
     for _ in range(50):  # a moment of grip may be none
         P = aided._go_adrift(P, is_adrift=False, off=0.02, dt=0.01)
     assert aided.drift == pytest.approx(2.5 * off)

@@ -47,6 +47,7 @@ def test_a_standstill_shows_the_biases_whatever_was_made_of_them_before() -> Non
     assert P[ACCELEROMETER, ACCELEROMETER] == pytest.approx(off)
     assert P[VX, VX] == pytest.approx(NOISE.start_twist**2)
     assert P[ACCELEROMETER, VX] == 0.0
+    assert P[AX, AX] == pytest.approx(NOISE.accelerometer**2 / 25)
     np.linalg.cholesky(P + 1e-12 * np.eye(len(P)))
 
 
@@ -137,3 +138,20 @@ def test_the_beginning_is_over_once_the_wheels_turn() -> None:
         assert beginning.step((x, P), mode, given, rest, False)[1] is P
     assert beginning.has_stood
     assert not mode.any()
+
+
+def test_a_robot_that_stands_is_not_doubted() -> None:
+    beginning, x, P, mode = begun([0.1] * 60)
+    x[GYRO] = 0.1
+    felt = np.array([0.0, 0.0, 0.0, 0.1, 0.0, 9.81])
+    given = Inputs(0.6, 0.01, NOISE, np.zeros(3), np.zeros((2, 3)), felt)
+    assert beginning.step((x, P), mode, given, 1.0, False)[1] is P
+
+
+def test_what_was_felt_before_somebody_carried_it_says_nothing() -> None:
+    beginning, state, mode = Beginning(Creep()), start(NOISE, Creep()), np.zeros(4)
+    felt = np.array([0.0, 0.0, 0.0, 0.1, 0.0, 9.81])
+    for step in range(44):
+        given = Inputs(0.01 * step, 0.01, NOISE, np.zeros(3), np.zeros((2, 3)), felt)
+        state = beginning.step(state, mode, given, 1.0, 18 <= step < 20)
+    assert not beginning.has_stood
