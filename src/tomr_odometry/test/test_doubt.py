@@ -131,6 +131,21 @@ def test_until_a_standstill_what_is_taken_for_a_bias_may_be_a_motion(
     assert core._aided.drift == pytest.approx(expected, rel=0.05)
 
 
+@pytest.mark.parametrize(("unknown", "drift"), [(4.98, 0.005), (4.995, 0.0)])
+def test_that_is_doubted_for_so_long_only(unknown: float, drift: float) -> None:
+    core = standing(has_imu=True)
+    x, P, aided = core._x, core._P, core._aided
+    x[ACCELEROMETER] = 0.5
+    ways = np.stack([x[RIM : RIM + 3], np.full(3, 1e-9)])
+    force = np.array([0.0, 0.0, 0.0, 0.5, 0.0, 9.81])
+    given = Inputs(1e-9 * core._time, 0.01, core.settings.noise, np.zeros(3), ways, force)
+    aided._unknown = unknown
+    aided.step(x, P, np.zeros(4), given, core._rims, is_known=False)
+    assert aided.drift == pytest.approx(drift, rel=0.05)
+    aided.step(x, P, np.zeros(4), given, core._rims, is_known=True)
+    assert aided._unknown == 0.0
+
+
 def test_a_robot_that_stands_is_not_adrift() -> None:
     core = standing(has_imu=True)
     core._aided._adrift = 4.0

@@ -102,6 +102,13 @@ def test_a_bias_that_no_imu_has_is_no_standstill() -> None:
     assert not is_incredible(x, NOISE)
 
 
+@pytest.mark.parametrize(("rest", "has_stood"), [(2.9, False), (3.1, True)])
+def test_a_robot_that_feels_it_for_long_stands_on_a_slope(rest: float, has_stood: bool) -> None:
+    beginning, x, _, _ = begun([0.5] * 40, rest=rest)
+    assert beginning.has_stood == has_stood
+    assert x[ACCELEROMETER] == pytest.approx(0.5 if has_stood else 0.0)
+
+
 def test_a_robot_that_speeds_up_while_its_wheels_stand_slides() -> None:
     growing = [0.01 * step for step in range(60)]
     beginning, x, P, mode = begun(growing)

@@ -49,6 +49,7 @@ class Aided:
         self._felt = [0.0, 0.0, 0.0]  # m/s^2, m/s^2, rad/s, less what the robot would feel at rest
         self._calm = 0.0  # s
         self._lost = 0.0  # s, since all wheels gripped
+        self._unknown = 0.0  # s, for which the biases have not been known
         self._adrift = 0.0  # s, for which the velocity has been the accelerometer's
         self._spread = 0.0  # m, what its bias made of that
         self.drift = 0.0  # m/s, the same of the velocity
@@ -75,10 +76,12 @@ class Aided:
                 P = self._stand(x, P, mode)
         is_sliding = bool(mode[:3].max() > SLIDES)
         self._lost = self._lost + given.dt if is_sliding else 0.0
-        # As long as no standstill has shown the biases, what is taken for one may be a motion.
+        # Until a standstill has shown the biases, what is taken for one may be a motion.
+        self._unknown = 0.0 if is_known else self._unknown + given.dt
         biases = x[ACCELEROMETER : ACCELEROMETER + 2]
         off = float(P[ACCELEROMETER, ACCELEROMETER]) + (0.0 if is_known else float(biases @ biases))
-        return self._go_adrift(P, is_sliding or not is_known, math.sqrt(off), given.dt)
+        is_adrift = is_sliding or 0.0 < self._unknown < DOUBTED
+        return self._go_adrift(P, is_adrift, math.sqrt(off), given.dt)
 
     def _go_adrift(self, P: Array, is_adrift: bool, off: float, dt: float) -> Array:
         """While wheels slide, what the bias is off by adds up; returns the covariance.

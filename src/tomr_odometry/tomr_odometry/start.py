@@ -30,6 +30,9 @@ from tomr_odometry.standstill import Felt, Standstill
 from tomr_power_model.robot import WHEELS
 
 REST = 0.3  # s of standstill, in which an IMU shows its biases
+_SLOPING = (
+    3.0  # s of standstill, after which what no bias would do is a slope: no slide lasts so long
+)
 _ONSET = 0.2  # s, in which coarse encoders count as well if the wheels begin to turn
 DOUBTED = 5.0  # s, over which a velocity that turns out wrong is taken to have been so at most
 _INCREDIBLE = 2.5  # standard deviations of a bias
@@ -121,7 +124,7 @@ class Beginning:
         is_steady = felt is not None and felt.is_steady
         if felt is not None and is_steady and not self.has_stood:
             at_rest = rested(*state, given.noise, felt)
-            if not is_incredible(at_rest[0], given.noise):
+            if rest > _SLOPING or not is_incredible(at_rest[0], given.noise):
                 self.has_stood = True
                 mode[:] = 0.0
                 return at_rest
