@@ -57,6 +57,19 @@ def test_an_imu_shows_its_biases_where_the_robot_stands(
     assert (item.twist_covariance[0, 0] > 0.3) != is_sure
 
 
+@pytest.mark.parametrize("rate", [10, 30])
+def test_seldom_encoders_show_a_standstill_as_well(rate: int) -> None:
+    core = SlipOdometry(ROBOT)
+    for sample in range(100):
+        stamp = START + 10_000_000 * sample
+        core.imu(stamp, (0.0, 0.0, 0.01, 0.1, 0.0, 9.81))
+        if sample % (100 // rate) == 0:
+            core.encoders(stamp, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        list(core.due())
+    assert core._beginning.has_stood
+    assert core._x[ACCELEROMETER] == pytest.approx(0.1, abs=0.01)
+
+
 @pytest.mark.parametrize(("seconds", "spread"), [(3.0, 3.0), (-4.0, 4.0), (100.0, 10.0)])
 def test_how_far_a_robot_came_in_a_leap_of_the_clock(seconds: float, spread: float) -> None:
     core = standing(has_imu=True)

@@ -12,7 +12,7 @@ from tomr_odometry.kernel import Noise
 Array = NDArray[np.float64]
 _PLACES = [2, 3, 4]  # of the yaw rate and of the specific forces along the floor
 _APART = 4.0  # standard deviations
-_FEWEST = 6  # samples
+_FEWEST = 3  # samples, as of encoders of 10 Hz
 
 
 class Felt(NamedTuple):

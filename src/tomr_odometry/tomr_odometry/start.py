@@ -30,9 +30,7 @@ from tomr_odometry.standstill import Felt, Standstill
 from tomr_power_model.robot import WHEELS
 
 REST = 0.3  # s of standstill, in which an IMU shows its biases
-_SLOPING = (
-    3.0  # s of standstill, after which what no bias would do is a slope: no slide lasts so long
-)
+_SLOPING = 3.0  # s of standstill: no slide lasts so long, and what no bias would do is a slope
 _ONSET = 0.2  # s, in which coarse encoders count as well if the wheels begin to turn
 DOUBTED = 5.0  # s, over which a velocity that turns out wrong is taken to have been so at most
 _INCREDIBLE = 2.5  # standard deviations of a bias
