@@ -4,26 +4,31 @@
 
 The drives of slips_practice that have no IMU, by one that knows which wheels slide when, the
 floor's traction, slope and drag and the robot's parameters: what it still lacks is what pushes and
-how slides begin. Printed are end errors and velocity errors while wheels slide, over those of wheel
-odometry, and the distance of slip ratios to the true ones within 0.1 s.
+how slides begin. Printed are its end errors and velocity errors while wheels slide, over those of
+wheel odometry, and the distance of slip ratios to the true ones within 0.1 s; beside them those of
+the slip odometry without an IMU by the same measures, every drive counting alike.
 """
 
 import argparse
 import json
+import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 from odometry import ratio, recordings
-from slippery import slip_error
+from slippery import slip_error, speed_error, true_twists
+from tqdm import tqdm
 
+from tomr_odometry.estimate import Estimate
 from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.offline import estimates
 from tomr_odometry.reference import reference_of
 from tomr_odometry.settings import OdometrySettings
+from tomr_odometry.summary import end_error, estimated_path
 from tomr_power_model.cli import run_main
 from tomr_power_model.messages.types import ODOMETRY
 from tomr_power_model.recordings import open_recording
@@ -97,50 +102,57 @@ def _end(start: Array, twists: Array, times: Array) -> Array:
     return pose
 
 
-def _real(poses: Array, times: Array) -> Array:
-    """Twists in base_link by differences of poses."""
-    step = (
-        np.diff(poses, axis=0, prepend=poses[:1]) / np.diff(times, prepend=times[0] - 1.0)[:, None]
-    )
-    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    return np.stack(
-        [c * step[:, 0] + s * step[:, 1], c * step[:, 1] - s * step[:, 0], step[:, 2]], 1
-    )
+@frozen
+class Errors:
+    """Of the end [m], of the velocity while wheels slide [m/s], of slip ratios."""
+
+    end: float
+    speed: float
+    slip: float
 
 
-def bound_of(bag: Path, truth: Path, robot: Robot) -> dict[str, float]:
-    """Errors of a drive: of the end [m], of the velocity while sliding [m/s], of slip ratios."""
-    known = json.loads(truth.read_text())
+def _streamed(bag: Path, robot: Robot, use_power: bool) -> list[Estimate]:
+    core = SlipOdometry(robot, OdometrySettings(use_imu=False, use_power=use_power))
     with open_recording(bag) as recording:
-        core = SlipOdometry(robot, OdometrySettings(use_imu=False, use_power=False))
-        items = list(estimates(recording, robot, core, Complaints()))
+        return list(estimates(recording, robot, core, Complaints()))
+
+
+def errors_of(bag: Path, truth: Path, robot: Robot) -> tuple[dict[str, Errors], float]:
+    """Of wheel odometry, of the slip odometry without an IMU and of the bound; way driven [m]."""
+    known = json.loads(truth.read_text())
+    plain, ours = (_streamed(bag, robot, use_power) for use_power in (False, True))
     with open_recording(truth.parent / "truth_odom" / bag.name) as recording:
         (topic,) = [name for name, kind in recording.topics.items() if kind == ODOMETRY]
         true = reference_of(recording, topic)
-    stamps = np.array([item.stamp_ns for item in items], dtype=np.int64)
+    stamps = np.array([item.stamp_ns for item in plain], dtype=np.int64)
     times = np.asarray(1e-9 * (stamps - int(known["t0_ns"])), dtype=np.float64)
     slides = np.stack([_is_within(spells, times) for spells in known["slipping"]], axis=1)
     poses, floor = true.at(stamps), known["floor"]
-    by_wheels, real = np.array([item.twist for item in items]), _real(poses, times)
+    by_wheels, real = np.array([item.twist for item in plain]), true_twists(poses, times)
     ride = Ride(times, by_wheels, slides, floor.get("patch_friction", floor["friction"]))
-    twists = known_twists(ride, float(poses[0, 2]), floor, robot)
-    sliding = slides.any(axis=1)
-    v, v_plain = (
-        float(np.sqrt(np.mean(np.sum((one - real)[sliding, :2] ** 2, axis=1))))
-        for one in (twists, by_wheels)
-    )
+    bound = known_twists(ride, float(poses[0, 2]), floor, robot)
     rows = body_of(robot)[0].rows
-    rims, ground = by_wheels @ rows.T, twists @ rows.T
-    ratios = (rims - ground) / np.maximum(np.maximum(np.abs(rims), np.abs(ground)), 0.02)
-    ends = [_end(poses[0], one, times) - poses[-1] for one in (twists, by_wheels)]
-    return {
-        "ours": float(np.hypot(*ends[0][:2])),
-        "plain": float(np.hypot(*ends[1][:2])),
-        "way": float(np.hypot(*(np.diff(poses[:, :2], axis=0).T)).sum()),
-        "v": v,
-        "v_plain": v_plain,
-        "slip": slip_error(ratios, rims - real @ rows.T, rims),
+    rims, ground = by_wheels @ rows.T, bound @ rows.T
+    larger = np.maximum(np.maximum(np.abs(rims), np.abs(ground)), 0.02)
+    end = float(np.hypot(*(_end(poses[0], bound, times) - poses[-1])[:2]))
+    found = {
+        "wheels": (end_error(estimated_path(plain), true), by_wheels, np.zeros_like(rims)),
+        "ours": (
+            end_error(estimated_path(ours), true),
+            np.array([item.twist for item in ours]),
+            np.array([item.slip for item in ours]),
+        ),
+        "bound": (end, bound, (rims - ground) / larger),
     }
+    errors = {
+        name: Errors(
+            end=end,
+            speed=speed_error(twists - real, np.asarray(slides.any(axis=1))),
+            slip=slip_error(slip, rims - real @ rows.T, rims),
+        )
+        for name, (end, twists, slip) in found.items()
+    }
+    return errors, float(np.hypot(*(np.diff(poses[:, :2], axis=0).T)).sum())
 
 
 def _moved(pose: Array, twist: Array, dt: float) -> Array:
@@ -150,34 +162,41 @@ def _moved(pose: Array, twist: Array, dt: float) -> Array:
     return np.asarray(pose + np.array([c * x - s * y, s * x + c * y, turn]))
 
 
-def bound(is_all: bool) -> int:
-    """How good an estimator without IMU can be that knows the true parameters."""
+def _drives(is_all: bool) -> Iterator[tuple[Path, Path, Robot]]:
     folder = recordings() / "slips_practice"
-    if not folder.exists():
-        print(f"skipped: {folder} is absent; set TOMR_RECORDINGS")
-        return 0
-    rows = []
     for robot in sorted(path.parent for path in folder.glob("slips/*/robot.yaml")):
         known = load_robot(robot / "robot.yaml")
         for bag in sorted((robot / "drives").iterdir()):
             truth = folder / "slips_truth" / robot.name / f"{bag.name}.json"
-            if json.loads(truth.read_text())["imu"] and not is_all:
-                continue
-            rows.append(found := bound_of(bag, truth, known))
-            print(
-                f"{bag.name}: end {found['plain']:.3f} -> {found['ours']:.3f} m on "
-                f"{found['way']:.1f} m; while slipping {found['v_plain']:.3f} -> "
-                f"{found['v']:.3f} m/s; slip ratio {found['slip']:.3f}",
-                flush=True,
+            if is_all or not json.loads(truth.read_text())["imu"]:
+                yield bag, truth, known
+
+
+def bound(is_all: bool) -> int:
+    """How good an estimator without IMU can be that knows the true parameters."""
+    found, ways = [], []
+    for bag, truth, robot in tqdm(list(_drives(is_all)), unit="drive"):
+        errors, way = errors_of(bag, truth, robot)
+        found.append(errors)
+        ways.append(way)
+        for name, item in errors.items():
+            tqdm.write(
+                f"{bag.name}: {name:6} end {item.end:.3f} of {way:.1f} m; while slipping "
+                f"{item.speed:.3f} m/s; slip ratio {item.slip:.3f}"
             )
-    ends = np.array([[row["ours"], row["plain"], row["way"]] for row in rows]).T
-    print(", ".join(f"{name} {value:.3g}" for name, value in ratio(*ends).items()))
-    speeds = np.array([[row["v"], row["v_plain"]] for row in rows])
-    pooled = np.sqrt(np.nanmean(speeds**2, axis=0))
-    slip = np.sqrt(np.mean([row["slip"] ** 2 for row in rows]))
-    print(
-        f"velocity while slipping over plain's: {pooled[0] / pooled[1]:.2f}; slip ratio {slip:.3f}"
-    )
+    if not found:
+        print("skipped: slips_practice is absent; set TOMR_RECORDINGS")
+        return 0
+    plain = np.array([errors["wheels"].end for errors in found])
+    for name in ("ours", "bound"):
+        ends = ratio(np.array([errors[name].end for errors in found]), plain, np.array(ways))
+        speeds = [[errors[one].speed for one in (name, "wheels")] for errors in found]
+        pooled = np.sqrt(np.nanmean(np.square(speeds), axis=0))
+        slip = math.sqrt(np.mean([errors[name].slip ** 2 for errors in found]))
+        print(
+            f"{name}: end {ends['ratio']:.2f} [{ends['low']:.2f}, {ends['high']:.2f}] of plain's, "
+            f"velocity while slipping {pooled[0] / pooled[1]:.2f}, slip ratio {slip:.3f}"
+        )
     return 0
 
 

@@ -154,6 +154,20 @@ def _estimated(bag: Path, robot: Robot, settings: OdometrySettings, seed: int) -
         return list(estimates(recording, robot, core, Complaints()))
 
 
+def true_twists(poses: Array, times: Array) -> Array:
+    """Twists in base_link, of poses in the odometry frame at times [s], (n, 3) each."""
+    change = np.gradient(poses, times, axis=0)
+    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    return np.stack(
+        [c * change[:, 0] + s * change[:, 1], c * change[:, 1] - s * change[:, 0], change[:, 2]], 1
+    )
+
+
+def speed_error(off: Array, slides: NDArray[np.bool_]) -> float:
+    """RMS of what twists are off by along the floor while wheels slide [m/s]; NaN: none does."""
+    return math.sqrt(np.mean(np.sum(off[slides, :2] ** 2, axis=1))) if slides.any() else math.nan
+
+
 def slip_error(ours: Array, sliding: Array, rims: Array) -> float:
     """Distance of ratios to the range of the true ones within 0.1 s, RMS, from 5 cm/s on."""
     larger = np.maximum(np.abs(rims), np.abs(rims - sliding))
@@ -191,20 +205,13 @@ def met(bag: Path, description: Path, use_imu: bool) -> Met:
     known = np.flatnonzero(np.isfinite(poses).all(axis=1))
     poses, ours, at = poses[known], [ours[k] for k in known], {one.stamp_ns: one for one in plain}
     plain = [at.get(item.stamp_ns, plain[-1]) for item in ours]
-    change = np.gradient(poses, 1e-9 * stamps[known], axis=0)
-    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    real = np.stack(
-        [c * change[:, 0] + s * change[:, 1], c * change[:, 1] - s * change[:, 0], change[:, 2]], 1
-    )
+    real = true_twists(poses, np.asarray(1e-9 * stamps[known], dtype=np.float64))
     off = [np.array([item.twist for item in items]) - real for items in (plain, ours)]
     rows = body_of(robot)[0].rows
     sliding = off[0] @ rows.T
-    slides = (np.abs(sliding) > _SLIDING).any(axis=1)
+    slides = np.asarray((np.abs(sliding) > _SLIDING).any(axis=1))
     reported = np.array([item.is_slipping for item in ours])
-    speeds = [
-        math.sqrt(np.mean(np.sum(one[slides, :2] ** 2, axis=1))) if slides.any() else math.nan
-        for one in off
-    ]
+    speeds = [speed_error(one, slides) for one in off]
     return Met(
         ends=(end_error(paths[0], reference), end_error(paths[1], reference)),
         speeds=(speeds[0], speeds[1]),

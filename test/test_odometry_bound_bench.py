@@ -10,6 +10,7 @@ import pytest
 sys.path.append(str(Path(__file__).resolve().parent.parent / "bench"))
 
 from odometry_bound import Ride, known_twists
+from slippery import slip_error, speed_error, true_twists
 
 from tomr_power_model.robot import GRAVITY, shipped_robot
 
@@ -39,3 +40,24 @@ def test_a_slope_pulls_a_robot_that_slides() -> None:
     found = known_twists(Ride(TIMES, np.zeros((6, 3)), slides, 0.0), 0.0, floor, ROBOT)
     assert found[-1, 1] == pytest.approx(0.1 * GRAVITY * math.sin(0.1), rel=0.05)
     assert found[-1, 0] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_true_twists_are_those_of_the_body() -> None:
+    times = 0.01 * np.arange(50)
+    # Along a circle of 2 m to the left, with the nose ahead: 1 m/s and 0.5 rad/s.
+    angle = 0.5 * times + 0.7
+    poses = np.stack([2.0 * np.sin(angle), -2.0 * np.cos(angle), angle], axis=1)
+    found = true_twists(poses, times)
+    assert found[5:-5] == pytest.approx(np.tile([1.0, 0.0, 0.5], (40, 1)), abs=1e-4)
+
+
+def test_speeds_count_while_wheels_slide_and_ratios_within_a_tenth_of_a_second() -> None:
+    off = np.array([[0.3, 0.4, 9.0], [5.0, 5.0, 5.0]])
+    assert speed_error(off, np.array([True, False])) == pytest.approx(0.5)
+    assert math.isnan(speed_error(off, np.array([False, False])))
+    rims, sliding = np.full((60, 3), 0.5), np.zeros((60, 3))
+    sliding[30:] = 0.25
+    late = np.zeros((60, 3))
+    for by, error in ((5, 0.0), (7, 0.5 * math.sqrt(2 / 50))):
+        late[30 + by :], late[: 30 + by] = 0.5, 0.0
+        assert slip_error(late, sliding, rims) == pytest.approx(error, abs=1e-9)
