@@ -85,7 +85,8 @@ def known_twists(ride: Ride, yaw: float, floor: Mapping[str, float], robot: Robo
     for elapsed, by_wheels, slides in steps:
         dt, twist = min(float(elapsed), 0.1), found[-1]
         force = ride.traction * body.load * np.tanh(body.rows @ (by_wheels - twist) / STICKING)
-        twist = _advanced(body, twist, slides * force, *_floor(floor, yaw, body, robot), dt)
+        # Whatever force wheels that grip are given here, holding them takes it back.
+        twist = _advanced(body, twist, force, *_floor(floor, yaw, body, robot), dt)
         grips = body.rows[~slides]
         if len(grips):
             light = np.linalg.solve(body.inertia, grips.T)

@@ -42,6 +42,17 @@ def test_a_slope_pulls_a_robot_that_slides() -> None:
     assert found[-1, 0] == pytest.approx(0.0, abs=1e-6)
 
 
+def test_a_slope_pulls_one_way_however_the_robot_turns() -> None:
+    times, spinning = 0.002 * np.arange(51), np.zeros((51, 3))
+    spinning[:, 2] = 10.0
+    floor = {"friction": 0.0, "slope": 0.1, "azimuth": 0.0, "roller_drag": 0.0}
+    ride = Ride(times, spinning, np.ones((51, 3), dtype=bool), 0.0)
+    vx, vy, _ = known_twists(ride, 0.0, floor, ROBOT)[-1]
+    # After 0.1 s and a radian: downhill is to the right of the nose.
+    assert math.atan2(vy, vx) == pytest.approx(-1.0, abs=0.05)
+    assert math.hypot(vx, vy) == pytest.approx(0.1 * GRAVITY * math.sin(0.1), rel=0.05)
+
+
 def test_true_twists_are_those_of_the_body() -> None:
     times = 0.01 * np.arange(50)
     # Along a circle of 2 m to the left, with the nose ahead: 1 m/s and 0.5 rad/s.
