@@ -30,6 +30,7 @@ from tomr_odometry.reference import reference_of
 from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.summary import end_error, estimated_path
 from tomr_power_model.cli import run_main
+from tomr_power_model.geometry.poses import moved
 from tomr_power_model.messages.types import ODOMETRY
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import GRAVITY, Robot, load_robot
@@ -99,7 +100,7 @@ def known_twists(ride: Ride, yaw: float, floor: Mapping[str, float], robot: Robo
 def _end(start: Array, twists: Array, times: Array) -> Array:
     pose = start
     for twist, dt in zip(twists[1:], np.minimum(np.diff(times), 0.1), strict=True):
-        pose = _moved(pose, twist, float(dt))
+        pose = moved(pose, float(dt) * twist)
     return pose
 
 
@@ -154,13 +155,6 @@ def errors_of(bag: Path, truth: Path, robot: Robot) -> tuple[dict[str, Errors], 
         for name, (end, twists, slip) in found.items()
     }
     return errors, float(np.hypot(*(np.diff(poses[:, :2], axis=0).T)).sum())
-
-
-def _moved(pose: Array, twist: Array, dt: float) -> Array:
-    yaw = pose[2] + 0.5 * dt * twist[2]
-    c, s = np.cos(yaw), np.sin(yaw)
-    x, y, turn = dt * twist
-    return np.asarray(pose + np.array([c * x - s * y, s * x + c * y, turn]))
 
 
 def _drives(is_all: bool) -> Iterator[tuple[Path, Path, Robot]]:

@@ -11,12 +11,12 @@ from odometry_drives import ROBOT, START, Recorded, drive, play
 
 from tomr_odometry.creep import Creep
 from tomr_odometry.estimator import SlipOdometry
-from tomr_odometry.kernel import CREEP
+from tomr_odometry.kernel import CREEP, RIM
 from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.traction import Traction
 from tomr_odometry.unaided import Unaided
 from tomr_power_model.slides.body import body_of
-from tomr_power_model.slides.particles import Pair
+from tomr_power_model.slides.particles import Pair, Slides
 
 Array = NDArray[np.float64]
 SETTINGS = OdometrySettings(creep=Creep((0.5, 1.0, 1.5), 0.0, 0.05))
@@ -141,3 +141,71 @@ def test_powers_count_as_what_they_say_beyond_rolling() -> None:
     assert wheel == 1
     assert forces == pytest.approx((rolls + (2.0 + 4.0) / 2.0, rolls - 90.0 - 1.5), rel=1e-3)
     assert stds == pytest.approx((0.2, 0.4))
+
+
+class Scripted(Watched):
+    """Particles that say what they are told to, and keep what they are asked."""
+
+    def __init__(self, sliding: list[float]) -> None:
+        super().__init__()
+        self.sliding, self.ways, self.settled = sliding, list[tuple[Array, Array]](), 0
+
+    def step(self, dt: float, rims: Array) -> bool:
+        return True
+
+    def slides(self, rims: Array) -> Slides:
+        share, nothing = self.sliding.pop(0), np.zeros(3)
+        return Slides(nothing, np.eye(3), nothing, np.full(3, share), share)
+
+    def part(self, dt: float, rims: Array, rolled: Array, taken: Array, keep: float) -> None:
+        self.ways.append((rolled, taken))
+
+    def settle(self) -> Array:
+        self.settled += 1
+        return np.array([0.1 * self.settled, 0.0, 0.0])
+
+
+def test_the_pose_is_corrected_while_wheels_slide_and_for_some_time_after() -> None:
+    """Not before: where wheels grip the pose is theirs."""
+    body, radius = body_of(ROBOT)
+    ahead = np.array([1.0, 0.0, 0.0])
+    by_power, particles = Unaided(ROBOT, body, radius), Scripted([0.2, 0.9, *[0.0] * 120])
+    by_power._particles = particles  # type: ignore[assignment]
+    corrected = []
+    for _ in range(122):
+        by_power.step(0.05, np.zeros(3), body.rows @ ahead, [])
+        corrected.append(bool(by_power.correction.any()))
+    assert corrected[0] is False
+    assert 98 <= sum(corrected) == particles.settled <= 101  # 5 s
+    # What was rolled; taken was the same until they said that it slides, then nothing.
+    taken = [(rolled[0], way[0]) for rolled, way in particles.ways[1:4]]
+    assert np.array(taken) == pytest.approx(np.array([[0.05, 0.05], [0.05, 0.0], [0.05, 0.05]]))
+    by_power.rest()
+    assert not by_power.correction.any()
+
+
+def test_a_correction_moves_the_pose_along_its_heading() -> None:
+    core = SlipOdometry(ROBOT)
+    for sample in range(4):
+        core.encoders(START + 10_000_000 * sample, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        list(core.due())
+    before = core._x[:3].copy()
+    core._x[2] += 0.5 * np.pi
+    core._by_power = SimpleNamespace(  # type: ignore[assignment]
+        slid=np.zeros(3), rest=lambda: None, probability=np.zeros(3),
+        correction=np.array([0.3, 0.1, 0.2]),
+    )  # fmt: skip
+    core._heard["encoders"] = core._time
+    core._step(core._time + 10_000_000, np.stack([core._x[RIM : RIM + 3], np.full(3, 1e-8)]))
+    off = 0.5 * np.pi + 0.1  # half of what it turned
+    way = [0.3 * np.cos(off) - 0.1 * np.sin(off), 0.3 * np.sin(off) + 0.1 * np.cos(off)]
+    assert core._x[:2] - before[:2] == pytest.approx(way, abs=1e-6)
+    assert core._x[2] - before[2] == pytest.approx(0.5 * np.pi + 0.2, abs=1e-6)
+
+
+def test_power_alone_says_sooner_that_a_wheel_slides() -> None:
+    core = SlipOdometry(ROBOT)
+    core._by_power.probability = core._mode[:3] = np.array([0.4, 0.2, 0.6])
+    assert core._slides.tolist() == [True, False, True]
+    core._is_aided = True
+    assert core._slides.tolist() == [False, False, True]

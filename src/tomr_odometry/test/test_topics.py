@@ -78,7 +78,7 @@ def test_slip_creep_and_silent_sensors_are_said_apart(resting: Estimate) -> None
     well = evolve(resting, missing=(), stamp_ns=START)
     creeping = evolve(well, creeping=np.array([0.0, 0.03, 0.0]), sliding=np.array([0.0, 0.03, 0.0]))
     lost = evolve(
-        creeping, probability=np.array([0.0, 0.9, 0.0]), sliding=np.array([0.0, 0.2, 0.0])
+        creeping, slides=np.array([False, True, False]), sliding=np.array([0.0, 0.2, 0.0])
     )
     silent = evolve(well, missing=("imu/data",))
     for item, level, words in (
@@ -94,7 +94,7 @@ def test_slip_creep_and_silent_sensors_are_said_apart(resting: Estimate) -> None
 
 
 def test_spells_of_slip_that_are_near_are_one(resting: Estimate) -> None:
-    slides = {"probability": np.array([0.9, 0.0, 0.0]), "sliding": np.array([0.2, 0.0, 0.0])}
+    slides = {"slides": np.array([True, False, False]), "sliding": np.array([0.2, 0.0, 0.0])}
     slipping = {0.2, 0.4, 1.0, 1.2}
     items = [
         evolve(resting, stamp_ns=START + round(1e9 * t), **(slides if t in slipping else {}))

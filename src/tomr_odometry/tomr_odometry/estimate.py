@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from tomr_odometry.grip import Grid
 
 Array = NDArray[np.float64]
-SLIDES = 0.5  # probability from which a wheel is said to slide
+SLIDES = 0.5  # probability from which a wheel is said to slide that an IMU shows
+SLIDES_UNAIDED = 0.3  # and without one: as many slides are missed then as are none
 _SLOW = 0.02  # m/s: sliding slower than that is none
 
 
@@ -23,6 +24,7 @@ class Estimate:
     slip: Array  # ratio of each wheel, signed
     sliding: Array  # m/s, rim less ground
     probability: Array  # that each wheel slides
+    slides: NDArray[np.bool_]  # which wheels are said to slide
     creeping: Array  # the part of it that grows with traction; the rest is loss of traction
     traction: Array  # N, NaN where not known
     traction_std: Array
@@ -48,7 +50,7 @@ class Estimate:
     @property
     def loses_traction(self) -> NDArray[np.bool_]:
         """Which wheels slide beyond their limit."""
-        return (self.probability > SLIDES) & (np.abs(self.sliding) > _SLOW)
+        return self.slides & (np.abs(self.sliding) > _SLOW)
 
     @property
     def losing(self) -> Array:

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomr_odometry.aided import Aided
-from tomr_odometry.estimate import SLIDES, Estimate
+from tomr_odometry.estimate import SLIDES, SLIDES_UNAIDED, Estimate
 from tomr_odometry.grip import Available, Floor
 from tomr_odometry.hindsight import Inputs
-from tomr_odometry.kernel import AX, CREEP, GYRO, RIM, SLOPE, VX, WZ, YAW, step
+from tomr_odometry.kernel import AX, CREEP, GYRO, RIM, SLOPE, VX, WZ, step
 from tomr_odometry.lifted import Lifted
 from tomr_odometry.rims import Rims
 from tomr_odometry.settings import OdometrySettings
@@ -19,6 +19,7 @@ from tomr_odometry.start import Beginning, start
 from tomr_odometry.traction import Traction, Tractions
 from tomr_odometry.unaided import FEWEST_POWERS, Unaided
 from tomr_power_model.drive.sources import PowerReading
+from tomr_power_model.geometry.poses import moved
 from tomr_power_model.model.encoder_flaws import EncoderFlaws
 from tomr_power_model.model.encoders import RecentStamps
 from tomr_power_model.model.ticks import Arrival, TickClock, to_ns
@@ -212,13 +213,14 @@ class SlipOdometry:
         inertial = _mean(self._inertial)
         self._inertial, self._tractive = [], []
         self._advance(time, dt, ways, inertial)
+        self._x[:3] = moved(self._x[:3], self._by_power.correction)
         self._time = time
         self._rims.passes(self._body.rows @ self._x[VX : WZ + 1])
         if time < self._lifted.until:
             lost = _CARRIED_SPEED**2 * dt
             for place in (0, 1, 2, VX, VX + 1, WZ):
                 self._P[place, place] += lost
-        sliding = self._probability > SLIDES
+        sliding = self._slides
         self._available.take(self._forces, self._force_std, sliding, dt)
         self.floor.take(self._x[:3], sliding, self._forces / self._body.load)
 
@@ -226,6 +228,11 @@ class SlipOdometry:
     def _probability(self) -> Array:
         """That each wheel slides."""
         return self._mode[:3] if self._is_aided else self._by_power.probability
+
+    @property
+    def _slides(self) -> NDArray[np.bool_]:
+        """Which wheels are said to slide."""
+        return self._probability > (SLIDES if self._is_aided else SLIDES_UNAIDED)
 
     def _ask_power(self, dt: float) -> None:
         """What the contacts slid in a step without an IMU."""
@@ -287,17 +294,12 @@ class SlipOdometry:
         ahead = 1e-9 * (tick - self._time)
         dt = min(ahead, _AHEAD)
         twist = x[VX : WZ + 1] + x[AX : AX + 3] * min(max(dt, 0.0), 0.05)
-        moved = twist * dt
-        yaw = x[YAW] + 0.5 * moved[2]
-        c, s = math.cos(yaw), math.sin(yaw)
-        pose = x[:3].copy()
-        pose += (c * moved[0] - s * moved[1], s * moved[0] + c * moved[1], moved[2])
+        pose = moved(x[:3], twist * dt)
         silent = 1e-9 * (tick - self._rims.time) - _AHEAD
         # Encoders are silent: anything may happen.
         lost = (_LOST_SPEED * max(silent, 0.0)) ** 2 * _EACH
         creeps = x[CREEP] * self.settings.creep.shape(self._used) * math.hypot(*self._travel)
-        is_sliding = self._probability > SLIDES
-        sliding, slip = self._slip(body.rows @ twist, creeps, is_sliding)
+        sliding, slip = self._slip(body.rows @ twist, creeps)
         missing, sensors = self._sensors(tick)
         is_due = self.settings.publish_floor and tick % _GRID_NS < self.settings.ticks.period
         return Estimate(
@@ -310,6 +312,7 @@ class SlipOdometry:
             sliding=sliding,
             creeping=creeps,
             probability=self._probability.copy(),
+            slides=self._slides,
             traction=self._forces.copy(),
             traction_std=self._force_std.copy(),
             available=self._available.interval,
@@ -321,14 +324,12 @@ class SlipOdometry:
             learnt=self._learnt(),
         )
 
-    def _slip(
-        self, ground: Array, creeps: Array, is_sliding: NDArray[np.bool_]
-    ) -> tuple[Array, Array]:
+    def _slip(self, ground: Array, creeps: Array) -> tuple[Array, Array]:
         """How fast the rims turn over the ground [m/s], and the slip ratios.
 
         With an IMU the twist shows it, of wheels that slide too slowly to be noticed as well.
         """
-        rim = self._rims.speed
+        rim, is_sliding = self._rims.speed, self._slides
         if self._is_aided:
             sliding = self._rims.sliding
             is_seen = is_sliding | (np.abs(sliding) > np.maximum(_SEEN, 2.0 * self._rims.blur))

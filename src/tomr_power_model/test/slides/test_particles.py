@@ -336,3 +336,62 @@ def test_a_steep_slope_explains_less_of_what_is_felt_than_a_gentle_one() -> None
         assert 0.05 < changed.mean() < 0.15  # 0.2 a second
         assert particles._weight[changed] == pytest.approx(share * before[changed])
         assert np.abs(particles._slope[changed].mean(axis=0) - felt).max() < 0.1
+
+
+def test_particles_carry_where_they_have_the_body() -> None:
+    """Half of them hold that it stood while its rims went on by 0.1 m and it was taken to roll."""
+    ahead = np.array([1.0, 0.0, 0.0])
+    particles = _alike(1.0, ahead)
+    n = len(particles._twist)
+    particles._twist[: n // 2] = 0.0
+    way = 0.1 * ahead
+    particles.part(0.1, BODY.rows @ ahead, way, way, keep=1.0)
+    assert particles.settle() == pytest.approx([-0.05, 0.0, 0.0])
+    assert particles.settle() == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    # Those that hold that it stood turn out to be right: the rest of the way comes off.
+    particles._weight[:] = np.where(np.arange(n) < n // 2, 2.0 / n, 0.0)
+    assert particles.settle() == pytest.approx([-0.05, 0.0, 0.0])
+
+
+def test_what_particles_are_apart_is_forgotten() -> None:
+    ahead = np.array([1.0, 0.0, 0.0])
+    particles = _alike(1.0, np.zeros(3))
+    particles.part(0.1, BODY.rows @ ahead, 0.1 * ahead, 0.1 * ahead, keep=1.0)
+    particles._twist[:] = ahead
+    particles.part(0.1, BODY.rows @ ahead, 0.1 * ahead, 0.1 * ahead, keep=0.5)
+    assert particles.settle() == pytest.approx([-0.05, 0.0, 0.0])
+
+
+def test_a_turn_that_was_a_slide_turns_the_way_since() -> None:
+    """A robot that did not turn by 90 degrees has gone ahead, not to its left."""
+    turn, ahead = np.array([0.0, 0.0, 0.5 * math.pi]), np.array([1.0, 0.0, 0.0])
+    particles = _alike(1.0, np.zeros(3))
+    particles.part(1.0, BODY.rows @ turn, turn, turn, keep=1.0)
+    particles._twist[:] = ahead
+    particles.part(1.0, BODY.rows @ ahead, ahead, ahead, keep=1.0)
+    # Taken to be at (0, 1), looking along y; it is at (1, 0), looking along x.
+    assert particles.settle() == pytest.approx([-1.0, -1.0, -0.5 * math.pi])
+
+
+def test_a_wheel_alone_may_come_to_another_floor() -> None:
+    for rate, share in ((0.0, 0.0), (0.5, 1.0 - math.exp(-1.5))):
+        settings = ParticleSettings(patches=rate, new_floor=0.0, regain=0.0)
+        particles = Particles(BODY, FRICTION, 0.0, settings)
+        for _ in range(50):
+            assert particles.step(STEP, np.zeros(3))
+        differ = np.ptp(particles._traction, axis=1) > 1e-9
+        assert differ.mean() == pytest.approx(share, abs=0.05)
+
+
+def test_a_wheel_on_a_patch_slides_alone() -> None:
+    """It spins with next to no force; about where the others stand the robot begins to turn."""
+    rims, pull = np.array([0.5, 0.0, 0.0]), 1.2  # m/s, N
+    free = np.cross(BODY.rows[1], BODY.rows[2])  # the twist that the other two allow
+    rate = float(BODY.rows[0] @ free) ** 2 * pull / float(free @ BODY.inertia @ free)
+    settings = ParticleSettings(patches=0.05)
+    found, _ = played(
+        lambda time: rims, lambda wheel, time: pull * (wheel == 0), 1.0, settings=settings
+    )
+    assert found.probability[0] > 0.9
+    assert found.probability[1:].max() < 0.5
+    assert BODY.rows @ found.twist == pytest.approx([1.0 * rate, 0.0, 0.0], abs=0.03)

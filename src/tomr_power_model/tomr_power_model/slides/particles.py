@@ -1,9 +1,10 @@
 """Slides estimated from power alone: a particle filter over the floor and what the body does on it.
 
-Each particle is a floor (traction coefficient, slope), what friction and drag are off by, and the
-twist that the body has on this floor when its rims turn as the encoders say. It predicts the force
-of each contact; a motor's power has two currents, and so gives one of two forces. A particle whose
-forces are those of the power, near either of the two, lives on. Where wheels grip all floors agree.
+Each particle is a floor (traction coefficient of each wheel, slope), what friction and drag are off
+by, and the twist that the body has on this floor when its rims turn as the encoders say. It
+predicts the force of each contact; a motor's power has two currents, and so gives one of two
+forces. A particle whose forces are those of the power, near either of the two, lives on. Where
+wheels grip all floors agree.
 
 The contacts are those of the one dynamics (dynamics/contacts.py: sticking up to traction times
 load), but with rims that are given and for all particles at once, which makes a step cheap.
@@ -16,6 +17,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.geometry.poses import moved, seen_from
 from tomr_power_model.robot import GRAVITY, WHEELS
 from tomr_power_model.slides.body import STICKING, ContactBody
 from tomr_power_model.slides.roughness import Roughness
@@ -41,6 +43,7 @@ class ParticleSettings(NamedTuple):
     grips: float = 0.3
     most: float = 1.0
     new_floor: float = 0.03  # 1/s, at which a robot comes to another floor
+    patches: float = 0.0  # 1/s, at which each of its wheels alone comes to another floor
     regain: float = 0.3  # 1/s, at which its wheels find their grip
     comes_to_rest: float = 1.0  # 1/s, at which it stands where no wheel turns: forces show nothing
     wander: float = 0.1  # 1/sqrt(s), of the logarithm of the traction coefficient
@@ -129,7 +132,8 @@ class Particles:
         self._random = np.random.default_rng(_SEED)
         self._twist = np.tile(twist, (n, 1))
         self._yaw = np.zeros(n)
-        self._traction = self._floors(n)
+        self._offset = np.zeros((n, 3))  # m, m, rad
+        self._traction = np.tile(self._floors(n)[:, None], (1, WHEELS))
         steep = np.where(self._random.random((n, 1)) < s.sloping, s.slope, s.level)
         self._slope = steep * self._random.standard_normal((n, 2))
         off = s.friction * self._dry + s.friction_least
@@ -194,6 +198,24 @@ class Particles:
             any_probability=float(self._weight @ sliding.any(axis=1)),
         )
 
+    def part(self, dt: float, rims: Array, rolled: Array, taken: Array, keep: float) -> None:
+        """Go on with the place that the body has by each particle, beside where it is taken to be.
+
+        rolled: way if wheels grip; taken: that which was taken for the body's, both in its frame
+        [m, m, rad], of the last dt [s]; keep: share of what they are apart that goes on.
+        """
+        apart = rims - self._twist @ self._body.rows.T
+        slides = np.any(np.abs(apart) > _SLIDING, axis=1, keepdims=True)
+        ways = rolled - dt * slides * (apart @ self._body.to_twist.T)
+        there = moved(np.zeros(3), taken)
+        self._offset = keep * seen_from(moved(self._offset, ways), there)
+
+    def settle(self) -> Array:
+        """Take the body to be where they have it; seen from where it was, that is [m, m, rad]."""
+        mean = np.asarray(self._weight @ self._offset)
+        self._offset = seen_from(self._offset, mean)
+        return mean
+
     def pull(self) -> Pull:
         """What they say of the force that stays."""
         mean = self._weight @ self._slope
@@ -207,13 +229,17 @@ class Particles:
         """Floors change, and wheels find their grip again."""
         s, random, n = self._set, self._random, self._set.particles
         other = np.flatnonzero(random.random(n) < s.new_floor * dt)
-        self._traction[other] = self._floors(len(other))
+        self._traction[other] = self._floors(len(other))[:, None]
+        if s.patches:
+            patches = random.binomial(n * WHEELS, s.patches * dt)
+            where = random.integers(n, size=patches), random.integers(WHEELS, size=patches)
+            self._traction[where] = self._floors(patches)
         back = np.flatnonzero(random.random(n) < s.regain * dt)
         if len(back):
-            grips = self._traction > s.grips
+            grips = (self._traction > s.grips).all(axis=1)
             self._force[back] = self._force[grips].mean(axis=0) if grips.any() else 0.0
             self._twist[back] = self._body.to_twist @ rims
-            self._traction[back] = s.grips * (s.most / s.grips) ** random.random(len(back))
+            self._traction[back] = s.grips * (s.most / s.grips) ** random.random((len(back), 1))
             # What was taken for a slide may be a slope or drag: else nothing that grips agrees.
             slopes, drags = (back[random.random(len(back)) < s.otherwise] for _ in range(2))
             self._slope[slopes] = s.slope * random.standard_normal((len(slopes), 2))
@@ -229,7 +255,7 @@ class Particles:
             self._slope[onto] = s.slope * random.standard_normal((len(onto), 2))
         if s.ramps and self._felt is not None:
             self._explain(dt, self._felt)
-        self._traction *= np.exp(s.wander * math.sqrt(dt) * random.standard_normal(n))
+        self._traction *= np.exp(s.wander * math.sqrt(dt) * random.standard_normal((n, 1)))
         np.clip(self._traction, 0.5 * s.least, 1.2 * s.most, out=self._traction)
         self._slope += s.walk_slope * math.sqrt(dt) * random.standard_normal((n, 2))
 
@@ -245,7 +271,7 @@ class Particles:
         self._weight[onto] *= math.exp(-0.5 * (x * x + y * y) / s.slope**2)
         if math.hypot(x, y) > _PLAINLY * float(felt.std.max()):
             slippery = np.flatnonzero(random.random(n) < s.felt_rate * dt)
-            least = random.random(len(slippery))
+            least = random.random((len(slippery), 1))
             self._traction[slippery] = s.least * (s.grips / s.least) ** least
 
     def _move(self, dt: float, rims: Array) -> None:
@@ -271,7 +297,7 @@ class Particles:
         In ways of the contacts and wheel by wheel: the rows of one are near each other in memory.
         """
         b, before = self._body, self._force.T
-        most = b.load[:, None] * self._traction
+        most = b.load[:, None] * self._traction.T
         least, apart, force = -most, rims[:, None] - b.rows @ free.T, before.copy()
         for i in [*range(WHEELS)] * self._set.sweeps:
             more = apart[i] / (dt * self._yields[i])
@@ -289,7 +315,7 @@ class Particles:
         along = np.tanh(self._twist @ b.along.T / STICKING) * b.load
         wrench = -self._drag[:, None] * (along @ b.along)
         steep = np.hypot(self._slope[:, 0], self._slope[:, 1])
-        most = self._set.holds * GRAVITY * self._traction
+        most = self._set.holds * GRAVITY * self._traction.max(axis=1)  # others are on patches
         pull = b.mass * np.minimum(1.0, most / np.maximum(steep, 1e-9))
         sloping = np.zeros_like(wrench)
         sloping[:, 0] = pull * (cos * self._slope[:, 0] + sin * self._slope[:, 1])
@@ -352,7 +378,8 @@ class Particles:
         places = (random.random() + np.arange(n)) / n
         kept = np.minimum(np.searchsorted(np.cumsum(self._weight), places), n - 1)
         self._twist, self._yaw = self._twist[kept], self._yaw[kept]
-        self._traction = self._traction[kept] * np.exp(0.05 * random.standard_normal(n))
+        self._traction = self._traction[kept] * np.exp(0.05 * random.standard_normal((n, 1)))
+        self._offset = self._offset[kept]
         self._slope = self._spread(self._slope, kept)
         self._friction = self._spread(self._friction, kept)
         self._drag = self._spread(self._drag, kept)
