@@ -213,7 +213,8 @@ class SlipOdometry:
         inertial = _mean(self._inertial)
         self._inertial, self._tractive = [], []
         self._advance(time, dt, ways, inertial)
-        self._x[:3] = moved(self._x[:3], self._by_power.correction)
+        if self._by_power.correction is not None:
+            self._x[:3] = moved(self._x[:3], self._by_power.correction)
         self._time = time
         self._rims.passes(self._body.rows @ self._x[VX : WZ + 1])
         if time < self._lifted.until:

@@ -47,7 +47,8 @@ class Unaided:
         self.force = np.zeros(WHEELS)  # N, of each contact
         self.probability = np.zeros(WHEELS)  # that each wheel slides
         self.covariance = np.zeros((3, 3))  # of the twist while wheels slide
-        self.correction = np.zeros(3)  # of the pose, in its own frame [m, m, rad]
+        # Of the pose in its own frame [m, m, rad].
+        self.correction: Array | None = None
         self._slid_ago = math.inf  # s
 
     def step(self, dt: float, twist: Array, rims: Array, readings: list[Traction]) -> None:
@@ -58,7 +59,7 @@ class Unaided:
             self.is_at_work = True
         self._elapsed += dt
         self._readings += [one for one in readings if abs(one.speed) > _MOVES]
-        self.correction = np.zeros(3)
+        self.correction = None
         if self._elapsed >= _STEP:
             self._weigh(rims)
         self.slid = self.slid + dt * self._sliding

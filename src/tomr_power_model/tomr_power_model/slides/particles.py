@@ -297,7 +297,7 @@ class Particles:
         In ways of the contacts and wheel by wheel: the rows of one are near each other in memory.
         """
         b, before = self._body, self._force.T
-        most = b.load[:, None] * self._traction.T
+        most = np.ascontiguousarray((b.load * self._traction).T)
         least, apart, force = -most, rims[:, None] - b.rows @ free.T, before.copy()
         for i in [*range(WHEELS)] * self._set.sweeps:
             more = apart[i] / (dt * self._yields[i])
