@@ -1,5 +1,6 @@
 """What the odometry makes of its wheels' forces: creep, and slides where there is no IMU."""
 
+import math
 from functools import cache
 from types import SimpleNamespace
 from typing import Any
@@ -159,6 +160,7 @@ class Scripted(Watched):
 
     def part(self, dt: float, rims: Array, rolled: Array, taken: Array, keep: float) -> None:
         self.ways.append((rolled, taken))
+        assert keep == pytest.approx(math.exp(-dt / 5.0))
 
     def settle(self) -> Array:
         self.settled += 1
@@ -180,8 +182,21 @@ def test_the_pose_is_corrected_while_wheels_slide_and_for_some_time_after() -> N
     # What was rolled; taken was the same until they said that it slides, then nothing.
     taken = [(rolled[0], way[0]) for rolled, way in particles.ways[1:4]]
     assert np.array(taken) == pytest.approx(np.array([[0.05, 0.05], [0.05, 0.0], [0.05, 0.05]]))
+    particles.sliding.append(0.9)
+    by_power.step(0.05, np.zeros(3), body.rows @ ahead, [])
     by_power.rest()
     assert by_power.correction is None
+    for share, is_corrected in ((0.0, False), (0.4, True)):  # begun anew nothing has slid yet
+        particles.sliding.append(share)
+        by_power.step(0.05, np.zeros(3), body.rows @ ahead, [])
+        assert (by_power.correction is not None) == is_corrected
+
+
+def test_wheels_may_come_to_a_patch_alone() -> None:
+    by_power = Unaided(ROBOT, *body_of(ROBOT))
+    for _ in range(40):
+        by_power.step(0.05, np.zeros(3), np.full(3, 0.1), [])
+    assert np.ptp(by_power._particles._traction, axis=1).any()
 
 
 def test_a_correction_moves_the_pose_along_its_heading() -> None:

@@ -373,6 +373,24 @@ def test_a_turn_that_was_a_slide_turns_the_way_since() -> None:
     assert particles.settle() == pytest.approx([-1.0, -1.0, -0.5 * math.pi])
 
 
+def test_places_live_on_with_their_particles_and_go_with_a_new_beginning() -> None:
+    particles = _alike(1.0, np.zeros(3))
+    particles._offset[:] = np.arange(len(particles._twist))[:, None]
+    particles._weight[:] = np.arange(len(particles._twist)) == 7
+    particles._draw()
+    assert (particles._offset == 7.0).all()
+    particles.start(np.zeros(3))
+    assert not particles._offset.any()
+
+
+def test_a_particle_that_hardly_slides_goes_with_the_wheels() -> None:
+    """What sweeps over the contacts leave is no slide."""
+    ahead = np.array([1.0, 0.0, 0.0])
+    particles = _alike(1.0, 0.96 * ahead)
+    particles.part(0.1, BODY.rows @ ahead, 0.1 * ahead, 0.1 * ahead, keep=1.0)
+    assert particles.settle() == pytest.approx(np.zeros(3), abs=1e-12)
+
+
 def test_a_wheel_alone_may_come_to_another_floor() -> None:
     for rate, share in ((0.0, 0.0), (0.5, 1.0 - math.exp(-1.5))):
         settings = ParticleSettings(patches=rate, new_floor=0.0, regain=0.0)
@@ -381,6 +399,26 @@ def test_a_wheel_alone_may_come_to_another_floor() -> None:
             assert particles.step(STEP, np.zeros(3))
         differ = np.ptp(particles._traction, axis=1) > 1e-9
         assert differ.mean() == pytest.approx(share, abs=0.05)
+        for wheel in (0, 1, 2):  # each of them
+            others = np.delete(particles._traction, wheel, axis=1)
+            alone = (np.ptp(others, axis=1) < 1e-9) & differ
+            assert alone.mean() == pytest.approx(
+                math.exp(-1.0) * (1.0 - math.exp(-0.5)) * (rate > 0), abs=0.05
+            )
+
+
+def test_a_slope_pulls_a_robot_with_one_wheel_on_ice_no_less() -> None:
+    particles = _alike(1.0, np.zeros(3))
+    particles._traction[:, 1], particles._slope[:] = 0.01, (9.0, 0.0)
+    assert sum(particles._wrenches())[0, 0] == pytest.approx(0.7 * 9.81 * BODY.mass, rel=1e-3)
+
+
+def test_wheels_that_find_their_grip_do_so_with_the_forces_of_those_that_all_grip() -> None:
+    particles = Particles(BODY, FRICTION, 0.0, ParticleSettings(regain=100.0, new_floor=0.0))
+    particles._traction[:], particles._force[:] = 0.9, 1.0
+    particles._traction[::2, 1], particles._force[::2] = 0.02, 5.0
+    particles._change(STEP, np.zeros(3))
+    assert (particles._force == 1.0).all()
 
 
 def test_a_wheel_on_a_patch_slides_alone() -> None:
