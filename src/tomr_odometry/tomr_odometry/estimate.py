@@ -8,7 +8,7 @@ from tomr_odometry.grip import Grid
 
 Array = NDArray[np.float64]
 SLIDES = 0.5  # probability from which a wheel is said to slide that an IMU shows
-SLIDES_UNAIDED = 0.3  # and without one: as many slides are missed then as are none
+SLIDES_UNAIDED = 0.3  # and without one: from 0.5 on a fifth of the sliding is missed
 _SLOW = 0.02  # m/s: sliding slower than that is none
 
 
