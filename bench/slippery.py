@@ -35,6 +35,7 @@ from tomr_odometry.reference import reference_of
 from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.summary import end_error, estimated_path
 from tomr_power_model.cli import run_main
+from tomr_power_model.geometry.poses import turned
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import GRAVITY, Robot, load_robot
@@ -156,11 +157,7 @@ def _estimated(bag: Path, robot: Robot, settings: OdometrySettings, seed: int) -
 
 def true_twists(poses: Array, times: Array) -> Array:
     """Twists in base_link, of poses in the odometry frame at times [s], (n, 3) each."""
-    change = np.gradient(poses, times, axis=0)
-    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    return np.stack(
-        [c * change[:, 0] + s * change[:, 1], c * change[:, 1] - s * change[:, 0], change[:, 2]], 1
-    )
+    return turned(np.gradient(poses, times, axis=0), -poses[:, 2])
 
 
 def speed_error(off: Array, slides: NDArray[np.bool_]) -> float:
@@ -181,10 +178,9 @@ def slip_error(ours: Array, sliding: Array, rims: Array) -> float:
 
 def _inside(ours: Sequence[Estimate], poses: Array) -> float:
     """Share of the time in which the true place is in the ellipse; the starts on each other."""
-    turned = ours[0].pose[2] - poses[0, 2]
-    c, s = math.cos(turned), math.sin(turned)
-    places = (poses[:, :2] - poses[0, :2]) @ np.array([[c, s], [-s, c]]) + ours[0].pose[:2]
-    off = places - np.array([item.pose[:2] for item in ours])
+    first = ours[0].pose
+    places = first + turned(poses - poses[0], first[2] - poses[0, 2])
+    off = (places - np.array([item.pose for item in ours]))[:, :2]
     covariance = np.array([item.pose_covariance[:2, :2] for item in ours]) + 1e-6 * np.eye(2)
     square = np.einsum("ni,nij,nj->n", off, np.linalg.inv(covariance), off)
     return float(np.mean(square < _ELLIPSE))

@@ -8,6 +8,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.errors import InputError
+from tomr_power_model.geometry.poses import turned
 from tomr_power_model.messages.intake import MALFORMED, WheelFinder, stamp_of
 from tomr_power_model.messages.types import ODOMETRY, TF
 from tomr_power_model.recordings import Recording, require_topic
@@ -33,10 +34,7 @@ class Path2D:
 
     def laid_on(self, pose: Array, at: Array) -> "Path2D":
         """Moved rigidly so that the pose `at` comes to lie on `pose`."""
-        turn = float(pose[2] - at[2])
-        c, s = math.cos(turn), math.sin(turn)
-        moved = (self.pose[:, :2] - at[:2]) @ np.array([[c, s], [-s, c]]) + pose[:2]
-        return Path2D(self.stamps, np.column_stack([moved, self.pose[:, 2] + turn]))
+        return Path2D(self.stamps, pose + turned(self.pose - at, pose[2] - at[2]))
 
 
 def _path(rows: list[tuple[int, float, float, float]], place: str) -> Path2D:
@@ -96,10 +94,6 @@ def wheel_path(recording: Recording, robot: Robot, namespace: str | None = None)
     angles = np.array([row[1:] for row in rows])
     step = np.diff(angles, axis=0) * radius @ body.to_twist.T
     yaw = np.concatenate([[0.0], np.cumsum(step[:, 2])])
-    middle = 0.5 * (yaw[1:] + yaw[:-1])
-    x = np.cos(middle) * step[:, 0] - np.sin(middle) * step[:, 1]
-    y = np.sin(middle) * step[:, 0] + np.cos(middle) * step[:, 1]
-    pose = np.column_stack(
-        [np.concatenate([[0.0], np.cumsum(x)]), np.concatenate([[0.0], np.cumsum(y)]), yaw]
-    )
+    ways = turned(step, 0.5 * (yaw[1:] + yaw[:-1]))
+    pose = np.concatenate([np.zeros((1, 3)), np.cumsum(ways, axis=0)])
     return Path2D(np.array([row[0] for row in rows], dtype=np.int64), pose)
