@@ -224,3 +224,20 @@ def test_power_alone_says_sooner_that_a_wheel_slides() -> None:
     assert core._slides.tolist() == [True, False, True]
     core._is_aided = True
     assert core._slides.tolist() == [False, False, True]
+
+
+def test_what_power_alone_says_to_slide_has_a_slip_ratio_and_a_place_on_the_floor() -> None:
+    core, rims = SlipOdometry(ROBOT), np.array([0.5, 0.5, 0.5])  # m/s
+    for sample in range(6):
+        first, second, third = (0.01 * sample * rims / ROBOT.wheel_radius).tolist()
+        core.encoders(START + 10_000_000 * sample, (first, second, third), (0.0, 0.0, 0.0))
+    list(core.due())
+    seen: list[list[bool]] = []
+    core.floor.take = lambda pose, sliding, force: seen.append(sliding.tolist())  # type: ignore[method-assign]
+    core._by_power.rest = lambda: None  # type: ignore[method-assign]
+    core._by_power.probability = np.array([0.4, 0.2, 0.0])
+    sliding, slip = core._slip(np.full(3, 0.1), np.zeros(3))
+    assert sliding == pytest.approx([0.4, 0.0, 0.0])
+    assert slip == pytest.approx([0.8, 0.0, 0.0])
+    core._step(core._time + 10_000_000, np.stack([core._x[RIM : RIM + 3], np.full(3, 1e-8)]))
+    assert seen == [[True, False, False]]
