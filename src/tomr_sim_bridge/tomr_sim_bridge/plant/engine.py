@@ -69,7 +69,7 @@ class Engine:
         self._yaw = 0.0
         self._settle(phase)
         self._zero = self.data.qpos[self._angles].copy()
-        self._normal = self._contact_forces()
+        self._normal, self._carrying = self._contact_forces()
 
     def _settle(self, phase: Vector) -> None:
         gravity = self.model.opt.gravity.copy()
@@ -130,16 +130,21 @@ class Engine:
     def normal_forces(self, duration: float) -> Vector:
         """Smoothed normal force on each wheel [N], shape (3,); call once per stretch."""
         share = min(1.0, duration / _NORMAL_SMOOTHING)
-        self._normal = self._normal + share * (self._contact_forces() - self._normal)
+        force, carrying = self._contact_forces()
+        self._normal = self._normal + share * (force - self._normal)
+        self._carrying = self._carrying + share * (carrying - self._carrying)
         return self._normal
 
-    def _contact_forces(self) -> Vector:
-        force = np.zeros(WHEELS)
+    def _contact_forces(self) -> tuple[Vector, Vector]:
+        """Normal force on each wheel [N], and how many of its rollers carry it; shape (3,)."""
+        force, carrying = np.zeros(WHEELS), np.zeros(WHEELS)
         contact = self.data.contact
         if self.data.ncon:
             wheels = self._wheel_of_geom[contact.geom].max(axis=1)
-            np.add.at(force, wheels, self.data.efc_force[contact.efc_address])
-        return force
+            pressed = self.data.efc_force[contact.efc_address]
+            np.add.at(force, wheels, pressed)
+            np.add.at(carrying, wheels, pressed > 0.0)
+        return force, np.maximum(carrying, 1.0)
 
     def set_friction(self, friction: Vector) -> None:
         """Set the traction coefficient under each wheel, shape (3,)."""
@@ -155,7 +160,8 @@ class Engine:
         self.model.dof_solimp[self._speeds, :2] = impedance
         self.model.dof_damping[self._speeds] = loads.viscous
         self.data.qfrc_applied[self._speeds] = loads.torque
-        torque = loads.roller_force * self._roller_radius
+        # Where one roller hands over to the next both turn, and each drags with its own load only.
+        torque = loads.roller_force * self._roller_radius / self._carrying
         self.model.dof_frictionloss[self._roller_speeds] = torque[:, None]
 
     def set_push(self, push: Vector) -> None:
