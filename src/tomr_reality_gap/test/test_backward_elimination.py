@@ -23,6 +23,10 @@ WORTH: Mapping[str, float] = {
     "ac": 905.0,
     "bc": 400.0,
     "abc": 910.0,
+    "ae": 700.0,
+    "be": 700.0,
+    "abe": 1000.0,
+    "bw": 990.0,
     "ad": 1000.0,
     "bd": 310.0,
 }
@@ -92,6 +96,33 @@ def test_needed_findings_stay_and_their_rivals_are_named(second) -> None:  # typ
     assert _letters(found.alternatives[0][0].model) == "ac"
 
 
+def test_one_effect_may_do_the_work_of_any_two_findings(
+    second,  # type: ignore[no-untyped-def]
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """w does nearly what a and e do together, and two findings cost less than three."""
+    asked = []
+
+    class Nearest:
+        candidates = ("w",)
+
+        def __init__(self, dataset: object, found: Selection, candidates: object) -> None:
+            self.found, self.dataset = found, dataset
+
+        def nearest(self, best: FittedModel, *numbers: int) -> list[Model]:
+            asked.append((_letters(best.model), numbers))
+            letters = list(_letters(best.model))
+            pair = sorted(letters[number] for number in numbers)
+            rest = [letter for letter in letters if letter not in pair]
+            return [_model("".join(["w", *rest]))] if pair == ["a", "e"] else []
+
+    monkeypatch.setattr(backward_elimination, "Responses", Nearest)
+    monkeypatch.setattr(backward_elimination, "_together", lambda *given: ())
+    found = second("abe", ("", "a"), ("a", "b"), ("ab", "e"))
+    assert _letters(found.best.model) == "wb"
+    assert {("abe", pair) for pair in ((0, 1), (0, 2), (1, 2))} <= set(asked)
+
+
 @pytest.mark.parametrize(
     ("known", "expected"),
     [
@@ -134,7 +165,7 @@ def test_what_does_the_work_of_several_stands_in_for_them_together(
 
 def test_the_second_part_of_friction_at_a_place_costs_the_least() -> None:
     """Coulomb and viscous friction of one wheel; iron loss costs as two findings."""
-    price = backward_elimination._Price(usual=100.0, least=20.0)
+    price = backward_elimination.Price(usual=100.0, least=20.0)
 
     def worth(*effects: tuple[str, str]) -> float:
         model = EMPTY

@@ -37,8 +37,11 @@ class _Model:
         return SimpleNamespace(robot=self.hypotheses)
 
     def without(self, number: int) -> "_Model":
-        kept = [item for place, item in enumerate(self.hypotheses) if place != number]
-        return evolve(self, hypotheses=tuple(kept))
+        return self.kept([place != number for place in range(len(self.hypotheses))])
+
+    def kept(self, wanted: list[bool]) -> "_Model":
+        pairs = zip(self.hypotheses, wanted, strict=True)
+        return evolve(self, hypotheses=tuple(item for item, is_wanted in pairs if is_wanted))
 
     def swapped(self, number: int, item: Hypothesis, offsets: tuple[float, ...]) -> "_Model":
         changed = list(self.hypotheses)
@@ -47,18 +50,20 @@ class _Model:
 
 
 def _nearest(
-    *shown: tuple[Hypothesis, np.ndarray], size: float = 3.0, searched: int = 0
+    *shown: tuple[Hypothesis, np.ndarray], size: float = 3.0, searched: int = 0, findings: int = 1
 ) -> list[_Model]:
     """Rivals of the first, of which so much is in the data; the first column is a nuisance.
 
-    So many others were in the last model that was searched from, and are no candidates there.
+    So many others were in the last model that was searched from, and are no candidates there. With
+    two findings the second is in the data as well, and what stands in is sought for both.
     """
     hypotheses, columns = zip(*shown, strict=True)
-    found, by_name = hypotheses[0], {item.name: column for item, column in shown}
+    by_name = {item.name: column for item, column in shown}
     matrix = np.stack([NUISANCE, *columns], axis=1)
-    value = size * columns[0] + RANDOM.standard_normal(SAMPLES)
+    explained = size * np.sum(columns[:findings], axis=0)
+    value = explained + RANDOM.standard_normal(SAMPLES)
     places = {item.key: slice(row, row + 1) for row, item in enumerate(hypotheses, start=1)}
-    model = _Model((found,))
+    model = _Model(hypotheses[:findings])
     jacobian = SimpleNamespace(
         matrix=matrix,
         sensors=slice(1, 1),
@@ -66,7 +71,7 @@ def _nearest(
         own=[places.pop(item.key) for item in hypotheses[1 : 1 + searched]],
         candidates=places,
     )
-    best = SimpleNamespace(model=model, value=size * columns[0])
+    best = SimpleNamespace(model=model, value=explained)
 
     def predict(robots: list[tuple[Hypothesis, ...]]) -> list[np.ndarray]:
         return [
@@ -82,7 +87,7 @@ def _nearest(
         ),  # type: ignore[arg-type]
         hypotheses,
     )
-    return responses.nearest(best, 0)  # type: ignore[arg-type, return-value]
+    return responses.nearest(best, *range(findings))  # type: ignore[arg-type, return-value]
 
 
 def test_what_spans_nearly_the_same_is_a_rival_with_the_size_that_stands_in() -> None:
@@ -102,6 +107,16 @@ def test_what_only_nuisances_distinguish_is_a_rival() -> None:
     found, beside, near = map(_hypothesis, ("found", "beside", "near"))
     tried = _nearest((found, SHOWN), (beside, SHOWN + NUISANCE), (near, SHOWN + 0.03 * OTHER))
     assert [model.hypotheses[0].effect for model in tried] == ["beside", "near"]
+
+
+def test_what_shows_what_two_findings_do_stands_in_for_both() -> None:
+    """In the place of the first; what one of them shows is none of the other."""
+    half, rest, whole = map(_hypothesis, ("half", "rest", "whole"))
+    third = (_hypothesis("third"), SHOWN + 0.5 * OTHER)
+    shown = ((half, SHOWN), (rest, OTHER), (whole, SHOWN + OTHER), third)
+    tried = _nearest(*shown, findings=2)
+    assert [[item.effect for item in model.hypotheses] for model in tried] == [["whole"]]
+    assert tried[0].offsets[0] == pytest.approx((3.0,), rel=0.02)
 
 
 def test_what_was_dropped_from_the_model_may_stand_in_as_well() -> None:

@@ -19,6 +19,7 @@ from tomr_reality_gap.fit.basis_responses import basis_responses
 from tomr_reality_gap.fit.consistency import check_same_robot
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection, finding_cost, forward_selection
+from tomr_reality_gap.fit.integrator import sums_otherwise
 from tomr_reality_gap.fit.jacobian import linearise
 from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.model import Model
@@ -58,15 +59,21 @@ def explain(request: Request, progress: Progress = lambda stage, part: None) -> 
     progress("reading", 0.0)
     ready = prepared(request)
     progress("simulating", 0.05)
-    analysis = _analysed(request, ready, progress)
+    analysis = _analysed(request, ready, progress, is_loop_known=bool(ready.simulations))
     progress("what is left", 0.85)
     explanation = explanation_of(analysis, ready.held, ready.notes)
     progress("done", 1.0)
     return evolve(explanation, recordings=(*request.real, *request.holdout))
 
 
-def _analysed(request: Request, ready: Prepared, progress: Progress) -> AnalysisResult:
-    """All hypotheses tried on what was prepared."""
+def _analysed(
+    request: Request, ready: Prepared, progress: Progress, *, is_loop_known: bool
+) -> AnalysisResult:
+    """All hypotheses tried on what was prepared.
+
+    How the drivers sum is known where the user's simulation shows it; else what is found may
+    show that it is the other way.
+    """
     base, wheels, dataset = ready.base, ready.robot.wheel_names, Dataset(ready.real)
     parameters = nuisances(base, wheels, request.tolerance, request.tolerances)
     orders = _orders(dataset, ready.runs)
@@ -88,6 +95,8 @@ def _analysed(request: Request, ready: Prepared, progress: Progress) -> Analysis
         return backward_elimination(data, found, candidates, tick)
 
     found = named(dataset)
+    if not is_loop_known and sums_otherwise(dataset, found, tick):
+        return _analysed(request, ready.summed_otherwise(), progress, is_loop_known=True)
     check_same_robot(dataset, found.rounds[-1])
     effect, plain = _unmodelled(dataset, found, ready), None
     if effect is not None:

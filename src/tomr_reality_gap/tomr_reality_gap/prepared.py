@@ -23,6 +23,7 @@ from tomr_power_model.robot import Robot, read_description, robot_from_parameter
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS, channels_of
 from tomr_reality_gap.alignment.motion import motion_in
 from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
+from tomr_reality_gap.fit.integrator import INTEGRATOR, WAYS, summed_otherwise
 from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.simulator_discrepancy import DiscrepancyTorques, discrepancy_torques
 from tomr_reality_gap.hypotheses.scales import scales_of, traction_ratios_of
@@ -30,7 +31,6 @@ from tomr_reality_gap.request import Request
 
 Array = NDArray[np.float64]
 
-INTEGRATOR = "controller.integrator"
 _MOSTLY_INSIDE = 0.02  # of a drive beyond a table
 
 
@@ -46,6 +46,11 @@ class Prepared:
     runs: tuple[Run, ...]  # as described, of the real ones
     scales: Scales
     notes: tuple[str, ...]
+
+    def summed_otherwise(self) -> "Prepared":
+        """The same, of drivers that sum their error the other way."""
+        base = summed_otherwise(self.base)
+        return evolve(self, base=base, robot=robot_from_parameters(base.values, base.place))
 
 
 def prepared(request: Request) -> Prepared:
@@ -159,15 +164,14 @@ def integrator_of(simulation: RecordingSimulation) -> str:
 
     It counts as much as a few percent of the proportional gain.
     """
-    ways = ("forward", "backward")
     given = simulation.robot
-    robots = [evolve(given, controller=evolve(given.controller, integrator=way)) for way in ways]
-    errors = dict.fromkeys(ways, 0.0)
-    for way, value in zip(ways, simulation.predict(robots), strict=True):
+    robots = [evolve(given, controller=evolve(given.controller, integrator=way)) for way in WAYS]
+    errors = dict.fromkeys(WAYS, 0.0)
+    for way, value in zip(WAYS, simulation.predict(robots), strict=True):
         for channel, part in zip(simulation.channels, rows_of(simulation.channels), strict=True):
             if channel.kind == "speed":
                 errors[way] += float(np.mean(np.abs(channel.value - value[part])))
-    return min(ways, key=errors.__getitem__)
+    return min(WAYS, key=errors.__getitem__)
 
 
 def _check_same_commands(real: tuple[Drive, ...], sim: tuple[Drive, ...]) -> None:

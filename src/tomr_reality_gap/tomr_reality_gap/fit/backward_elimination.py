@@ -1,6 +1,7 @@
 """Backward elimination: whether each finding is still needed, and what could take its place."""
 
 from collections.abc import Iterator, Sequence
+from itertools import chain, combinations
 
 import numpy as np
 from attrs import evolve, frozen
@@ -14,6 +15,7 @@ from tomr_reality_gap.fit.rivals import Responses
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 
 _STAND_INS = 4  # alternatives that are tried for each finding
+_MERGERS = 2  # that are tried for each pair of them
 _SWAPS = 3  # at most
 
 
@@ -34,7 +36,7 @@ def backward_elimination(
         count = len(best.model.hypotheses)
         fewer = [(best.model.without(number), best.sensors) for number in range(count)]
         shorter = refine(dataset, fewer, jacobian, noise, tick=tick)
-        price = _Price.of(dataset, found, best)
+        price = Price.of(dataset, found, best)
         gains = [price.worth(best) - price.worth(item) for item in shorter]
         weakest = int(np.argmin(gains))
         if gains[weakest] > 0.0:
@@ -43,8 +45,8 @@ def backward_elimination(
     responses = Responses(dataset, found, candidates)
     groups = _alternatives(responses, best, tick)
     for _ in range(_SWAPS):
-        price = _Price.of(dataset, found, best)
-        better = max((item for group in groups for item in group), key=price.worth)
+        price = Price.of(dataset, found, best)
+        better = max((*chain(*groups), *_merged(responses, best, tick)), key=price.worth)
         if price.worth(better) <= price.worth(best):
             break
         best = better
@@ -53,14 +55,14 @@ def backward_elimination(
 
 
 @frozen
-class _Price:
+class Price:
     """Log evidence that effects must bring."""
 
     usual: float  # a finding
     least: float  # the second of friction's parts at one place, which are one finding
 
     @classmethod
-    def of(cls, dataset: Dataset, found: Selection, best: FittedModel) -> "_Price":
+    def of(cls, dataset: Dataset, found: Selection, best: FittedModel) -> "Price":
         samples = len(dataset.value)
         return cls(found.cost(samples, best), finding_cost(samples))
 
@@ -80,6 +82,17 @@ def _alternatives(
     jacobian = found.rounds[-1].jacobian
     fitted = iter(refine(responses.dataset, states, jacobian, found.noise, tick=tick))
     return [(best, *(next(fitted) for _ in group)) for group in trials]
+
+
+def _merged(responses: Responses, best: FittedModel, tick: Tick) -> list[FittedModel]:
+    """Models in which one thing does the work of two findings: what came first may have been as
+    good a name for half of it, and another for the rest.
+    """
+    found, count = responses.found, len(best.model.hypotheses)
+    pairs = combinations(range(count), 2) if responses.candidates else ()
+    trials = [model for pair in pairs for model in responses.nearest(best, *pair)[:_MERGERS]]
+    states = [(model, best.sensors) for model in trials]
+    return refine(responses.dataset, states, found.rounds[-1].jacobian, found.noise, tick=tick)
 
 
 def _stand_ins(responses: Responses, best: FittedModel, number: int) -> list[Model]:

@@ -41,10 +41,15 @@ class Responses:
         matrix = self.found.rounds[-1].jacobian.matrix
         return Gram.of(matrix, np.zeros(len(matrix)), self.found.noise.weight)
 
-    def nearest(self, best: FittedModel, number: int) -> list[Model]:
-        """Models in which another hypothesis stands in for one finding, best first."""
+    def nearest(self, best: FittedModel, *numbers: int) -> list[Model]:
+        """Models in which another hypothesis stands in for one finding, or for two of them, in
+        the place of the first; best first.
+        """
         jacobian, weight = self.found.rounds[-1].jacobian, self.found.noise.weight
-        fewer = best.model.without(number)
+        number, *others = numbers
+        count = len(best.model.hypotheses)
+        kept = best.model.kept([at not in others for at in range(count)]) if others else best.model
+        fewer = kept.without(number)
         values = self.dataset.predict([best.model.described.robot, fewer.described.robot])
         lacking = (self.dataset.value - best.value + values[0] - values[1]) * weight
         vector = transposed_product(jacobian.matrix, lacking * weight)
@@ -70,7 +75,7 @@ class Responses:
                 continue
             if item.name not in found or evidence > found[item.name][0]:
                 offsets = (*sizes, *(0.0,) * (len(item.parameters) - len(sizes)))
-                found[item.name] = (evidence, best.model.swapped(number, item, offsets))
+                found[item.name] = (evidence, kept.swapped(number, item, offsets))
         ranked = sorted(found.values(), key=lambda pair: -pair[0])
         return [model for evidence, model in ranked if evidence > ranked[0][0] - _WITHIN]
 
