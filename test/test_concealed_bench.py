@@ -478,18 +478,23 @@ from pathlib import Path
 given = dict(zip(sys.argv[2::2], sys.argv[3::2]))
 if "{bad}" in given["--real"]:
     sys.exit("error: no such luck")
-assert sys.argv[1] == "explain" and Path(given["--sim"]).is_dir()
+assert sys.argv[1] == "explain"
+assert Path(given["--sim"]).is_dir() if {with_sim} else "--sim" not in given
 out = Path(given["--out"])
 out.mkdir(parents=True)
 (out / "report.json").write_text(json.dumps({{"verdict": "match", "findings": []}}))
 """
 
 
-def test_run_keeps_reports_and_times_and_names_what_failed(made: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("with_sim", [True, False])
+def test_run_keeps_reports_and_times_and_names_what_failed(
+    with_sim: bool, made: Path, tmp_path: Path
+) -> None:
     good, bad = (catalogue_identity(n) for n in ("total, one viscous", "slow sensor at one wheel"))
     script, reports = tmp_path / "tool.py", tmp_path / "reports"
-    script.write_text(TOOL.format(bad=bad))
-    runs = run_all([sys.executable, str(script)], made / "cases", reports, (), 1)
+    script.write_text(TOOL.format(bad=bad, with_sim=with_sim))
+    command = [sys.executable, str(script)]
+    runs = run_all(command, made / "cases", reports, with_sim=with_sim)
     errors = {run.identity: run.error for run in runs}
     assert errors == {good: None, bad: "exit code 1: error: no such luck"}
     times = json.loads((reports / "seconds.json").read_text())

@@ -139,12 +139,22 @@ def _run_parser(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--jobs", type=int, default=1, help="cases at a time (default 1)")
     parser.add_argument("--only", nargs="+", default=[], metavar="ID", help="these cases")
     parser.add_argument("--tool", metavar="COMMAND", help="instead of the installed tomr_gap")
+    parser.add_argument(
+        "--without-sim", action="store_true", help="as a user who has recordings of the robot alone"
+    )
     parser.set_defaults(command=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
     command = tool(options.tool)
-    runs = run_all(command, options.cases, options.out, options.only, options.jobs)
+    runs = run_all(
+        command,
+        options.cases,
+        options.out,
+        options.only,
+        jobs=options.jobs,
+        with_sim=not options.without_sim,
+    )
     failed = [run for run in runs if run.error is not None]
     for run in failed:
         print(f"failed: {run.identity}: {run.error}")

@@ -40,14 +40,16 @@ def tool(command: str | None) -> list[str]:
     return [found]
 
 
-def explain(command: Sequence[str], case: Path, reports: Path, out: Path) -> Run:
+def explain(
+    command: Sequence[str], case: Path, reports: Path, out: Path, *, with_sim: bool = True
+) -> Run:
     """Run the tool on one case; its report goes to REPORTS/<id>.json."""
     target = out / case.name
     arguments = [
         "explain",
         *("--robot", str(case / "robot.yaml")),
         *("--real", str(case / "real")),
-        *("--sim", str(case / "sim")),
+        *(("--sim", str(case / "sim")) if with_sim else ()),
         *("--holdout", str(case / "real_holdout")),
         *("--out", str(target)),
     ]
@@ -68,9 +70,15 @@ def explain(command: Sequence[str], case: Path, reports: Path, out: Path) -> Run
 
 
 def run_all(
-    command: Sequence[str], cases: Path, reports: Path, only: Sequence[str], jobs: int
+    command: Sequence[str],
+    cases: Path,
+    reports: Path,
+    only: Sequence[str] = (),
+    *,
+    jobs: int = 1,
+    with_sim: bool = True,
 ) -> list[Run]:
-    """Explain every case that has no report yet.
+    """Explain every case that has no report yet; as a user who did not simulate without `with_sim`.
 
     Raises InputError for a folder without cases, or a case that is not there.
     """
@@ -91,7 +99,8 @@ def run_all(
     runs = []
     with ThreadPoolExecutor(jobs) as pool:
         running = [
-            pool.submit(explain, command, case, reports, reports / "details") for case in todo
+            pool.submit(explain, command, case, reports, reports / "details", with_sim=with_sim)
+            for case in todo
         ]
         for done in tqdm(as_completed(running), total=len(todo), desc="explaining", unit="case"):
             run = done.result()

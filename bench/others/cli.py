@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None) -> int:
     reports = options.reports or options.out / "reports"
     failed = []
     if any(not (reports / f"{name}.json").exists() for name in names):
-        runs = run_all(tool(None), options.cases, reports, names, options.jobs)
+        runs = run_all(tool(None), options.cases, reports, names, jobs=options.jobs)
         failed = [f"{run.identity}: tomr_gap: {run.error}" for run in runs if run.error]
     failed += _answer_all([options.cases / name for name in names], options.out, options.jobs)
     for line in failed:

@@ -31,6 +31,8 @@ def sums_otherwise(dataset: Dataset, found: Selection, tick: Tick = lambda done:
     what was found but the gains of the loop, or with all of it.
     """
     best = found.best
+    if not best.model.described.robot.controller.integral:
+        return False
     model = evolve(best.model, base=summed_otherwise(best.model.base))
     others = model.kept([item.effect not in _GAINS for item in model.hypotheses])
     states = [(item, best.sensors) for item in (model, others)]
