@@ -104,7 +104,7 @@ def test_one_effect_may_do_the_work_of_any_two_findings(
     asked = []
 
     class Nearest:
-        candidates = ("w",)
+        candidates = tuple(_model("w").hypotheses)
 
         def __init__(self, dataset: object, found: Selection, candidates: object) -> None:
             self.found, self.dataset = found, dataset
@@ -121,6 +121,20 @@ def test_one_effect_may_do_the_work_of_any_two_findings(
     found = second("abe", ("", "a"), ("a", "b"), ("ab", "e"))
     assert _letters(found.best.model) == "wb"
     assert {("abe", pair) for pair in ((0, 1), (0, 2), (1, 2))} <= set(asked)
+
+
+def test_another_shape_of_a_finding_may_do_without_a_second() -> None:
+    """It is tried as large as the finding is, whichever of the two that comes after."""
+    size, slip = Parameter("size", ("made",), "", 1.0), Parameter("slip", ("slip",), "", 1.0)
+    plain = Hypothesis("a", ("body",), (size,))
+    shaped = Hypothesis("a", ("body",), (size, slip), start={"slip": 0.4})
+    elsewhere = Hypothesis("a", ("supply",), (size, slip), start={"slip": 0.4})
+    responses = SimpleNamespace(candidates=(plain, shaped, elsewhere, *_model("b").hypotheses))
+    for model, number in ((_model("b").joined(plain), 1), (EMPTY.joined(plain).joined(plain), 0)):
+        model = model.moved(np.empty(0), np.array([0.5, 0.5]))
+        (found,) = backward_elimination._reshaped(responses, model, number, 1 - number)  # type: ignore[arg-type]
+        assert found.hypotheses == (shaped,)
+        assert found.offsets == ((0.5, 0.0),)
 
 
 @pytest.mark.parametrize(

@@ -86,13 +86,26 @@ def _alternatives(
 
 def _merged(responses: Responses, best: FittedModel, tick: Tick) -> list[FittedModel]:
     """Models in which one thing does the work of two findings: what came first may have been as
-    good a name for half of it, and another for the rest.
+    good a name for half of it, and another for the rest; or it has another shape, which the
+    second only made up for.
     """
     found, count = responses.found, len(best.model.hypotheses)
-    pairs = combinations(range(count), 2) if responses.candidates else ()
+    pairs = list(combinations(range(count), 2)) if responses.candidates else []
     trials = [model for pair in pairs for model in responses.nearest(best, *pair)[:_MERGERS]]
+    both_ways = [way for first, second in pairs for way in ((first, second), (second, first))]
+    trials += [model for way in both_ways for model in _reshaped(responses, best.model, *way)]
     states = [(model, best.sensors) for model in trials]
     return refine(responses.dataset, states, found.rounds[-1].jacobian, found.noise, tick=tick)
+
+
+def _reshaped(responses: Responses, model: Model, number: int, needless: int) -> Iterator[Model]:
+    """Models in which one finding has another shape, as large as it is, and another is gone."""
+    kept = [at != needless for at in range(len(model.hypotheses))]
+    known, size = model.hypotheses[number], model.offsets[number][0]
+    for item in responses.candidates:
+        if item.name == known.name and item.key != known.key:
+            offsets = (size, *(0.0,) * (len(item.parameters) - 1))
+            yield model.swapped(number, item, offsets).kept(kept)
 
 
 def _stand_ins(responses: Responses, best: FittedModel, number: int) -> list[Model]:
