@@ -68,6 +68,17 @@ def test_resistance_costs_what_its_formula_says(
     assert run.motors().mean(axis=0) == pytest.approx(expected_power(torque), rel=0.03)
 
 
+def test_slow_wheels_feel_all_of_their_dry_friction(make_robot: MakeRobot, drive: Callable) -> None:
+    """At 0.4 and 0.2 rad/s; a friction that yields would brake as if it were viscous."""
+    stribeck = named("friction.stribeck", torque=0.8, speed=1.0)
+    slow = tuple(0.05 * part for part in COMMAND)
+    run = drive(Simulation(make_robot(stribeck, ideal=True), seed=1), 4.0, slow, skip=2.0)
+    speed = 0.05 * np.abs(SPEED)
+    current = (0.06 + 0.004 * speed + 0.8 * np.exp(-(speed**2))) / CONSTANT
+    expected = CONSTANT * current * speed + RESISTANCE * current**2 + 1.2
+    assert run.motors().mean(axis=0) == pytest.approx(expected, rel=0.02)
+
+
 def test_roller_drag_costs_force_times_sliding(make_robot: MakeRobot, drive: Callable) -> None:
     drag = named("contact.roller_drag", coefficient=0.03)
     with_drag, without = (
