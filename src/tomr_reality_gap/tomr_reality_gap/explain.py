@@ -23,6 +23,7 @@ from tomr_reality_gap.fit.integrator import sums_otherwise
 from tomr_reality_gap.fit.jacobian import linearise
 from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.model import Model
+from tomr_reality_gap.fit.refine import refined_at_itself
 from tomr_reality_gap.fit.remainder import Remainder
 from tomr_reality_gap.fit.significance import significant
 from tomr_reality_gap.fit.simulator_baseline import (
@@ -110,6 +111,7 @@ def _analysed(
         effect, dataset, plain = None, plain or dataset, None
         found = named(dataset)
     found, shared = _held(dataset, found, candidates, baseline, tick)
+    found = evolve(found, best=refined_at_itself(dataset, found.best, found.noise, tick=tick))
     return AnalysisResult(
         dataset,
         found,

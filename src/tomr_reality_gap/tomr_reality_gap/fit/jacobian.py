@@ -46,9 +46,9 @@ def linearise(
 ) -> Jacobian:
     """Derivatives at a model, by its parameters and those of candidates.
 
-    With `before` the derivatives by nuisances and candidates are taken from there: they change
-    little from one model to the next, and cost most. They are the most memory as well, so its
-    matrix is used again: `before` has none that holds afterwards.
+    With `before` the derivatives by candidates are taken from there: they change little from one
+    model to the next, and cost most. They are the most memory as well, so its matrix is used
+    again: `before` has none that holds afterwards.
     """
     varied = _all_varied(model, candidates, before is None)
     first, edge = len(model.nuisances), len(model.nuisances) + dataset.sensor_count
@@ -59,12 +59,8 @@ def linearise(
         into = [*matrix[:first], *matrix[edge:]]
     else:
         old = [row for item in candidates for row in _of(before.candidates[item.key])]
-        places = [
-            *zip(range(first), _of(before.nuisance), strict=True),
-            *zip(range(kept, count), old, strict=True),
-        ]
-        matrix = _moved(before.matrix.T, count, places)
-        into = list(matrix[edge:kept])
+        matrix = _moved(before.matrix.T, count, list(zip(range(kept, count), old, strict=True)))
+        into = [*matrix[:first], *matrix[edge:kept]]
     value, time_derivative = dataset.with_time_derivative(
         model.described.robot,
         [robot for robot, _ in varied],
@@ -93,10 +89,10 @@ def linearise(
 def _all_varied(
     model: Model, candidates: Sequence[Hypothesis], whole: bool
 ) -> list[tuple[Robot, float]]:
-    """By whatever derivatives are taken: of a model's own parameters alone where not `whole`."""
+    """By whatever derivatives are taken: not of candidates where not `whole`."""
     described = model.described
     own = zip(model.own, model.own_offsets, strict=True)
-    varied = [_varied(described, item, item.step) for item in model.nuisances] if whole else []
+    varied = [_varied(described, item, item.step) for item in model.nuisances]
     varied += [_varied(described, item, item.step_at(offset)) for item, offset in own]
     for candidate in candidates if whole else ():
         started = described.given(
