@@ -1,6 +1,7 @@
 """Backward elimination of findings, by a table of what each set of them is worth."""
 
 from collections.abc import Mapping, Sequence
+from itertools import permutations
 from types import SimpleNamespace
 
 import numpy as np
@@ -121,6 +122,33 @@ def test_one_effect_may_do_the_work_of_any_two_findings(
     found = second("abe", ("", "a"), ("a", "b"), ("ab", "e"))
     assert _letters(found.best.model) == "wb"
     assert {("abe", pair) for pair in ((0, 1), (0, 2), (1, 2))} <= set(asked)
+
+
+def test_shapes_are_tried_for_each_of_two_findings(
+    second,  # type: ignore[no-untyped-def]
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = []
+
+    def reshaped(responses: object, model: Model, number: int, needless: int) -> list[Model]:
+        asked.append((number, needless))
+        return [_model("bw")] if (number, needless) == (2, 0) else []
+
+    class Nothing:
+        candidates = tuple(_model("w").hypotheses)
+
+        def __init__(self, dataset: object, found: Selection, candidates: object) -> None:
+            self.found, self.dataset = found, dataset
+
+        def nearest(self, best: FittedModel, *numbers: int) -> list[Model]:
+            return []
+
+    monkeypatch.setattr(backward_elimination, "Responses", Nothing)
+    monkeypatch.setattr(backward_elimination, "_together", lambda *given: ())
+    monkeypatch.setattr(backward_elimination, "_reshaped", reshaped)
+    found = second("abe", ("", "a"), ("a", "b"), ("ab", "e"))
+    assert _letters(found.best.model) == "bw"
+    assert set(permutations(range(3), 2)) <= set(asked)
 
 
 def test_another_shape_of_a_finding_may_do_without_a_second() -> None:

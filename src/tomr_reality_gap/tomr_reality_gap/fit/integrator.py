@@ -27,15 +27,12 @@ def summed_otherwise(base: ParameterisedRobot) -> ParameterisedRobot:
 
 
 def sums_otherwise(dataset: Dataset, found: Selection, tick: Tick = lambda done: None) -> bool:
-    """Whether the recordings are likelier the other way, by as much as a finding must bring: with
-    what was found but the gains of the loop, or with all of it.
+    """Whether the recordings are likelier the other way, by as much as a finding must bring, with
+    all that was found but the gains of the loop, which may only make up for it.
     """
     best = found.best
-    if not best.model.described.robot.controller.integral:
-        return False
     model = evolve(best.model, base=summed_otherwise(best.model.base))
-    others = model.kept([item.effect not in _GAINS for item in model.hypotheses])
-    states = [(item, best.sensors) for item in (model, others)]
-    tried = refine(dataset, states, found.rounds[-1].jacobian, found.noise, tick=tick)
+    states = [(model.kept([item.effect not in _GAINS for item in model.hypotheses]), best.sensors)]
+    (other,) = refine(dataset, states, found.rounds[-1].jacobian, found.noise, tick=tick)
     price = Price.of(dataset, found, best)
-    return max(price.worth(item) for item in tried) > price.worth(best) + price.least
+    return price.worth(other) > price.worth(best) + price.least
