@@ -17,6 +17,7 @@ from tomr_reality_gap.fit.refine import refine
 
 INTEGRATOR = "controller.integrator"
 WAYS = ("forward", "backward")
+_LIKELIER = 3.0  # log evidence: twenty times
 _GAINS = ("parameter.controller.proportional", "parameter.controller.integral")
 
 
@@ -27,12 +28,12 @@ def summed_otherwise(base: ParameterisedRobot) -> ParameterisedRobot:
 
 
 def sums_otherwise(dataset: Dataset, found: Selection, tick: Tick = lambda done: None) -> bool:
-    """Whether the recordings are likelier the other way, by as much as a finding must bring, with
-    all that was found but the gains of the loop, which may only make up for it.
+    """Whether the recordings are likelier the other way, with all that was found but the gains of
+    the loop, which may only make up for it. Either way is as likely beforehand.
     """
     best = found.best
     model = evolve(best.model, base=summed_otherwise(best.model.base))
     states = [(model.kept([item.effect not in _GAINS for item in model.hypotheses]), best.sensors)]
     (other,) = refine(dataset, states, found.rounds[-1].jacobian, found.noise, tick=tick)
     price = Price.of(dataset, found, best)
-    return price.worth(other) > price.worth(best) + price.least
+    return price.worth(other) > price.worth(best) + _LIKELIER
