@@ -26,9 +26,10 @@ _ROLLER_RADIUS = 0.4
 _ROLLER_DAMPING = 2e-6  # N m s/rad at the reference radius
 _ROLLER_ARMATURE = 1e-7  # kg m^2 at the reference radius
 _ROLLER_INERTIA_SHARE = 0.05  # of the wheel's inertia about its axle
-# Dry friction stops a joint within 2 ms. MuJoCo's own 20 ms would be viscous friction up to some
-# tenths of a rad/s: no wheel would stick, and Stribeck friction would lack its peak.
-_STIFF = "0.002 1"
+# Dry friction of a wheel stops it within 4 ms. MuJoCo's own 20 ms at an impedance of 0.9 would be
+# viscous friction up to some tenths of a rad/s: no wheel would stick, and Stribeck friction would
+# lack its peak. Two steps of 1 ms are the least that is stable.
+_WHEEL_STOPS, _ROLLER_STOPS = "0.004 1", "0.002 1"
 _FIRM = "0.99 0.99 0.001"
 _LEAST_INERTIA = 1e-7  # kg m^2: MuJoCo needs a positive one
 _LEAST_DRIVEN_INERTIA = 1e-4  # kg m^2 with the rotor, at the reference radius: less chatters
@@ -215,7 +216,7 @@ def _add_wheel(
     ET.SubElement(
         hub, "joint", name=f"wheel_{wheel}", type="hinge", axis="1 0 0",
         armature=_text(motor.rotor_inertia * motor.gear_ratio**2),
-        solreffriction=_STIFF, solimpfriction=_FIRM,
+        solreffriction=_WHEEL_STOPS, solimpfriction=_FIRM,
     )  # fmt: skip
     ET.SubElement(
         hub, "inertial", pos="0 0 0", mass=_text(parts.hub_mass),
@@ -233,7 +234,7 @@ def _add_wheel(
         ET.SubElement(
             roller, "joint", name=f"roller_{wheel}_{number}", type="hinge", axis="0 1 0",
             damping=_text(_ROLLER_DAMPING * scale**3), armature=_text(_ROLLER_ARMATURE * scale**3),
-            solreffriction=_STIFF, solimpfriction=_FIRM,
+            solreffriction=_ROLLER_STOPS, solimpfriction=_FIRM,
         )  # fmt: skip
         ET.SubElement(
             roller, "inertial", pos="0 0 0", mass=_text(parts.roller_mass),
