@@ -1,6 +1,6 @@
 """Backward elimination of findings, by a table of what each set of them is worth."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import permutations
 from types import SimpleNamespace
 
@@ -97,28 +97,34 @@ def test_needed_findings_stay_and_their_rivals_are_named(second) -> None:  # typ
     assert _letters(found.alternatives[0][0].model) == "ac"
 
 
-def test_one_effect_may_do_the_work_of_any_two_findings(
-    second,  # type: ignore[no-untyped-def]
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+@pytest.fixture
+def near(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[..., list[Model]]], None]:
+    """Sets what `nearest(best, *numbers)` gives; w is the one candidate."""
+    monkeypatch.setattr(backward_elimination, "_together", lambda *given: ())
+
+    def answer(nearest: Callable[..., list[Model]]) -> None:
+        def responses(dataset: object, found: Selection, candidates: object) -> SimpleNamespace:
+            return SimpleNamespace(
+                dataset=dataset, found=found, candidates=_model("w").hypotheses, nearest=nearest
+            )
+
+        monkeypatch.setattr(backward_elimination, "Responses", responses)
+
+    return answer
+
+
+def test_one_effect_may_do_the_work_of_any_two_findings(second, near) -> None:  # type: ignore[no-untyped-def]
     """w does nearly what a and e do together, and two findings cost less than three."""
     asked = []
 
-    class Nearest:
-        candidates = tuple(_model("w").hypotheses)
+    def nearest(best: FittedModel, *numbers: int) -> list[Model]:
+        asked.append((_letters(best.model), numbers))
+        letters = list(_letters(best.model))
+        pair = sorted(letters[number] for number in numbers)
+        rest = [letter for letter in letters if letter not in pair]
+        return [_model("".join(["w", *rest]))] if pair == ["a", "e"] else []
 
-        def __init__(self, dataset: object, found: Selection, candidates: object) -> None:
-            self.found, self.dataset = found, dataset
-
-        def nearest(self, best: FittedModel, *numbers: int) -> list[Model]:
-            asked.append((_letters(best.model), numbers))
-            letters = list(_letters(best.model))
-            pair = sorted(letters[number] for number in numbers)
-            rest = [letter for letter in letters if letter not in pair]
-            return [_model("".join(["w", *rest]))] if pair == ["a", "e"] else []
-
-    monkeypatch.setattr(backward_elimination, "Responses", Nearest)
-    monkeypatch.setattr(backward_elimination, "_together", lambda *given: ())
+    near(nearest)
     found = second("abe", ("", "a"), ("a", "b"), ("ab", "e"))
     assert _letters(found.best.model) == "wb"
     assert {("abe", pair) for pair in ((0, 1), (0, 2), (1, 2))} <= set(asked)
@@ -126,6 +132,7 @@ def test_one_effect_may_do_the_work_of_any_two_findings(
 
 def test_shapes_are_tried_for_each_of_two_findings(
     second,  # type: ignore[no-untyped-def]
+    near,  # type: ignore[no-untyped-def]
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     asked = []
@@ -134,17 +141,7 @@ def test_shapes_are_tried_for_each_of_two_findings(
         asked.append((number, needless))
         return [_model("bw")] if (number, needless) == (2, 0) else []
 
-    class Nothing:
-        candidates = tuple(_model("w").hypotheses)
-
-        def __init__(self, dataset: object, found: Selection, candidates: object) -> None:
-            self.found, self.dataset = found, dataset
-
-        def nearest(self, best: FittedModel, *numbers: int) -> list[Model]:
-            return []
-
-    monkeypatch.setattr(backward_elimination, "Responses", Nothing)
-    monkeypatch.setattr(backward_elimination, "_together", lambda *given: ())
+    near(lambda best, *numbers: [])
     monkeypatch.setattr(backward_elimination, "_reshaped", reshaped)
     found = second("abe", ("", "a"), ("a", "b"), ("ab", "e"))
     assert _letters(found.best.model) == "bw"

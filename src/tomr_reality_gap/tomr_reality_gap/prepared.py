@@ -50,7 +50,7 @@ class Prepared:
     def summed_otherwise(self) -> "Prepared":
         """The same, of drivers that sum their error the other way."""
         base = summed_otherwise(self.base)
-        return evolve(self, base=base, robot=robot_from_parameters(base.values, base.place))
+        return evolve(self, base=base, robot=base.robot)
 
 
 def prepared(request: Request) -> Prepared:

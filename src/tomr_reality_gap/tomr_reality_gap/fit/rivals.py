@@ -47,8 +47,7 @@ class Responses:
         """
         jacobian, weight = self.found.rounds[-1].jacobian, self.found.noise.weight
         number, *others = numbers
-        count = len(best.model.hypotheses)
-        kept = best.model.kept([at not in others for at in range(count)]) if others else best.model
+        kept = best.model.kept([at not in others for at in range(len(best.model.hypotheses))])
         fewer = kept.without(number)
         values = self.dataset.predict([best.model.described.robot, fewer.described.robot])
         lacking = (self.dataset.value - best.value + values[0] - values[1]) * weight

@@ -128,7 +128,10 @@ class Engine:
         return np.asarray(self._arms @ rotation + self.data.qpos[:2])
 
     def normal_forces(self, duration: float) -> Vector:
-        """Smoothed normal force on each wheel [N], shape (3,); call once per stretch."""
+        """Smoothed normal force on each wheel [N], shape (3,); call once per stretch.
+
+        How many rollers carry each wheel, which `set_loads` needs, is smoothed with it.
+        """
         share = min(1.0, duration / _NORMAL_SMOOTHING)
         force, carrying = self._contact_forces()
         self._normal = self._normal + share * (force - self._normal)
