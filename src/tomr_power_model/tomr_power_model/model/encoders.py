@@ -204,26 +204,29 @@ class EncoderWindow:
             return _from_positions(times, positions)
         return self._mixed(samples, times, positions)
 
-    def beside(self, tick_ns: int, reference: Reference) -> WheelEstimate:
-        """As `at`, where a simulation of the same motion is known.
+    def beside(self, tick_ns: int, reference: Reference) -> tuple[WheelEstimate, WheelEstimate]:
+        """As `at`, where a simulation of the same motion is known; and as simulated, at the angles
+        that are measured.
 
         What is measured less what is simulated changes slowly: it is fitted over a longer span,
         which leaves less of the noise in the acceleration.
         """
         samples = self._until(tick_ns, max(self._span, round(1e9 * LONG_S)))
         positions = np.array([sample.position for sample in samples])
-        if len(samples) < _FIT or np.isnan(positions).any():
-            return self.at(tick_ns)
         middle = tick_ns - self._period // 2
         times = self._times(samples, middle)
         simulated, angle, speed, acceleration = reference.beside(
             [middle + time for time in times], tick_ns, self._period
         )
-        ahead = positions - simulated
-        offset = _weights(times, 2) @ (ahead - ahead[0])
-        return WheelEstimate(
-            speed + offset[1], acceleration + 2.0 * offset[2], angle + ahead[0] + offset[0]
-        )
+        if len(samples) < _FIT or np.isnan(positions).any():
+            measured = self.at(tick_ns)
+        else:
+            ahead = positions - simulated
+            offset = _weights(times, 2) @ (ahead - ahead[0])
+            measured = WheelEstimate(
+                speed + offset[1], acceleration + 2.0 * offset[2], angle + ahead[0] + offset[0]
+            )
+        return measured, WheelEstimate(speed, acceleration, measured.angle)
 
     def _until(self, tick_ns: int, span: int | None = None) -> list[EncoderSample]:
         """Samples of the window, and the two newest where encoders are slower than it."""

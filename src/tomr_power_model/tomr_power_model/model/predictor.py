@@ -13,12 +13,12 @@ from tomr_power_model.drive.plausible import fastest_wheel
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.body import Body
 from tomr_power_model.dynamics.vehicle import plant_numbers, vehicle_of
-from tomr_power_model.effects import EFFECTS
 from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.readings import NAN, UNKNOWN_READING, SupplyReading
 from tomr_power_model.model.commanded import Commanded, CommandPath, CommandTiming, Seen
 from tomr_power_model.model.continuity import COMMAND_TOLERANCE, Continuity
 from tomr_power_model.model.encoder_flaws import EncoderFlaws
+from tomr_power_model.model.encoder_path import RESTS, EncoderPath, Simulated
 from tomr_power_model.model.encoders import (
     UNKNOWN,
     UNKNOWN_MOTION,
@@ -29,7 +29,6 @@ from tomr_power_model.model.encoders import (
 )
 from tomr_power_model.model.input_health import InputReporter, InputState, TermsState
 from tomr_power_model.model.means import Means
-from tomr_power_model.model.monitors import Monitors
 from tomr_power_model.model.power_models import POWER_MODELS, MeasuredMotion, Windows
 from tomr_power_model.model.prediction import Prediction, Readings
 from tomr_power_model.model.resting import RestingDrivers
@@ -45,7 +44,6 @@ IMU = "imu/data"
 VOLTAGES = "motor_voltage"
 
 _BY_ANGLE = {"drivetrain.torque_ripple", "sensor.encoder_eccentricity"}
-_RESTS = 0.05  # rad/s: a slower wheel may stand still
 _INTERVALS = 5  # between commands, of which the middle one is usual
 _LOST = 1.5  # of the usual: a command was lost
 _UNSURE = to_ns(0.5)  # until robot and simulation do the same again
@@ -83,11 +81,10 @@ class PowerPredictor:
         self._flaws = EncoderFlaws.of(robot)
         self._supply_scale = numbers.supply_scale
         self._ripples = bool(_BY_ANGLE & robot.physics.keys())
-        self._sticks = any(EFFECTS[name].dry_torque is not None for name in robot.physics)
         self._to_twist = Body.of(robot).to_twist.tolist()
         # The paper's coefficients are fitted to what the monitors showed.
-        physical = given.power_model == "physical"
-        self._measured = Monitors.of(robot, period_s) if physical else None
+        is_shown = given.power_model != "physical"
+        self._measured = EncoderPath(robot, self._model, period_s, is_shown=is_shown)
         self._clear()
 
     def _clear(self) -> None:
@@ -104,8 +101,7 @@ class PowerPredictor:
         self._heading = 0.0  # at the start of the next tick, against the first [rad]
         self._model.clear()
         self._stamps: list[deque[tuple[int]]] = [deque() for _ in range(WHEELS + 1)]
-        if self._measured is not None:
-            self._measured.clear()
+        self._measured.clear()
 
     def command(self, stamp_ns: int, twist: Triple) -> Arrival:
         """Take a commanded twist (v_x, v_y [m/s], omega_z [rad/s]) in base_link."""
@@ -198,14 +194,44 @@ class PowerPredictor:
         commanded = self._path.over(tick, Seen(twist, before, self._heading))
         if begins and commanded is not None and _is_half_known(speed):
             self._begun = tick
+        simulated = UNKNOWN_MOTION
         if commanded is not None:
-            estimate = self._encoders.beside(tick, self._path.motion)
+            estimate, simulated = self._encoders.beside(tick, self._path.motion)
             speed = estimate.speed.tolist()
-        after = self._moved(estimate, 0.5 * self._period_s)
         windows = self._windows(tick)
-        share = 0.5 + windows.offset_s / self._period_s
-        held = self._commanded(tick, self._resting.voltages(self._path, after, speed, share))
-        rise = self._path.wheel(at.RISE) or self._cold
+        said = self._said(tick)
+        motion = self._motion(estimate, gyro, commanded, windows.offset_s, said)
+        is_silent = commanded is None or self._is_silent(tick, commanded, speed)
+        if self._has_lost(tick) or is_silent:
+            self._resting.forget()
+        says = [math.isfinite(volts) for volts in said]
+        if commanded is None or is_silent:
+            alone = self._readings(self._measured.means(motion, None, says))
+            return Prediction(tick, UNKNOWN, UNKNOWN, _UNKNOWN, UNKNOWN_READING, alone)
+        means = self._model.commanded(commanded, windows)
+        beside = Simulated(self._moving_as(motion, simulated), means)
+        return Prediction(
+            stamp_ns=tick,
+            speed=_triple(commanded.speed),
+            torque=_triple(means.torque),
+            motors=self._readings(means),
+            total=self._total(means),
+            from_encoders=self._readings(self._measured.means(motion, beside, says)),
+        )
+
+    def _motion(
+        self,
+        estimate: WheelEstimate,
+        gyro: float,
+        commanded: Commanded | None,
+        offset_s: float,
+        said: Sequence[float],
+    ) -> MeasuredMotion:
+        """Motion of the wheels in a tick, from what the encoders show of it."""
+        after = self._moved(estimate, 0.5 * self._period_s)
+        share = 0.5 + offset_s / self._period_s
+        inferred = self._resting.voltages(self._path, after, estimate.speed.tolist(), share)
+        pairs = zip(said, inferred, strict=True)
         wheels = self._flaws.turned(estimate)
         turning = wheels.speed.tolist()
         turned = self._period_s * self._turning(turning, gyro, commanded)
@@ -215,39 +241,31 @@ class PowerPredictor:
             estimate.angle.tolist(),
             gyro,
             self._heading + 0.5 * turned,
-            rise,
-            held,
-            windows.offset_s,
+            self._path.wheel(at.RISE) or self._cold,
+            [own if math.isfinite(own) else other for own, other in pairs],
+            offset_s,
             self._path.besides,
         )
         self._heading += turned
-        measured = self._model.measured(motion)
-        from_encoders = self._readings(self._where_known(measured, motion), self._measured)
-        is_silent = commanded is None or self._is_silent(tick, commanded, speed)
-        if self._has_lost(tick) or is_silent:
-            self._resting.forget()
-        if commanded is None or is_silent:
-            return Prediction(tick, UNKNOWN, UNKNOWN, _UNKNOWN, UNKNOWN_READING, from_encoders)
-        means = self._model.commanded(commanded, windows)
-        return Prediction(
-            stamp_ns=tick,
-            speed=_triple(commanded.speed),
-            torque=_triple(means.torque),
-            motors=self._readings(means),
-            total=self._total(means),
-            from_encoders=from_encoders,
+        return motion
+
+    def _moving_as(self, motion: MeasuredMotion, simulated: WheelEstimate) -> MeasuredMotion:
+        """The same with the wheels as simulated, and the body as they roll."""
+        wheels = self._flaws.turned(simulated)
+        return evolve(
+            motion,
+            speed=wheels.speed.tolist(),
+            acceleration=wheels.acceleration.tolist(),
+            yaw_rate=NAN,
         )
 
-    def _commanded(self, tick: int, inferred: Sequence[float]) -> list[float]:
-        """Voltages of the drivers in a tick [V]: as they say, or else as inferred."""
+    def _said(self, tick: int) -> list[float]:
+        """Voltages of the drivers in a tick, as they say [V]; NaN where they do not."""
         period, stale = self.settings.ticks.period, self.settings.stale
         found = of_tick(self._voltages, tick, period, stale)
         if not found:
-            return list(inferred)
-        means = [sum(column) / len(found) for column in zip(*found, strict=True)][1:]
-        return [
-            said if math.isfinite(said) else own for said, own in zip(means, inferred, strict=True)
-        ]
+            return [NAN] * WHEELS
+        return [sum(column) / len(found) for column in zip(*found, strict=True)][1:]
 
     def _is_silent(self, tick: int, commanded: Commanded, speed: Sequence[float]) -> bool:
         """Whether the commands paused lately, so that what the robot was commanded is not known.
@@ -262,7 +280,7 @@ class PowerPredictor:
         if not timeout:
             return False
         silent = self._commands.is_broken(tick)
-        stands = all(abs(value) < _RESTS for value in (*commanded.speed, *speed))
+        stands = all(abs(value) < RESTS for value in (*commanded.speed, *speed))
         if silent and stands and tick - self._commands.last(tick) > timeout:
             self._commands.excuse(tick)
             return False
@@ -282,25 +300,6 @@ class PowerPredictor:
             [stamp for (stamp,) in of_tick(stamps, tick, period, stale)] for stamps in self._stamps
         ]
         return Windows(ends[:WHEELS], ends[WHEELS], self._window, tick, period)
-
-    def _where_known(self, means: Means, motion: MeasuredMotion) -> Means:
-        """NaN for a wheel at rest that may hold any torque up to its dry friction."""
-        if not self._sticks or not any(math.isnan(volts) for volts in motion.held):
-            return means
-        known = [
-            not math.isnan(volts) or abs(speed) > _RESTS
-            for volts, speed in zip(motion.held, motion.speed, strict=True)
-        ]
-
-        def kept(values: Sequence[float]) -> list[float]:
-            return [value if sure else NAN for value, sure in zip(values, known, strict=True)]
-
-        return evolve(
-            means,
-            current=kept(means.current),
-            at_motor=kept(means.at_motor),
-            power=kept(means.power),
-        )
 
     def _twist(self, speed: Sequence[float]) -> Triple:
         """Twist of the body from wheel speeds [rad/s]."""
@@ -328,27 +327,15 @@ class PowerPredictor:
         nominal = self._robot.supply.nominal_voltage
         return nominal if math.isnan(power) else nominal - self._drop * power / nominal
 
-    def _readings(self, means: Means, monitors: Monitors | None = None) -> Readings:
+    def _readings(self, means: Means) -> Readings:
         if self._reads_motor:
-            if monitors is not None:
-                means = self._as_shown(means, monitors)
             first, second, third = map(self._at_motor, means.at_motor, means.current)
         else:
             voltage = self._bus_voltage(means, means.total)
-            powers = means.power if monitors is None else monitors.shown(means.power)
             first, second, third = (
-                SupplyReading.rounded(voltage, power / voltage) for power in powers
+                SupplyReading.rounded(voltage, power / voltage) for power in means.power
             )
         return first, second, third
-
-    def _as_shown(self, means: Means, monitors: Monitors) -> Means:
-        """Motor currents as their monitors show them, which take them for those of the supply."""
-        nominal = self._robot.supply.nominal_voltage
-        shown = monitors.shown([nominal * current for current in means.current])
-        current = [power / nominal for power in shown]
-        volts = _voltages(means)
-        at_motor = [v * i for v, i in zip(volts, current, strict=True)]
-        return evolve(means, current=current, at_motor=at_motor)
 
     def _at_motor(self, power: float, current: float) -> SupplyReading:
         """Motor current, and the terminal voltage that makes voltage * current the power."""
@@ -366,12 +353,6 @@ class PowerPredictor:
         return SupplyReading.rounded(voltage, self._supply_scale * power / voltage)
 
 
-def _voltages(means: Means) -> list[float]:
-    """Mean terminal voltages where current flows, else 0 [V]."""
-    pairs = zip(means.at_motor, means.current, strict=True)
-    return [power / current if current else 0.0 for power, current in pairs]
-
-
 def _triple(values: Sequence[float] | Array) -> Triple:
     first, second, third = (float(value) for value in values)
     return first, second, third
@@ -379,5 +360,5 @@ def _triple(values: Sequence[float] | Array) -> Triple:
 
 def _is_half_known(speed: Sequence[float]) -> bool:
     """Whether some wheels turn, and of others nothing is known."""
-    turns = any(abs(value) > _RESTS for value in speed)
+    turns = any(abs(value) > RESTS for value in speed)
     return turns and any(math.isnan(value) for value in speed)

@@ -32,9 +32,12 @@ class Expected:
 
     motion: Motion
     # Of each tick, (ticks, 3): speeds and accelerations in its middle as `EncoderWindow.beside`
-    # gives them [rad/s, rad/s^2], voltages of the drivers as the power sensors see them [V].
+    # gives them, measured and simulated [rad/s, rad/s^2], voltages of the drivers as the power
+    # sensors see them [V].
     speed: Array = field(repr=False)
     acceleration: Array = field(repr=False)
+    simulated_speed: Array = field(repr=False)
+    simulated_acceleration: Array = field(repr=False)
     held: Array = field(repr=False)
 
 
@@ -74,7 +77,7 @@ def run_believed(drive: Drive, signals: Signals, share: Array) -> Expected:
     step = simulation.period_s / steps
     out = np.empty((len(inputs), steps * simulation.row))
     ends = np.zeros((len(inputs) * steps + 1, WHEELS))
-    shown = np.empty((3, ticks, WHEELS))  # speeds, accelerations, voltages
+    shown = np.empty((5, ticks, WHEELS))  # as in `Expected`
     fits = Fits.over(signals.encoder_time, ticks, LONG_S)
     borders = np.round(TICK * np.arange(ticks + 1) / simulation.period_s).astype(np.int64)
     borders[-1] = len(inputs)
@@ -86,10 +89,12 @@ def run_believed(drive: Drive, signals: Signals, share: Array) -> Expected:
             means, axis=0
         )
         after = np.array(path.wheel(at.SPEED))
-        change = (after - before) / TICK
-        angle, speed, acceleration = _seen(fits, k, ends[: last * steps + 1], step, change, signals)
+        until = ends[: last * steps + 1]
+        edges = at_times(until, step, TICK * np.array([k, k + 1.0]))
+        mean, change = (edges[1] - edges[0]) / TICK, (after - before) / TICK
+        angle, speed, acceleration = _seen(fits, k, until, step, (mean, change), signals)
         held = drivers.voltages(path, angle.tolist(), speed.tolist(), float(share[k]))
-        shown[:, k] = speed, acceleration, held
+        shown[:, k] = speed, acceleration, mean, change, held
         before = after
     variant = Variant(np.asarray(simulation.numbers))
     motion = Motion(variant, from_rest(inputs), Steps.of(out, WHEELS), step, ticks)
@@ -97,18 +102,22 @@ def run_believed(drive: Drive, signals: Signals, share: Array) -> Expected:
 
 
 def _seen(
-    fits: Fits, tick: int, ends: Array, step: float, change: Array, signals: Signals
+    fits: Fits,
+    tick: int,
+    ends: Array,
+    step: float,
+    simulated: tuple[Array, Array],
+    signals: Signals,
 ) -> tuple[Array, Array, Array]:
     """Angle at the end of a tick, and speed and acceleration in its middle, (3,) each.
 
-    As `EncoderWindow.beside` gives them beside a simulated motion, whose speed changes by `change`
-    [rad/s^2].
+    As `EncoderWindow.beside` gives them beside a simulated motion of some mean speed and
+    acceleration.
     """
-    edges = TICK * np.array([tick, tick + 0.5, tick + 1.0])
-    start, middle, end = at_times(ends, step, edges)
+    middle = at_times(ends, step, TICK * np.array([tick + 0.5]))[0]
     index = fits.index[tick]
     ahead = signals.position[index] - at_times(ends, step, signals.encoder_time[index])
     offset, slope, curve = fits.of(tick, ahead)
-    speed, acceleration = (end - start) / TICK + slope, change + curve
+    speed, acceleration = simulated[0] + slope, simulated[1] + curve
     half = 0.5 * TICK
     return middle + offset + half * (speed + 0.5 * half * acceleration), speed, acceleration

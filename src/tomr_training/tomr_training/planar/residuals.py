@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.binding import compiled
+from tomr_power_model.model.encoder_path import at_rest, beside
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.robot import WHEELS
 from tomr_training.drives import Drive
@@ -63,16 +64,26 @@ def compare(drive: Drive, signals: Signals) -> Compared:
     total = commanded.sum(axis=1, keepdims=True) + auxiliary
     _, speed, _ = Fits.over(signals.encoder_time, ticks, _WINDOW).all(signals.position)
     drawn = _tick_means(signals.power_time, signals.voltage * signals.drawn, ticks)
-    derived = _derived(believed, offset)
+    derived = _derived(believed, commanded, offset)
     return Compared(
         np.hstack([total, commanded, expected.tick_means(expected.steps.speed), derived]),
         np.hstack([drawn[:, 3:], drawn[:, :3], speed, drawn[:, :3]]),
     )
 
 
-def _derived(believed: Expected, offset: Array) -> Array:
+def _derived(believed: Expected, commanded: Array, offset: Array) -> Array:
     """Power of each driver by the encoders [W], (ticks, 3): `PowerPredictor`'s encoder path."""
-    speed, acceleration = believed.speed, believed.acceleration
+    speed, simulated = believed.speed, believed.simulated_speed
+    return beside(
+        commanded,
+        _inverse(believed, speed, believed.acceleration, offset),
+        _inverse(believed, simulated, believed.simulated_acceleration, offset),
+        (at_rest(speed), at_rest(simulated)),
+    )
+
+
+def _inverse(believed: Expected, speed: Array, acceleration: Array, offset: Array) -> Array:
+    """Power of each driver in some motion by inverse dynamics [W], (ticks, 3)."""
     motion = np.zeros((len(speed), at.MOTION_HEADER + WHEELS * at.MOTION_WHEEL))
     motion[:, [at.MOTION_YAW, at.MOTION_HEADING]] = math.nan
     first = at.MOTION_HEADER + at.MOTION_WHEEL * np.arange(WHEELS)

@@ -1,0 +1,114 @@
+"""The encoder path: what the difference of two motions makes, on top of the simulated power."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from tomr_power_model.model.commanded import CommandPath, CommandTiming, Seen
+from tomr_power_model.model.encoder_path import at_rest, beside
+from tomr_power_model.model.prediction import Prediction
+from tomr_power_model.model.predictor import PowerPredictor
+from tomr_power_model.robot import Robot, shipped_robot
+
+MS = 1_000_000
+BASE = 1_700_000_000_000 * MS
+NAN3 = (math.nan, math.nan, math.nan)
+STILL = Seen((0.0, 0.0, 0.0), NAN3, math.nan)
+ROBOT = shipped_robot("reference")
+Twist = tuple[float, float, float]
+STOP, AHEAD, TURN = (0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, 0.0, 1.0)
+# Rollers that drag keep what the drive ahead left in them while the robot turns on the spot.
+DRAG = {"contact.roller_drag": ({"coefficient": 0.03, "slip": 1.0},) * 3}
+MONITORS = {
+    "sensor.power_scale": ({"scale": 1.1},) * 3,
+    "sensor.power_lag": ({"time_constant": 0.1},) * 3,
+}
+
+
+def _robot(
+    physics: Mapping[str, tuple[Mapping[str, float], ...]], name: str = "reference"
+) -> Robot:
+    robot = shipped_robot(name)
+    return evolve(robot, physics={**robot.physics, **physics})
+
+
+def _angles(robot: Robot, twists: list[tuple[int, Twist]], until_ms: int) -> dict[int, list[float]]:
+    """Angles of wheels that do as they are commanded, by the time of the encoders' samples [ms]."""
+    path = CommandPath(robot, CommandTiming(50 * MS))
+    found: dict[int, list[float]] = {}
+    for start_ms in range(0, until_ms, 50):
+        newest = [twist for begin, twist in twists if begin <= start_ms][-1]
+        path.command(BASE + start_ms * MS, newest)
+        end = BASE + (start_ms + 50) * MS
+        path.over(end, STILL)
+        times = range(start_ms + 3, start_ms + 50, 10)
+        if path.state is None:  # the first command is on its way
+            found |= {t: [0.0, 0.0, 0.0] for t in times}
+            continue
+        seen, *_ = path.motion.beside([BASE + t * MS for t in times], end, 50 * MS)
+        found |= dict(zip(times, seen.tolist(), strict=True))
+    return found
+
+
+def _predictions(
+    robot: Robot, twists: list[tuple[int, Twist]], until_ms: int, faster: float = 0.0
+) -> list[Prediction]:
+    """Of a robot that does as it is commanded, or whose wheels turn faster backwards [rad/s]."""
+    predictor, angles, found = PowerPredictor(robot), _angles(robot, twists, until_ms), []
+    for at_ms in range(until_ms):
+        stamp = BASE + at_ms * MS
+        if at_ms % 50 == 0:
+            predictor.command(stamp, [twist for begin, twist in twists if begin <= at_ms][-1])
+        if at_ms in angles:
+            first, second, third = (angle - 1e-3 * faster * at_ms for angle in angles[at_ms])
+            predictor.encoders(stamp, (first, second, third), NAN3)
+        found += predictor.due()
+    return found
+
+
+def _powers(prediction: Prediction) -> tuple[list[float], list[float]]:
+    return [item.power for item in prediction.motors], [
+        item.power for item in prediction.from_encoders
+    ]
+
+
+def test_the_difference_of_two_motions_by_hand() -> None:
+    simulated, inverse, of_simulated = np.array([5.0] * 4), np.array([4.0] * 4), np.array([3.0] * 4)
+    here = np.array([False, False, True, True])
+    there = np.array([False, True, False, True])
+    found = beside(simulated, inverse, of_simulated, (here, there))
+    # Both move: 5 + 4 - 3. At rest in the simulation alone: inverse dynamics. Both rest: 5.
+    assert found.tolist() == [6.0, 4.0, 6.0, 5.0]
+
+
+def test_a_wheel_of_unknown_speed_does_not_rest() -> None:
+    assert at_rest(np.array([0.09, -0.09, 0.11, math.nan])).tolist() == [True, True, False, False]
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [
+        ROBOT,
+        _robot(DRAG),
+        _robot(MONITORS),
+        _robot(MONITORS, "robotino_v2"),
+    ],
+    ids=["reference", "rollers that drag", "monitors", "currents"],
+)
+def test_of_wheels_that_turn_as_simulated_both_paths_say_the_same(robot: Robot) -> None:
+    found = _predictions(robot, [(0, STOP), (500, AHEAD), (1500, TURN), (2500, STOP)], 3500)
+    for prediction in found:
+        commanded, measured = _powers(prediction)
+        assert measured == pytest.approx(commanded, rel=1e-5, abs=1e-5, nan_ok=True)
+
+
+def test_faster_wheels_draw_more_by_what_their_speed_makes() -> None:
+    """Friction 0.06 + 0.004 w N m, k 0.7 N m/A, 0.8 ohm: 0.3134 W at 4 rad/s, 0.3609 at 4.5."""
+    plain = _predictions(ROBOT, [(0, STOP), (500, TURN)], 2500)[-1]
+    faster = _predictions(ROBOT, [(0, STOP), (500, TURN)], 2500, faster=0.5)[-1]
+    assert _powers(faster)[0] == pytest.approx(_powers(plain)[0], rel=1e-5)
+    more = np.array(_powers(faster)[1]) - _powers(plain)[1]
+    np.testing.assert_allclose(more, 0.3609 - 0.3134, atol=1e-4)
