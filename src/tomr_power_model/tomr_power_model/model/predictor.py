@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from statistics import median
 
 import numpy as np
-from attrs import evolve
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.drive.plausible import fastest_wheel
@@ -48,6 +48,18 @@ _INTERVALS = 5  # between commands, of which the middle one is usual
 _LOST = 1.5  # of the usual: a command was lost
 _UNSURE = to_ns(0.5)  # until robot and simulation do the same again
 _UNKNOWN: Readings = (UNKNOWN_READING, UNKNOWN_READING, UNKNOWN_READING)
+
+
+@frozen
+class _Tick:
+    """What is known of a tick before the drivers are asked about it."""
+
+    estimate: WheelEstimate  # of the motion of the wheels, by their encoders
+    simulated: WheelEstimate  # the same as simulated, unknown before the first command
+    gyro: float  # rad/s, NaN where not known
+    commanded: Commanded | None
+    offset_s: float  # how much later than its middle the power was measured [s]
+    said: Sequence[float]  # voltages of the drivers, NaN where they do not say them [V]
 
 
 class PowerPredictor:
@@ -200,7 +212,7 @@ class PowerPredictor:
             speed = estimate.speed.tolist()
         windows = self._windows(tick)
         said = self._said(tick)
-        motion = self._motion(estimate, gyro, commanded, windows.offset_s, said)
+        motion = self._motion(_Tick(estimate, simulated, gyro, commanded, windows.offset_s, said))
         is_silent = commanded is None or self._is_silent(tick, commanded, speed)
         if self._has_lost(tick) or is_silent:
             self._resting.forget()
@@ -219,31 +231,28 @@ class PowerPredictor:
             from_encoders=self._readings(self._measured.means(motion, beside, says)),
         )
 
-    def _motion(
-        self,
-        estimate: WheelEstimate,
-        gyro: float,
-        commanded: Commanded | None,
-        offset_s: float,
-        said: Sequence[float],
-    ) -> MeasuredMotion:
+    def _motion(self, seen: _Tick) -> MeasuredMotion:
         """Motion of the wheels in a tick, from what the encoders show of it."""
-        after = self._moved(estimate, 0.5 * self._period_s)
-        share = 0.5 + offset_s / self._period_s
-        inferred = self._resting.voltages(self._path, after, estimate.speed.tolist(), share)
-        pairs = zip(said, inferred, strict=True)
-        wheels = self._flaws.turned(estimate)
+        inferred = self._resting.voltages(
+            self._path,
+            self._moved(seen.estimate, 0.5 * self._period_s),
+            seen.estimate.speed.tolist(),
+            simulated=seen.simulated.speed.tolist(),
+            share=0.5 + seen.offset_s / self._period_s,
+        )
+        pairs = zip(seen.said, inferred, strict=True)
+        wheels = self._flaws.turned(seen.estimate)
         turning = wheels.speed.tolist()
-        turned = self._period_s * self._turning(turning, gyro, commanded)
+        turned = self._period_s * self._turning(turning, seen.gyro, seen.commanded)
         motion = MeasuredMotion(
             turning,
             wheels.acceleration.tolist(),
-            estimate.angle.tolist(),
-            gyro,
+            seen.estimate.angle.tolist(),
+            seen.gyro,
             self._heading + 0.5 * turned,
             self._path.wheel(at.RISE) or self._cold,
             [own if math.isfinite(own) else other for own, other in pairs],
-            offset_s,
+            seen.offset_s,
             self._path.besides,
         )
         self._heading += turned

@@ -6,8 +6,9 @@ driver's law does, on the measured speeds:
     v = k_p (asked - omega) + k_i I,   I = integral of (asked - omega) = I_sim + theta_sim - theta
 
 for simulation and driver are asked for the same, and both sum up. What a start in motion,
-saturation or a fault left different fades while the wheel turns, soon where it turns as simulated:
-what moves alike is driven alike.
+saturation or a fault left different fades while the wheel turns: soon for a while after it has
+turned otherwise than simulated, for what moves alike is driven alike, else slowly, for by as much
+as its friction is not as described its driver's sum does differ.
 
 What a push leaves in a driver's sum stays while friction holds the wheel, seconds long, and what
 is expected of the wheel then would be wrong. So while a wheel stands that in the simulation stands
@@ -28,8 +29,9 @@ from tomr_power_model.robot import WHEELS, Robot
 
 _UNKNOWN = float("nan")
 _MOVING = 1.0  # rad/s
-_FADES = 0.01  # share of the difference in a tick in motion, ...
-_AGREES, _FADES_SOON = 0.5, 0.1  # ... and where it differs by less [rad/s]
+_FADES = 0.005  # share of the difference in a tick in motion, ...
+_FADES_SOON, _SOON = 0.1, 40  # ... and for so many ticks after ...
+_DIFFERS = 0.5  # ... the speed was not as simulated [rad/s]
 _STANDS = 0.05  # rad/s
 _CREEPS = 0.01  # rad/s: faster than it is asked to
 _SLOW = 0.5  # rad/s
@@ -68,6 +70,7 @@ class RestingDrivers:
         self._offset = [_UNKNOWN] * WHEELS  # rad
         self._before = [_UNKNOWN] * WHEELS  # V, at the end of the last tick
         self._strange = [False] * WHEELS  # differences that are not the drivers'
+        self._soon = [0] * WHEELS  # ticks for which they fade soon
         self._followed = [False] * WHEELS  # in the last tick
 
     def forget(self) -> None:
@@ -75,7 +78,13 @@ class RestingDrivers:
         self._offset = [_UNKNOWN] * WHEELS
 
     def voltages(
-        self, path: SimulatedDrivers, angle: Sequence[float], speed: Sequence[float], share: float
+        self,
+        path: SimulatedDrivers,
+        angle: Sequence[float],
+        speed: Sequence[float],
+        *,
+        simulated: Sequence[float],
+        share: float,
     ) -> list[float]:
         """Voltage that each driver holds at some time of a tick [V], NaN before the first command.
 
@@ -83,18 +92,17 @@ class RestingDrivers:
             path: that simulates what the drivers are asked for.
             angle: of the wheels at the end of the tick [rad], NaN where not known.
             speed: of the wheels [rad/s].
+            simulated: the same as simulated, mean of the tick as well.
             share: of the tick at that time.
         """
         if path.state is None:
             return [_UNKNOWN] * WHEELS
         turned, sums, asked = (path.wheel(part) for part in (at.TURNED, at.INTEGRAL, at.ASKED))
         ahead = [turned[wheel] - angle[wheel] for wheel in range(WHEELS)]
-        simulated = path.wheel(at.SPEED)
         found, apart = [], []
         for wheel in range(WHEELS):
-            fades = _FADES_SOON if abs(speed[wheel] - simulated[wheel]) < _AGREES else _FADES
-            share_lost = fades if abs(speed[wheel]) > _MOVING else 0.0
-            apart.append(self._difference(wheel, ahead[wheel], share_lost))
+            fades = self._fades(wheel, speed[wheel], simulated[wheel])
+            apart.append(self._difference(wheel, ahead[wheel], fades))
             known = apart[wheel] if apart[wheel] == apart[wheel] else 0.0
             error = asked[wheel] - speed[wheel]
             found.append(self._proportional * error + self._integral * (sums[wheel] + known))
@@ -104,6 +112,17 @@ class RestingDrivers:
             first + share * (last - first) if first == first else last
             for first, last in zip(before, found, strict=True)
         ]
+
+    def _fades(self, wheel: int, speed: float, simulated: float) -> float:
+        """Share of the difference that a tick takes off, of a wheel that turns so [rad/s]."""
+        if abs(speed - simulated) > _DIFFERS:
+            self._soon[wheel] = _SOON
+        if not abs(speed) > _MOVING:
+            return 0.0
+        if not self._soon[wheel] or abs(speed - simulated) > _DIFFERS:
+            return _FADES
+        self._soon[wheel] -= 1
+        return _FADES_SOON
 
     def _difference(self, wheel: int, ahead: float, fades: float) -> float:
         """What a driver's sum is over the simulation's [rad], NaN where not known.

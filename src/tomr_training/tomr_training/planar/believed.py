@@ -93,7 +93,8 @@ def run_believed(drive: Drive, signals: Signals, share: Array) -> Expected:
         edges = at_times(until, step, TICK * np.array([k, k + 1.0]))
         mean, change = (edges[1] - edges[0]) / TICK, (after - before) / TICK
         angle, speed, acceleration = _seen(fits, k, until, step, (mean, change), signals)
-        held = drivers.voltages(path, angle.tolist(), speed.tolist(), float(share[k]))
+        seen = angle.tolist(), speed.tolist()
+        held = drivers.voltages(path, *seen, simulated=mean.tolist(), share=float(share[k]))
         shown[:, k] = speed, acceleration, mean, change, held
         before = after
     variant = Variant(np.asarray(simulation.numbers))
