@@ -11,6 +11,7 @@ from tomr_power_model.model.commanded import CommandPath, CommandTiming, Seen
 from tomr_power_model.model.encoder_path import at_rest, beside
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.predictor import PowerPredictor
+from tomr_power_model.model.settings import ModelSettings
 from tomr_power_model.robot import Robot, shipped_robot
 
 MS = 1_000_000
@@ -95,14 +96,17 @@ def test_a_wheel_of_unknown_speed_does_not_rest() -> None:
         _robot(DRAG),
         _robot(MONITORS),
         _robot(MONITORS, "robotino_v2"),
+        _robot({"sensor.encoder_scale": ({"scale": 1.1},) * 3}),
     ],
-    ids=["reference", "rollers that drag", "monitors", "currents"],
+    ids=["reference", "rollers that drag", "monitors", "currents", "encoders"],
 )
 def test_of_wheels_that_turn_as_simulated_both_paths_say_the_same(robot: Robot) -> None:
     found = _predictions(robot, [(0, STOP), (500, AHEAD), (1500, TURN), (2500, STOP)], 3500)
     for prediction in found:
         commanded, measured = _powers(prediction)
         assert measured == pytest.approx(commanded, rel=1e-5, abs=1e-5, nan_ok=True)
+        for one, other in zip(prediction.motors, prediction.from_encoders, strict=True):
+            assert one.current == pytest.approx(other.current, rel=1e-5, abs=1e-5, nan_ok=True)
 
 
 def test_faster_wheels_draw_more_by_what_their_speed_makes() -> None:
@@ -112,3 +116,52 @@ def test_faster_wheels_draw_more_by_what_their_speed_makes() -> None:
     assert _powers(faster)[0] == pytest.approx(_powers(plain)[0], rel=1e-5)
     more = np.array(_powers(faster)[1]) - _powers(plain)[1]
     np.testing.assert_allclose(more, 0.3609 - 0.3134, atol=1e-4)
+
+
+def test_a_driver_that_says_its_voltage_is_believed_of_a_wheel_that_rests() -> None:
+    """0.5 V at 0.8 ohm and 1.2 W of standby, while the simulated drivers hold nothing."""
+    held = {"friction.coulomb": ({"torque": 0.7},) * 3}  # N m: what a motor makes of 0.8 V
+    predictor, last = PowerPredictor(_robot(held)), None
+    for at_ms in range(3, 1000, 10):
+        stamp = BASE + at_ms * MS
+        predictor.command(stamp, STOP)
+        predictor.encoders(stamp, STOP, NAN3)
+        predictor.voltages(stamp, (0.5, math.nan, math.nan))
+        last = next(iter(predictor.due()), last)
+    assert last is not None
+    assert _powers(last)[1] == pytest.approx([0.5**2 / 0.8 + 1.2, 1.2, 1.2], abs=1e-4)
+
+
+def test_what_a_gyro_says_of_the_body_is_no_motion_of_the_simulated_one() -> None:
+    """It turns faster than its wheels say: on a curve that takes more force."""
+    curve, powers = (0.3, 0.0, 1.0), []
+    for yaw_rate in (1.0, 1.3):
+        predictor, last = PowerPredictor(ROBOT, ModelSettings(use_imu=True)), None
+        angles = _angles(ROBOT, [(0, STOP), (500, curve)], 2500)
+        for at_ms in range(2500):
+            stamp = BASE + at_ms * MS
+            if at_ms % 50 == 0:
+                predictor.command(stamp, curve if at_ms >= 500 else STOP)
+            if at_ms in angles:
+                first, second, third = angles[at_ms]
+                predictor.encoders(stamp, (first, second, third), NAN3)
+                predictor.imu(stamp, yaw_rate)
+            last = next(iter(predictor.due()), last)
+        assert last is not None
+        powers.append(_powers(last))
+    (commanded, as_wheels), (_, faster) = powers
+    assert as_wheels == pytest.approx(commanded, rel=1e-4)
+    assert np.abs(np.array(faster) - as_wheels).max() > 0.05  # W
+
+
+def test_late_monitors_are_followed_before_the_first_command() -> None:
+    robot = _robot({"sensor.clock_offset": ({"delay": 0.075},) * 3})
+    predictor, found = PowerPredictor(robot), []
+    for at_ms in range(2000):
+        stamp = BASE + at_ms * MS
+        if at_ms % 50 == 0 and at_ms >= 1000:
+            predictor.command(stamp, STOP)
+        if at_ms % 10 == 3:
+            predictor.encoders(stamp, STOP, (0.0, 0.0, 0.0))
+        found += predictor.due()
+    assert all(math.isfinite(power) for item in found[-15:] for power in _powers(item)[1])

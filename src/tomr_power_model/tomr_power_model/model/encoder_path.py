@@ -94,7 +94,6 @@ class EncoderPath:
         off = self._shown(self._model.measured(simulated.motion), 1)
         moves = np.array(motion.speed), np.array(simulated.motion.speed)
         rests = at_rest(moves[0]) & ~np.array(said), at_rest(moves[1])
-        known = self._where_known(shown, motion)
 
         def right(*of_tick: Sequence[float]) -> list[float]:
             first, alone, other = map(np.array, of_tick)
@@ -103,10 +102,10 @@ class EncoderPath:
 
         whole = simulated.means
         return evolve(
-            known,
-            current=right(whole.current, known.current, off.current),
-            at_motor=right(whole.at_motor, known.at_motor, off.at_motor),
-            power=right(whole.power, known.power, off.power),
+            shown,
+            current=right(whole.current, shown.current, off.current),
+            at_motor=right(whole.at_motor, shown.at_motor, off.at_motor),
+            power=right(whole.power, shown.power, off.power),
         )
 
     def _where_known(self, means: Means, motion: MeasuredMotion) -> Means:
