@@ -117,9 +117,10 @@ def test_a_recording_is_played_up_to_its_end_or_an_earlier_one() -> None:
     assert played.changes[-1][1] == "normal"
     standing = played.stamp_ns - played.stamp_ns[0] < 8e8
     assert played.measured[standing].mean() == pytest.approx(1.2, abs=0.05)  # W of standby
-    # Expected motion is not noisy, encoders are.
+    # Both are off by the sensor's noise, and the wheels turn nearly as expected.
     command, encoder = (path[~standing] for path in (played.command_path, played.encoder_path))
-    assert rms(command) < 0.8 * rms(encoder) < 0.2
+    assert max(rms(command), rms(encoder)) < 0.11
+    assert 0.0 < rms(encoder - command) < 0.2 * rms(command)
 
 
 def test_three_predictions_are_compared_on_the_same_ticks() -> None:
