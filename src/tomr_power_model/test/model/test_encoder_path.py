@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_power_model.model.commanded import CommandPath, CommandTiming, Seen
-from tomr_power_model.model.encoder_path import at_rest, beside
+from tomr_power_model.model.commanded import Commanded, CommandPath, CommandTiming, Seen
+from tomr_power_model.model.encoder_path import EncoderPath, Simulated, at_rest, beside
+from tomr_power_model.model.means import Means
+from tomr_power_model.model.power_models import MeasuredMotion, Windows
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.settings import ModelSettings
@@ -154,14 +156,27 @@ def test_what_a_gyro_says_of_the_body_is_no_motion_of_the_simulated_one() -> Non
     assert np.abs(np.array(faster) - as_wheels).max() > 0.05  # W
 
 
-def test_late_monitors_are_followed_before_the_first_command() -> None:
-    robot = _robot({"sensor.clock_offset": ({"delay": 0.075},) * 3})
-    predictor, found = PowerPredictor(robot), []
-    for at_ms in range(2000):
-        stamp = BASE + at_ms * MS
-        if at_ms % 50 == 0 and at_ms >= 1000:
-            predictor.command(stamp, STOP)
-        if at_ms % 10 == 3:
-            predictor.encoders(stamp, STOP, (0.0, 0.0, 0.0))
-        found += predictor.due()
-    assert all(math.isfinite(power) for item in found[-15:] for power in _powers(item)[1])
+class _Drawn:
+    """A power model that says of a motion what its first wheel's speed is [W]."""
+
+    def commanded(self, motion: Commanded, windows: Windows) -> Means:
+        raise NotImplementedError
+
+    def measured(self, motion: MeasuredMotion) -> Means:
+        power = [motion.speed[0]] * 3
+        return Means(power, power, power, power)
+
+    def clear(self) -> None:
+        """It remembers nothing."""
+
+
+def test_monitors_lag_alike_in_both_motions_also_after_a_time_without_simulation() -> None:
+    def moving(speed: float) -> MeasuredMotion:
+        nothing = [0.0] * 3
+        return MeasuredMotion([speed] * 3, nothing, nothing, math.nan, 0.0, nothing, nothing)
+
+    path = EncoderPath(_robot(MONITORS), _Drawn(), 0.05, is_shown=False)
+    path.means(moving(2.0), None, [False] * 3)
+    whole = Means([5.0] * 3, [5.0] * 3, [5.0] * 3, [5.0] * 3)
+    found = path.means(moving(4.0), Simulated(moving(4.0), whole), [False] * 3)
+    assert found.power == pytest.approx([5.0] * 3)
