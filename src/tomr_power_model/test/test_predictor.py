@@ -1,13 +1,14 @@
 """The model stage: driven by stamps, honest about what it does not know."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pytest
 from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.model.encoders import EncoderSample, EncoderWindow
@@ -21,6 +22,7 @@ MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
 NAN3 = (math.nan, math.nan, math.nan)
 Twist = tuple[float, float, float]
+Array = NDArray[np.float64]
 Event = tuple[int, str]
 
 
@@ -233,6 +235,26 @@ class TestEncoderWindow:
         speed, acceleration = self._fit(samples)
         np.testing.assert_allclose(speed, [2.0 + 40.0 * 0.075, 0.0, -1.0], atol=1e-9)
         np.testing.assert_allclose(acceleration, [40.0, 0.0, 0.0], atol=1e-7)
+
+    def test_a_simulated_motion_is_compared_at_the_angles_that_are_measured(self) -> None:
+        """Simulated wheels count from where they began, 5 rad off, and turn by 1 rad/s slower."""
+
+        class Slower:
+            def beside(
+                self, times_ns: Sequence[int], tick_ns: int, period_ns: int
+            ) -> tuple[Array, Array, Array, Array]:
+                times = np.array([*times_ns, tick_ns - period_ns // 2]) - BASE
+                angles = np.repeat(2e-9 * times[:, None], 3, axis=1)
+                return angles[:-1], angles[-1], np.full(3, 2.0), np.zeros(3)
+
+        window = EncoderWindow(to_ns(0.07), to_ns(0.05), to_ns(0.5))
+        for at_ms in range(3, 301, 10):
+            window.add(EncoderSample(BASE + at_ms * MS, (5.0 + 3e-3 * at_ms,) * 3, NAN3))
+        measured, simulated = window.beside(BASE + 300 * MS, Slower())
+        np.testing.assert_allclose(measured.speed, 3.0, atol=1e-6)
+        np.testing.assert_allclose(simulated.speed, 2.0)
+        np.testing.assert_allclose(measured.angle, 5.0 + 3.0 * 0.275, atol=1e-6)
+        assert simulated.angle.tolist() == measured.angle.tolist()
 
     def test_one_wheel_missing_leaves_the_others(self) -> None:
         samples = [

@@ -23,8 +23,7 @@ STILL = Seen((0.0, 0.0, 0.0), NAN3, math.nan)
 ROBOT = shipped_robot("reference")
 Twist = tuple[float, float, float]
 STOP, AHEAD, TURN = (0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, 0.0, 1.0)
-# Rollers that drag keep what the drive ahead left in them while the robot turns on the spot.
-DRAG = {"contact.roller_drag": ({"coefficient": 0.03, "slip": 1.0},) * 3}
+DRAG = {"contact.roller_drag": ({"coefficient": 0.05, "slip": 0.0},) * 3}
 MONITORS = {
     "sensor.power_scale": ({"scale": 1.1},) * 3,
     "sensor.power_lag": ({"time_constant": 0.1},) * 3,
@@ -57,10 +56,19 @@ def _angles(robot: Robot, twists: list[tuple[int, Twist]], until_ms: int) -> dic
 
 
 def _predictions(
-    robot: Robot, twists: list[tuple[int, Twist]], until_ms: int, faster: float = 0.0
+    robot: Robot,
+    twists: list[tuple[int, Twist]],
+    until_ms: int,
+    *,
+    faster: float = 0.0,
+    yaw_rate: float | None = None,
 ) -> list[Prediction]:
-    """Of a robot that does as it is commanded, or whose wheels turn faster backwards [rad/s]."""
-    predictor, angles, found = PowerPredictor(robot), _angles(robot, twists, until_ms), []
+    """Of a robot that does as it is commanded.
+
+    Or whose wheels turn faster backwards [rad/s], or which has a gyro that says so much [rad/s].
+    """
+    predictor = PowerPredictor(robot, ModelSettings(use_imu=yaw_rate is not None))
+    angles, found = _angles(robot, twists, until_ms), []
     for at_ms in range(until_ms):
         stamp = BASE + at_ms * MS
         if at_ms % 50 == 0:
@@ -68,6 +76,8 @@ def _predictions(
         if at_ms in angles:
             first, second, third = (angle - 1e-3 * faster * at_ms for angle in angles[at_ms])
             predictor.encoders(stamp, (first, second, third), NAN3)
+            if yaw_rate is not None:
+                predictor.imu(stamp, yaw_rate)
         found += predictor.due()
     return found
 
@@ -136,24 +146,22 @@ def test_a_driver_that_says_its_voltage_is_believed_of_a_wheel_that_rests() -> N
 
 def test_what_a_gyro_says_of_the_body_is_no_motion_of_the_simulated_one() -> None:
     """It turns faster than its wheels say: on a curve that takes more force."""
-    curve, powers = (0.3, 0.0, 1.0), []
-    for yaw_rate in (1.0, 1.3):
-        predictor, last = PowerPredictor(ROBOT, ModelSettings(use_imu=True)), None
-        angles = _angles(ROBOT, [(0, STOP), (500, curve)], 2500)
-        for at_ms in range(2500):
-            stamp = BASE + at_ms * MS
-            if at_ms % 50 == 0:
-                predictor.command(stamp, curve if at_ms >= 500 else STOP)
-            if at_ms in angles:
-                first, second, third = angles[at_ms]
-                predictor.encoders(stamp, (first, second, third), NAN3)
-                predictor.imu(stamp, yaw_rate)
-            last = next(iter(predictor.due()), last)
-        assert last is not None
-        powers.append(_powers(last))
-    (commanded, as_wheels), (_, faster) = powers
-    assert as_wheels == pytest.approx(commanded, rel=1e-4)
-    assert np.abs(np.array(faster) - as_wheels).max() > 0.05  # W
+    curve = [(0, STOP), (500, (0.3, 0.0, 1.0))]
+    as_wheels, faster = (
+        _powers(_predictions(ROBOT, curve, 2500, yaw_rate=yaw_rate)[-1]) for yaw_rate in (1.0, 1.3)
+    )
+    assert as_wheels[1] == pytest.approx(as_wheels[0], rel=1e-4)
+    assert np.abs(np.array(faster[1]) - as_wheels[1]).max() > 0.05  # W
+
+
+def test_what_rollers_hold_that_do_not_turn_is_known_of_the_encoders_as_well() -> None:
+    """On the spot no roller turns: how they came to rest says what they hold, not the motion."""
+    robot, turned = _robot(DRAG), []
+    for twist in (AHEAD, (-0.3, 0.0, 0.0)):
+        found = _predictions(robot, [(0, STOP), (500, twist), (2000, TURN)], 4000)[-1]
+        turned.append(_powers(found)[1])
+    ahead, back = turned
+    assert np.abs(np.array(ahead) - back).max() > 0.1  # W
 
 
 class _Drawn:

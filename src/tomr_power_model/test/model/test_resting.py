@@ -207,3 +207,15 @@ def test_after_a_leap_of_the_clock_nothing_is_remembered(path: CommandPath) -> N
     path.state[at.STATE_HEADER + at.SPEED] = 0.0
     _volts(drivers, path, (PUSHED, 0.0, 0.0))
     assert path.wheel(at.INTEGRAL)[0] < 0.0
+
+
+def test_after_a_leap_of_the_clock_it_is_forgotten_that_a_wheel_turned_otherwise(
+    path: CommandPath,
+) -> None:
+    drivers = RestingDrivers(ROBOT)
+    _volts(drivers, path, REST, TURNS, (1.4, 0.0, 0.0))
+    drivers.clear()
+    _volts(drivers, path, REST, TURNS, TURNS)
+    found = _volts(drivers, path, (0.1, 0.0, 0.0), TURNS, TURNS)[0]
+    error = 12.0 * 0.1 * 0.995
+    assert found == pytest.approx(1.2 * (path.wheel(at.ASKED)[0] - 2.0) - error, abs=1e-6)

@@ -115,11 +115,12 @@ class RestingDrivers:
 
     def _fades(self, wheel: int, speed: float, simulated: float) -> float:
         """Share of the difference that a tick takes off, of a wheel that turns so [rad/s]."""
-        if abs(speed - simulated) > _DIFFERS:
+        differs = abs(speed - simulated) > _DIFFERS
+        if differs:
             self._soon[wheel] = _SOON
         if not abs(speed) > _MOVING:
             return 0.0
-        if not self._soon[wheel] or abs(speed - simulated) > _DIFFERS:
+        if differs or not self._soon[wheel]:
             return _FADES
         self._soon[wheel] -= 1
         return _FADES_SOON
