@@ -25,7 +25,7 @@ def _stamp(seconds: float) -> int:
 @pytest.mark.parametrize("seed", [3, 4])
 def test_the_same_residuals_as_the_stages(chosen: Callable[..., Drive], seed: int) -> None:
     fault = PlannedFault("encoder_lost", 3.0, 5.0, {"severity": 0.8, "wheel": 2})
-    drive = chosen(seed, phases=chosen(seed).mission.phases[:4], faults=(fault,))
+    drive = chosen(seed, phases=chosen(seed).mission.phases[:10], faults=(fault,))
     signals = Signals.of(drive, run_plant(drive))
     compared = compare(drive, signals)
     residual, band = compared.residuals(BandSettings())
