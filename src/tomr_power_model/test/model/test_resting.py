@@ -16,6 +16,7 @@ ROBOT = shipped_robot("reference")
 Triple = tuple[float, float, float]
 REST: Triple = (0.0, 0.0, 0.0)
 TURNS: Triple = (2.0, 0.0, 0.0)
+TICK = 0.05  # s
 PUSHED = 0.004  # rad; friction holds 5.7 mrad
 
 
@@ -45,25 +46,25 @@ def _volts(
 
 def test_nothing_is_known_before_the_first_command() -> None:
     path = CommandPath(ROBOT, CommandTiming(50 * MS))
-    found = _volts(RestingDrivers(ROBOT), path, REST)
+    found = _volts(RestingDrivers(ROBOT, TICK), path, REST)
     assert all(math.isnan(volts) for volts in found)
 
 
 def test_a_wheel_pushed_aside_is_pulled_back(path: CommandPath) -> None:
     # k_i = 12 V/rad: 0.1 rad ahead are -1.2 V.
-    drivers = RestingDrivers(ROBOT)
+    drivers = RestingDrivers(ROBOT, TICK)
     assert _volts(drivers, path, REST) == pytest.approx(REST)
     assert _volts(drivers, path, (0.1, 0.0, 0.0))[0] == pytest.approx(-1.2)
 
 
 def test_voltages_are_those_of_the_time_asked_for(path: CommandPath) -> None:
-    drivers = RestingDrivers(ROBOT)
+    drivers = RestingDrivers(ROBOT, TICK)
     _volts(drivers, path, REST)
     assert _volts(drivers, path, (0.1, 0.0, 0.0), share=0.25)[0] == pytest.approx(-0.3)
 
 
 def test_what_a_start_left_different_fades_in_motion(path: CommandPath) -> None:
-    drivers = RestingDrivers(ROBOT)
+    drivers = RestingDrivers(ROBOT, TICK)
     _volts(drivers, path, REST)
     asked = path.wheel(at.ASKED)[0]
     for _ in range(1000):
@@ -74,18 +75,19 @@ def test_what_a_start_left_different_fades_in_motion(path: CommandPath) -> None:
 @pytest.mark.parametrize(
     ("before", "then", "left"),
     [
-        (1.4, 2.0, 0.9**40 * 0.995**10),  # a fault that ended
-        (2.0, 2.0, 0.995**50),  # friction that is not as described
-        (1.4, 1.4, 0.995**50),  # a fault that goes on
+        (1.4, 2.0, math.exp(-2.1 * 2.0 - 0.1 * 0.5)),  # a fault that ended
+        (2.0, 2.0, math.exp(-0.1 * 2.5)),  # friction that is not as described
+        (1.4, 1.4, math.exp(-0.1 * 2.5)),  # a fault that goes on
     ],
 )
+@pytest.mark.parametrize("tick", [0.01, 0.05, 0.1])
 def test_what_is_different_fades_soon_where_a_wheel_turns_as_simulated_again(
-    path: CommandPath, before: float, then: float, left: float
+    path: CommandPath, before: float, then: float, left: float, tick: float
 ) -> None:
-    drivers = RestingDrivers(ROBOT)
+    drivers = RestingDrivers(ROBOT, tick)
     # Nothing fades before there is a difference.
     _volts(drivers, path, REST, TURNS, (before, 0.0, 0.0))
-    for _ in range(50):
+    for _ in range(round(2.5 / tick)):
         found = _volts(drivers, path, (0.1, 0.0, 0.0), TURNS, (then, 0.0, 0.0))[0]
     error = 12.0 * 0.1 * left
     assert found == pytest.approx(1.2 * (path.wheel(at.ASKED)[0] - 2.0) - error, abs=1e-6)
@@ -93,7 +95,7 @@ def test_what_is_different_fades_soon_where_a_wheel_turns_as_simulated_again(
 
 def _sum_after(path: CommandPath, angle: float, speed: float) -> float:
     """Of the first wheel's simulated errors, 40 ticks after it was moved [rad]."""
-    drivers = RestingDrivers(ROBOT)
+    drivers = RestingDrivers(ROBOT, TICK)
     _volts(drivers, path, REST)
     for _ in range(40):
         _volts(drivers, path, (angle, 0.0, 0.0), (speed, 0.0, 0.0))
@@ -101,7 +103,7 @@ def _sum_after(path: CommandPath, angle: float, speed: float) -> float:
 
 
 def test_what_a_push_leaves_in_a_driver_is_expected_of_its_wheel(path: CommandPath) -> None:
-    drivers = RestingDrivers(ROBOT)
+    drivers = RestingDrivers(ROBOT, TICK)
     _volts(drivers, path, REST)
     for _ in range(40):
         volts = _volts(drivers, path, (PUSHED, 0.0, 0.0))
@@ -142,7 +144,7 @@ def test_a_simulated_wheel_that_creeps_takes_over_nothing(path: CommandPath) -> 
 def test_while_the_simulation_creeps_nothing_is_taken_over_and_then_it_is(
     path: CommandPath,
 ) -> None:
-    drivers, angle = RestingDrivers(ROBOT), (PUSHED, 0.0, 0.0)
+    drivers, angle = RestingDrivers(ROBOT, TICK), (PUSHED, 0.0, 0.0)
     assert path.state is not None
     _volts(drivers, path, REST, (2.0, 0.0, 0.0))
     path.state[at.STATE_HEADER + at.SPEED] = 0.1
@@ -155,12 +157,12 @@ def test_while_the_simulation_creeps_nothing_is_taken_over_and_then_it_is(
 
 def test_an_angle_that_is_not_known_leaves_the_simulation_alone(path: CommandPath) -> None:
     assert _sum_after(path, math.nan, 0.0) == 0.0
-    unknown = _volts(RestingDrivers(ROBOT), path, (math.nan, 0.0, 0.0))
+    unknown = _volts(RestingDrivers(ROBOT, TICK), path, (math.nan, 0.0, 0.0))
     assert unknown == pytest.approx(REST)  # as the simulation has it
 
 
 def test_a_sum_that_would_turn_the_wheel_is_not_the_drivers(path: CommandPath) -> None:
-    drivers = RestingDrivers(ROBOT)
+    drivers = RestingDrivers(ROBOT, TICK)
     _volts(drivers, path, REST)
     _volts(drivers, path, (PUSHED, 0.0, 0.0))
     taken = path.wheel(at.INTEGRAL)[0]
@@ -181,21 +183,21 @@ def test_a_sum_that_would_turn_the_wheel_is_not_the_drivers(path: CommandPath) -
 def test_a_wheel_without_dry_friction_holds_nothing() -> None:
     physics = {name: sets for name, sets in ROBOT.physics.items() if name != "friction.coulomb"}
     robot = evolve(ROBOT, physics=physics)
-    drivers, path = RestingDrivers(robot), _standing(robot)
+    drivers, path = RestingDrivers(robot, TICK), _standing(robot)
     for angle in (0.0, PUSHED, PUSHED):
         _volts(drivers, path, (angle, 0.0, 0.0))
     assert path.wheel(at.INTEGRAL)[0] == 0.0
 
 
 def test_after_what_is_not_known_the_sums_are_taken_for_equal(path: CommandPath) -> None:
-    drivers = RestingDrivers(ROBOT)
+    drivers = RestingDrivers(ROBOT, TICK)
     _volts(drivers, path, REST)
     drivers.forget()
     assert _volts(drivers, path, (0.1, 0.0, 0.0)) == pytest.approx(REST)
 
 
 def test_after_a_leap_of_the_clock_nothing_is_remembered(path: CommandPath) -> None:
-    drivers = RestingDrivers(ROBOT)
+    drivers = RestingDrivers(ROBOT, TICK)
     assert path.state is not None
     for angle in (0.0, 0.6):  # a difference that no push makes
         _volts(drivers, path, (angle, 0.0, 0.0))
@@ -212,10 +214,10 @@ def test_after_a_leap_of_the_clock_nothing_is_remembered(path: CommandPath) -> N
 def test_after_a_leap_of_the_clock_it_is_forgotten_that_a_wheel_turned_otherwise(
     path: CommandPath,
 ) -> None:
-    drivers = RestingDrivers(ROBOT)
+    drivers = RestingDrivers(ROBOT, TICK)
     _volts(drivers, path, REST, TURNS, (1.4, 0.0, 0.0))
     drivers.clear()
     _volts(drivers, path, REST, TURNS, TURNS)
     found = _volts(drivers, path, (0.1, 0.0, 0.0), TURNS, TURNS)[0]
-    error = 12.0 * 0.1 * 0.995
+    error = 12.0 * 0.1 * math.exp(-0.1 * TICK)
     assert found == pytest.approx(1.2 * (path.wheel(at.ASKED)[0] - 2.0) - error, abs=1e-6)

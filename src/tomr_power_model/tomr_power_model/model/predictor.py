@@ -80,7 +80,7 @@ class PowerPredictor:
         self._clock = TickClock(given.ticks)
         timing = CommandTiming(given.ticks.period, given.command_timeout, given.stale)
         self._path = CommandPath(robot, timing, is_compiled=is_compiled)
-        self._resting = RestingDrivers(robot)
+        self._resting = RestingDrivers(robot, period_s)
         self._encoders = EncoderWindow(
             given.encoder_window, given.ticks.period, given.stale, fastest_wheel(robot)
         )

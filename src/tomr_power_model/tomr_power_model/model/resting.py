@@ -19,6 +19,7 @@ expected of it. A sum that makes the simulated wheel creep is not the driver's: 
 sums have nothing in common until the wheel turns.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Protocol
 
@@ -29,8 +30,8 @@ from tomr_power_model.robot import WHEELS, Robot
 
 _UNKNOWN = float("nan")
 _MOVING = 1.0  # rad/s
-_FADES = 0.005  # share of the difference in a tick in motion, ...
-_FADES_SOON, _SOON = 0.1, 40  # ... and for so many ticks after ...
+_FADES = 0.1  # 1/s, of the difference in motion, ...
+_FADES_SOON, _SOON = 2.1, 2.0  # ... and for so many seconds after ...
 _DIFFERS = 0.5  # ... the speed was not as simulated [rad/s]
 _STANDS = 0.05  # rad/s
 _CREEPS = 0.01  # rad/s: faster than it is asked to
@@ -58,8 +59,12 @@ class SimulatedDrivers(Protocol):
 class RestingDrivers:
     """Sums of the drivers, one per wheel."""
 
-    def __init__(self, robot: Robot) -> None:
-        """Of a robot; only dry friction holds a wheel that its driver turns."""
+    def __init__(self, robot: Robot, period_s: float) -> None:
+        """Of a robot, in ticks so long; only dry friction holds a wheel that its driver turns."""
+        self._lasts = round(_SOON / period_s)
+        self._slowly, self._quickly = (
+            1.0 - math.exp(-rate * period_s) for rate in (_FADES, _FADES_SOON)
+        )
         self._proportional = robot.controller.proportional
         self._integral = robot.controller.integral
         self._holding = Holding(vehicle_of(robot))
@@ -117,13 +122,13 @@ class RestingDrivers:
         """Share of the difference that a tick takes off, of a wheel that turns so [rad/s]."""
         differs = abs(speed - simulated) > _DIFFERS
         if differs:
-            self._soon[wheel] = _SOON
+            self._soon[wheel] = self._lasts
         if not abs(speed) > _MOVING:
             return 0.0
         if differs or not self._soon[wheel]:
-            return _FADES
+            return self._slowly
         self._soon[wheel] -= 1
-        return _FADES_SOON
+        return self._quickly
 
     def _difference(self, wheel: int, ahead: float, fades: float) -> float:
         """What a driver's sum is over the simulation's [rad], NaN where not known.

@@ -72,7 +72,7 @@ def run_believed(drive: Drive, signals: Signals, share: Array) -> Expected:
     robot, ticks = drive.believed, tick_count(drive)
     inputs = commanded(drive, robot)
     simulation = Simulation(vehicle_of(robot), is_compiled=True)
-    path, drivers = _Path(simulation), RestingDrivers(robot)
+    path, drivers = _Path(simulation), RestingDrivers(robot, TICK)
     steps = simulation.steps
     step = simulation.period_s / steps
     out = np.empty((len(inputs), steps * simulation.row))
