@@ -12,7 +12,7 @@ from tomr_commission.observed import Observed
 from tomr_commission.rehearsal import Rehearsal, Usage, observed_of, rehearse, shoved_drive
 from tomr_commission.simulated import KINDS, cases, simulated_fault, try_simulated
 from tomr_fault_diag.classifier.settings import ClassifierSettings
-from tomr_fault_diag.residuals.frame import MOTORS
+from tomr_fault_diag.residuals.frame import MOTORS, SPEEDS
 from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import shipped_robot
@@ -41,6 +41,13 @@ def test_shoves_show_in_the_residuals_and_only_there() -> None:
         near |= (seen.seconds > bump.start - 0.1) & (seen.seconds < bump.start + 2.0)
     assert len(drive.bumps) == 3
     assert size[near].max() > 3.0 * size[~near].max()
+
+
+@pytest.mark.parametrize(("seed", "stands"), [(80_000_000, True), (80_000_001, False)])
+def test_of_four_drives_one_stands_still_when_it_is_shoved(seed: int, stands: bool) -> None:
+    seen = observed_of(shoved_drive(ROBOT, USAGE, Rehearsal(), seed))
+    late = seen.modelled[seen.seconds > 8.0][:, list(SPEEDS)]
+    assert bool((np.abs(late) < 0.1).all()) is stands
 
 
 def test_rehearsal_depends_on_its_arguments_alone() -> None:

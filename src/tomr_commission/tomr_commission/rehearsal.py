@@ -32,6 +32,7 @@ _SETTLING = 3.0  # s after a shove that are its own
 _APART = 6.0  # s between shoves
 _PER_DRIVE = 3  # shoves
 _FIRST = 4.0  # s
+_STANDING = 4  # one drive of so many stands still when it is shoved
 _CHUNK = 8
 
 
@@ -133,8 +134,9 @@ def shoved_drive(robot: Robot, usage: Usage, plan: Rehearsal, seed: int) -> Driv
     """One drive; it depends on nothing but the arguments."""
     random = np.random.default_rng(seed)
     length = _FIRST + _PER_DRIVE * _APART
+    stands = seed % _STANDING == 0
     phase = RandomPhase(
-        count=math.ceil(length / 1.5),
+        count=1 if stands else math.ceil(length / 1.5),
         speed=usage.speed,
         yaw_rate=usage.yaw_rate,
         duration=(1.0, 3.0),
@@ -150,7 +152,7 @@ def shoved_drive(robot: Robot, usage: Usage, plan: Rehearsal, seed: int) -> Driv
         floor_friction=float(random.uniform(*plan.friction)),
         stamp_jitter=0.0005,
         seed=seed,
-        phases=(TwistPhase((0.0, 0.0, 0.0), 1.0), phase),
+        phases=(_stop(1.0), phase, _stop(length)) if stands else (_stop(1.0), phase),
         faults=(),
     )
     plant = every_value(
@@ -159,6 +161,10 @@ def shoved_drive(robot: Robot, usage: Usage, plan: Rehearsal, seed: int) -> Driv
     starts = _FIRST + _APART * np.arange(_PER_DRIVE) + random.uniform(0.0, 1.0, _PER_DRIVE)
     shoves = tuple(_shove(robot, plan, float(start), random) for start in starts)
     return Drive(seed, plant, robot, mission, shoves)
+
+
+def _stop(seconds: float) -> TwistPhase:
+    return TwistPhase((0.0, 0.0, 0.0), seconds)
 
 
 def _shove(robot: Robot, plan: Rehearsal, start: float, random: np.random.Generator) -> Bump:

@@ -62,6 +62,24 @@ def test_a_wheel_that_coasts_is_moved_by_nobody() -> None:
     assert seen(asked, *stood, asked, *[coasting] * 30).moved == ()
 
 
+@pytest.mark.parametrize(("off", "moved"), [(0.15, ()), (0.25, (0,)), (-0.25, (0,))])
+def test_a_wheel_that_stirs_is_moved_where_none_is_to_turn(
+    off: float, moved: tuple[int, ...]
+) -> None:
+    """0.2 rad/s is the band."""
+    stirs: Wheel = (0.0, off)
+    assert seen([STILL] * 3, [stirs, STILL, STILL]).moved == moved
+    assert seen([STILL, STILL, (8.0, 0.0)], [stirs, STILL, (8.0, 0.0)]).moved == ()
+    assert seen([STILL] * 3, [(0.2, off), STILL, STILL]).moved == ()  # it may be asked to creep
+
+
+def test_a_wheel_that_comes_to_rest_is_moved_by_nobody() -> None:
+    slow: Wheel = (0.0, 0.3)
+    stops = [(6.0, 0.0)] * 3, *[[slow] * 3] * 20
+    assert seen(*stops).moved == ()
+    assert seen(*stops, [STILL] * 3, [slow] * 3).moved == (0, 1, 2)
+
+
 def test_a_robot_is_driven_that_was_asked_to_turn_some_wheel() -> None:
     assert seen([(0.0, 2.0), STILL, (8.0, 0.0)]).driven
     assert not seen([(0.0, 2.0), STILL, STILL]).driven

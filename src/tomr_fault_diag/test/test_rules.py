@@ -26,7 +26,9 @@ from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.outside import Outside
 from tomr_fault_diag.classifier.rules import ALL_RULES, STATE_RULES, WINDOW_RULES, Moment
 from tomr_fault_diag.classifier.states import NORMAL, SLIP
+from tomr_fault_diag.residuals.frame import ENCODERS as DERIVED
 from tomr_fault_diag.residuals.frame import (
+    MOTORS,
     RESIDUALS,
     SPEEDS,
     Residual,
@@ -93,12 +95,32 @@ def test_what_an_idle_wheel_hides_it_does_not_refute() -> None:
     assert changed("an idle wheel", moment) == {}  # but it may speak for it
 
 
-@pytest.mark.parametrize("driven", [False, True])
-def test_no_fault_turns_a_wheel_that_stood(driven: bool) -> None:
+def test_no_fault_turns_a_wheel_that_stood_where_others_are_driven() -> None:
     """But for a lost signal where other wheels pull it along."""
-    moment = evolve(QUIET, unseen=Unseen(moved=(0,), driven=driven))
-    kinds = (ENCODERS, DRAGS, WEAKS) if driven else (CONTROLS, ENCODERS, DRAGS, WEAKS)
+    moment = evolve(QUIET, unseen=Unseen(moved=(0,), driven=True))
+    kinds = ENCODERS, DRAGS, WEAKS
     assert set(changed("a wheel that is moved", moment)) == {kind.start for kind in kinds}
+
+
+@pytest.mark.parametrize("channel", [MOTORS.start, DERIVED.start])
+@pytest.mark.parametrize(("drawn", "pushed"), [(-5.0, True), (0.9, True), (1.1, False)])
+def test_what_is_not_known_turns_a_wheel_that_stood_only_where_it_draws_more(
+    channel: int, drawn: float, pushed: bool
+) -> None:
+    residuals = list(FRAME.residuals)
+    residuals[channel] = evolve(residuals[channel], residual=drawn)
+    frame = evolve(FRAME, residuals=tuple(residuals))
+    moment = evolve(QUIET, frame=frame, unseen=Unseen(moved=(0,)))
+    found = changed("a wheel that is moved", moment)
+    assert found.pop(OTHER, 0.0) == (-1.0 if pushed else 0.0)  # no likelier than a push
+    assert set(found) == {kind.start for kind in (CONTROLS, ENCODERS, DRAGS, WEAKS)}
+
+
+def test_what_is_not_known_is_as_likely_as_normal_where_a_push_is_not() -> None:
+    moment = evolve(QUIET, unseen=Unseen(moved=(0,)))
+    given = np.where(np.arange(HYPOTHESES) == OTHER, 3.0, 0.0)
+    given[EXTERNAL] = -2.0
+    assert changed("a wheel that is moved", moment, given) == {OTHER: -3.0}
 
 
 def test_without_speeds_no_encoder_is_likelier_than_another() -> None:

@@ -13,6 +13,7 @@ from tomr_fault_diag.residuals.frame import SPEEDS, Residual, ResidualFrame, mea
 from tomr_power_model.model.ticks import to_ns
 
 _TURNING = 0.5  # rad/s: a slower wheel counts as idle
+_STILL = 0.1  # rad/s: a slower wheel stands
 _SPEEDING = 0.3  # rad/s over the time below: what asks for traction
 _LATELY = to_ns(0.5)  # without it, before a fault counts as not observable
 _LEAST = to_ns(0.45)  # of the motion that must be known: ten ticks of 50 ms
@@ -69,12 +70,13 @@ class MotionWatch:
         now, asked = frame.stamp_ns, tuple([_is_asked_to_turn(speed) for speed in speeds])
         may_turn = tuple([_may_turn(speed) for speed in speeds])
         # One that goes on as it was asked to, as without its signal, is moved by nobody.
+        turns = _turns if any(asked) else _stirs
         moves = tuple(
-            [stood and _turns(speed) for stood, speed in zip(self._stood, speeds, strict=True)]
+            [stood and turns(speed) for stood, speed in zip(self._stood, speeds, strict=True)]
         )
         self._stood = [
-            not on and (stood or not may)
-            for on, stood, may in zip(asked, self._stood, may_turn, strict=True)
+            not on and (stood or _stands(speed))
+            for on, stood, speed in zip(asked, self._stood, speeds, strict=True)
         ]
         self._ticks.append((now, expected, asked, may_turn, moves))
         while self._ticks[0][0] <= now - _LATELY:
@@ -115,3 +117,14 @@ def _may_turn(speed: Residual) -> bool:
 def _turns(speed: Residual) -> bool:
     """Of one that is not known, nobody can say so."""
     return abs(measured_speed(speed)) >= _TURNING
+
+
+def _stirs(speed: Residual) -> bool:
+    """Of a robot that is to stand: beyond what a healthy one's encoders show as well."""
+    is_still = abs(speed.modelled) < _STILL
+    beyond = abs(speed.residual) > speed.band and not _stands(speed)
+    return _turns(speed) or (is_still and beyond)
+
+
+def _stands(speed: Residual) -> bool:
+    return abs(measured_speed(speed)) < _STILL

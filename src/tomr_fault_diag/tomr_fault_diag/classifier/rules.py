@@ -16,16 +16,19 @@ from tomr_fault_diag.classifier.belief import (
     CONTROLS,
     DRAGS,
     ENCODERS,
+    EXTERNAL,
     HYPOTHESES,
     LOADED,
     METERS,
+    OTHER,
     WEAKS,
     of_states,
 )
 from tomr_fault_diag.classifier.evidence import ALONE, Beside, astray
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.states import NORMAL, SLIP
-from tomr_fault_diag.residuals.frame import SPEEDS, ResidualFrame
+from tomr_fault_diag.residuals.frame import ENCODERS as DERIVED
+from tomr_fault_diag.residuals.frame import MOTORS, SPEEDS, ResidualFrame
 
 Array = NDArray[np.float64]
 
@@ -79,10 +82,21 @@ def _idle(likelihoods: Array, moment: Moment) -> Array:
 
 
 def _moved(likelihoods: Array, moment: Moment) -> Array:
-    """No fault turns a wheel that stands: somebody pushes."""
-    kinds = _FIRM if moment.unseen.driven else _HIDDEN
-    moved = [kind.start + wheel for wheel in moment.unseen.moved for kind in kinds]
-    return _as_normal(likelihoods, moved)
+    """No fault turns a wheel that stands: somebody pushes. Nor does one that is not known, where
+    no wheel is to turn and those that do draw no more for it."""
+    unseen = moment.unseen
+    kinds = _FIRM if unseen.driven else _HIDDEN
+    moved = [kind.start + wheel for wheel in unseen.moved for kind in kinds]
+    found = _as_normal(likelihoods, moved)
+    if moved and not unseen.driven and not any(_draws(moment.frame, i) for i in unseen.moved):
+        found[OTHER] = min(found[OTHER], max(found[EXTERNAL], found[NORMAL]))
+    return found
+
+
+def _draws(frame: ResidualFrame, wheel: int) -> bool:
+    """Whether a motor draws more than it should."""
+    paths = frame.residuals[MOTORS[wheel]], frame.residuals[DERIVED[wheel]]
+    return any(item.residual > item.band for item in paths)
 
 
 def _speedless(likelihoods: Array, moment: Moment) -> Array:

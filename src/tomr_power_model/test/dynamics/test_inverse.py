@@ -103,6 +103,7 @@ def test_a_resting_wheel_holds_what_its_driver_asks_for(
     found = powers(sticky, (0.0, 0.0, 0.0), held=volts)
     np.testing.assert_allclose(found[:, at.POWER_TORQUE], torque)
     np.testing.assert_allclose(found[:, at.POWER_DRAWN], 0.8 * (torque / 0.7) ** 2)
+    assert found[:, at.POWER_OBEYED].tolist() == [0.0 if volts == 0.7 else 1.0] * 3
 
 
 def test_a_slope_is_carried_where_the_heading_is_known(make_vehicle: MakeVehicle) -> None:

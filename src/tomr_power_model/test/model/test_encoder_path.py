@@ -8,9 +8,16 @@ import pytest
 from attrs import evolve
 
 from tomr_power_model.model.commanded import Commanded, CommandPath, CommandTiming, Seen
-from tomr_power_model.model.encoder_path import EncoderPath, Simulated, at_rest, beside
+from tomr_power_model.model.encoder_path import (
+    EncoderPath,
+    Rests,
+    Simulated,
+    alike,
+    at_rest,
+    beside,
+)
 from tomr_power_model.model.means import Means
-from tomr_power_model.model.power_models import MeasuredMotion, Windows
+from tomr_power_model.model.power_models import MeasuredMotion, Physical, Windows
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.settings import ModelSettings
@@ -89,12 +96,17 @@ def _powers(prediction: Prediction) -> tuple[list[float], list[float]]:
 
 
 def test_the_difference_of_two_motions_by_hand() -> None:
-    simulated, inverse, of_simulated = np.array([5.0] * 4), np.array([4.0] * 4), np.array([3.0] * 4)
-    here = np.array([False, False, True, True])
-    there = np.array([False, True, False, True])
-    found = beside(simulated, inverse, of_simulated, (here, there))
-    # Both move: 5 + 4 - 3. At rest in the simulation alone: inverse dynamics. Both rest: 5.
-    assert found.tolist() == [6.0, 4.0, 6.0, 5.0]
+    simulated, inverse, of_simulated = np.array([5.0] * 5), np.array([4.0] * 5), np.array([3.0] * 5)
+    here = np.array([False, False, True, True, True])
+    there = np.array([False, True, False, True, True])
+    held = np.array([False, False, False, False, True])
+    found = beside(simulated, inverse, of_simulated, Rests(here, there, held))
+    # 5 + 4 - 3; at rest in the simulation alone inverse dynamics; where neither moves and no driver
+    # is obeyed as simulated.
+    assert found.tolist() == [6.0, 4.0, 6.0, 5.0, 6.0]
+    # What both rest differ by is no motion.
+    both = alike(np.full(5, 0.02), np.full(5, 0.07), (here, there))
+    assert both.tolist() == [0.07, 0.07, 0.07, 0.02, 0.02]
 
 
 def test_a_wheel_of_unknown_speed_does_not_rest() -> None:
@@ -144,6 +156,31 @@ def test_a_driver_that_says_its_voltage_is_believed_of_a_wheel_that_rests() -> N
     assert _powers(last)[1] == pytest.approx([0.5**2 / 0.8 + 1.2, 1.2, 1.2], abs=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("volts", "expected", "difference"),
+    [
+        (0.5, 0.2, (0.5**2 - 0.2**2) / 0.8),
+        (1.2, 0.2, 0.0),  # friction holds 0.8 V: it would turn, so no driver holds that
+        (0.5, -1.2, 0.0),
+    ],
+)
+def test_of_a_wheel_that_rests_the_drivers_voltages_make_the_difference(
+    volts: float, expected: float, difference: float
+) -> None:
+    """At 0.8 ohm; that both come to rest otherwise makes none."""
+    nothing = [0.0] * 3
+
+    def resting(change: float, held: float) -> MeasuredMotion:
+        alike = [change] * 3
+        return MeasuredMotion(nothing, alike, nothing, math.nan, 0.0, nothing, [held] * 3)
+
+    robot = _robot({"friction.coulomb": ({"torque": 0.7},) * 3})
+    path = EncoderPath(robot, Physical(robot, 0.05, False), 0.05, is_shown=False)
+    whole = Means([5.0] * 3, [5.0] * 3, [5.0] * 3, [5.0] * 3)
+    found = path.means(resting(0.1, volts), Simulated(resting(-0.2, expected), whole))
+    assert found.power == pytest.approx([5.0 + difference] * 3)
+
+
 def test_what_a_gyro_says_of_the_body_is_no_motion_of_the_simulated_one() -> None:
     """It turns faster than its wheels say: on a curve that takes more force."""
     curve = [(0, STOP), (500, (0.3, 0.0, 1.0))]
@@ -184,7 +221,7 @@ def test_monitors_lag_alike_in_both_motions_also_after_a_time_without_simulation
         return MeasuredMotion([speed] * 3, nothing, nothing, math.nan, 0.0, nothing, nothing)
 
     path = EncoderPath(_robot(MONITORS), _Drawn(), 0.05, is_shown=False)
-    path.means(moving(2.0), None, [False] * 3)
+    path.means(moving(2.0), None)
     whole = Means([5.0] * 3, [5.0] * 3, [5.0] * 3, [5.0] * 3)
-    found = path.means(moving(4.0), Simulated(moving(4.0), whole), [False] * 3)
+    found = path.means(moving(4.0), Simulated(moving(4.0), whole))
     assert found.power == pytest.approx([5.0] * 3)

@@ -41,7 +41,7 @@ def _volts(
     simulated: Triple = REST,
     share: float = 1.0,
 ) -> list[float]:
-    return drivers.voltages(path, angle, speed, simulated=simulated, share=share)
+    return drivers.voltages(path, angle, speed, simulated=simulated, share=share).held
 
 
 def test_nothing_is_known_before_the_first_command() -> None:
@@ -55,6 +55,24 @@ def test_a_wheel_pushed_aside_is_pulled_back(path: CommandPath) -> None:
     drivers = RestingDrivers(ROBOT, TICK)
     assert _volts(drivers, path, REST) == pytest.approx(REST)
     assert _volts(drivers, path, (0.1, 0.0, 0.0))[0] == pytest.approx(-1.2)
+
+
+def test_what_a_push_leaves_is_not_in_the_simulated_drivers(path: CommandPath) -> None:
+    drivers = RestingDrivers(ROBOT, TICK)
+    proportional = ROBOT.controller.proportional
+    for share in (1.0, 0.5):
+        found = drivers.voltages(path, (0.1, 0.0, 0.0), REST, simulated=TURNS, share=share)
+        assert found.simulated == pytest.approx([-2.0 * proportional, 0.0, 0.0])
+
+
+def test_what_the_simulation_takes_over_it_holds_from_then_on(path: CommandPath) -> None:
+    drivers, found = RestingDrivers(ROBOT, TICK), []
+    drivers.voltages(path, REST, REST, simulated=REST, share=1.0)
+    for _ in range(3):
+        angle = PUSHED, 0.0, 0.0
+        found.append(drivers.voltages(path, angle, REST, simulated=REST, share=0.0).simulated[0])
+    # At the begin of each tick: half of what is left is taken over at the end of each.
+    assert found == pytest.approx([0.0, -12.0 * 0.5 * PUSHED, -12.0 * 0.75 * PUSHED])
 
 
 def test_voltages_are_those_of_the_time_asked_for(path: CommandPath) -> None:
@@ -175,7 +193,10 @@ def test_a_sum_that_would_turn_the_wheel_is_not_the_drivers(path: CommandPath) -
     assert volts[0] == pytest.approx(12.0 * taken)
     _volts(drivers, path, (1.2 * PUSHED, 0.0, 0.0))
     assert path.wheel(at.INTEGRAL)[0] == taken
-    _volts(drivers, path, (1.2 * PUSHED, 0.0, 0.0), (1.5, 0.0, 0.0))
+    _volts(drivers, path, (1.2 * PUSHED, 0.0, 0.0), (0.1, 0.0, 0.0))
+    _volts(drivers, path, (1.2 * PUSHED, 0.0, 0.0))
+    assert path.wheel(at.INTEGRAL)[0] == taken
+    _volts(drivers, path, (1.2 * PUSHED, 0.0, 0.0), (0.3, 0.0, 0.0))  # it turns after all
     _volts(drivers, path, (1.2 * PUSHED, 0.0, 0.0))
     assert path.wheel(at.INTEGRAL)[0] < taken
 

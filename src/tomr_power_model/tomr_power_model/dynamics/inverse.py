@@ -39,6 +39,7 @@ from tomr_power_model.dynamics.layout import (
     NOMINAL_RADIUS,
     POWER_CURRENT,
     POWER_DRAWN,
+    POWER_OBEYED,
     POWER_TORQUE,
     POWER_VOLTAGE,
     POWER_WHEEL,
@@ -151,18 +152,20 @@ def drive_state(
     k, hot = p[w + CONSTANT], p[w + RESISTANCE] * (1.0 + COPPER * m[a + MOTION_RISE])
     carried += p[w + VISCOUS] * speed + m[a + MOTION_RESISTING]
     moves, held = math.tanh(speed / STICKING_SPEED), m[a + MOTION_VOLTAGE]
-    torque = carried
+    torque, obeyed = carried, 1.0
     for _ in range(MESHING_SWEEPS):  # the gear carries what friction at the axle takes as well
         before = torque
         gear = before - p[w + ROTOR] * m[a + MOTION_ACCELERATION]
         wheel = Wheel(speed, load, gear, m[a + MOTION_ANGLE], p[w + NOMINAL_RADIUS], p[w + GEAR])
         dry, free = max(dry_torque(p, w, wheel), 0.0), carried + moving_torque(p, w, wheel)
-        rests = 0.0
+        rests, obeyed = 0.0, 1.0
         if held == held:
             hold = k / hot * held - free
             # A driver that asks for more than friction holds is not obeyed: nothing is known.
             if abs(hold) < OBEYED * dry:
                 rests = (1.0 - abs(moves)) * min(max(hold, -dry), dry)
+            else:
+                obeyed = 0.0
         torque = free + dry * moves + rests
         if abs(torque - before) < SETTLED:
             break
@@ -172,6 +175,7 @@ def drive_state(
     out[o + POWER_CURRENT] = current
     out[o + POWER_VOLTAGE] = volts
     out[o + POWER_DRAWN] = supplied(p, w, volts * current) + driver_power(p, w, current)
+    out[o + POWER_OBEYED] = obeyed
 
 
 def drive_powers(p: Numbers, motion: Mutable, out: Mutable, n: int) -> None:

@@ -179,8 +179,9 @@ MOTION_WHEEL = 6
     POWER_CURRENT,  # A
     POWER_VOLTAGE,  # at the terminals [V]
     POWER_DRAWN,  # from the supply [W]
-) = range(4)
-POWER_WHEEL = 4
+    POWER_OBEYED,  # whether friction can hold a resting wheel against its driver's voltage
+) = range(5)
+POWER_WHEEL = 5
 
 
 def state_size(wheels: int) -> int:

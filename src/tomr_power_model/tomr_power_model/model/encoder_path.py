@@ -6,8 +6,10 @@ only what the difference between the two motions makes:
 
     P = P_simulated + inverse(measured) - inverse(simulated)
 
-What a wheel that rests in both motions draws is as simulated, but where its driver says its
-voltage; of one that rests in the simulation alone inverse dynamics speak for themselves.
+For a wheel that rests in both motions that is what the voltages differ by that the two drivers
+hold, no more, and only where friction can hold it against them: how both come to rest is not known
+so well. Of one that rests in the simulation alone
+inverse dynamics speak for themselves.
 """
 
 import math
@@ -26,6 +28,7 @@ from tomr_power_model.model.power_models import MeasuredMotion, TickPower
 from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 RESTS = 0.05  # rad/s: a slower wheel may stand still
 
@@ -38,23 +41,35 @@ class Simulated:
     means: Means  # as the monitors show it
 
 
-def beside(
-    simulated: Array, inverse: Array, of_simulated: Array, rests: tuple[Array, Array]
-) -> Array:
+@frozen
+class Rests:
+    """Which wheels rest, (..., n)."""
+
+    here: Mask  # in the measured motion
+    there: Mask  # in the simulated one
+    held: Mask  # and friction can hold them against both drivers' voltages
+
+
+def beside(simulated: Array, inverse: Array, of_simulated: Array, rests: Rests) -> Array:
     """What inverse dynamics say of a motion, put right by a simulation of nearly the same.
 
     Args:
         simulated: what is asked for, as simulated, (..., n).
         inverse: the same by inverse dynamics, of the measured motion.
         of_simulated: and of the simulated motion.
-        rests: whether each wheel does in the measured motion, and in the simulated one.
+        rests: wheels that do.
     """
+    differs = np.where(rests.here & rests.there & ~rests.held, 0.0, inverse - of_simulated)
+    return np.where(rests.there & ~rests.here, inverse, simulated + differs)
+
+
+def alike(measured: Array, simulated: Array, rests: tuple[Mask, Mask]) -> Array:
+    """A simulated motion for `beside`: a wheel that rests in both moves as measured, (..., n)."""
     here, there = rests
-    moving = simulated + inverse - of_simulated
-    return np.where(there, np.where(here, simulated, inverse), moving)
+    return np.where(here & there, measured, simulated)
 
 
-def at_rest(speed: Array) -> Array:
+def at_rest(speed: Array) -> Mask:
     """Which wheels are so slow [rad/s] that dry friction may take any value; not if unknown."""
     return np.asarray(np.abs(speed) < STICKING_SPEED)
 
@@ -76,24 +91,29 @@ class EncoderPath:
             if monitors is not None:
                 monitors.clear()
 
-    def means(
-        self, motion: MeasuredMotion, simulated: Simulated | None, said: Sequence[bool]
-    ) -> Means:
+    def means(self, motion: MeasuredMotion, simulated: Simulated | None) -> Means:
         """Of a tick, as the monitors show it.
 
         Args:
             motion: of the wheels, as measured.
             simulated: None where no simulation can be compared.
-            said: of each wheel, whether its driver says its voltage.
         """
         means = self._model.measured(motion)
         shown = self._shown(means, 0)
         if simulated is None:
             self._shown(means, 1)
             return self._where_known(shown, motion)
-        off = self._shown(self._model.measured(simulated.motion), 1)
-        moves = np.array(motion.speed), np.array(simulated.motion.speed)
-        rests = at_rest(moves[0]) & ~np.array(said), at_rest(moves[1])
+        speeds = np.array(motion.speed), np.array(simulated.motion.speed)
+        resting = at_rest(speeds[0]), at_rest(speeds[1])
+        accelerations = np.array(motion.acceleration), np.array(simulated.motion.acceleration)
+        other = evolve(
+            simulated.motion,
+            speed=alike(*speeds, resting).tolist(),
+            acceleration=alike(*accelerations, resting).tolist(),
+        )
+        of_other = self._model.measured(other)
+        off = self._shown(of_other, 1)
+        rests = Rests(*resting, _obeyed(means) & _obeyed(of_other))
 
         def right(*of_tick: Sequence[float]) -> list[float]:
             first, alone, other = map(np.array, of_tick)
@@ -139,6 +159,11 @@ class EncoderPath:
         volts = _voltages(means)
         at_motor = [v * i for v, i in zip(volts, current, strict=True)]
         return evolve(means, current=current, at_motor=at_motor)
+
+
+def _obeyed(means: Means) -> Mask:
+    """Of each wheel; a model that was not asked says the same of both motions."""
+    return np.array([True] * len(means.power) if means.obeyed is None else means.obeyed)
 
 
 def _voltages(means: Means) -> list[float]:

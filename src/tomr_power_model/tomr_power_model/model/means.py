@@ -19,6 +19,8 @@ class Means:
     other: float | None = None  # of computer and sensors [W]; None: as described
     voltage: float | None = None  # of the supply [V]; None: nominal, less what sags
     drives: float | None = None  # of all drives, where it is known by itself [W]
+    # Whether friction can hold each wheel at rest against its driver; None: not asked.
+    obeyed: Sequence[bool] | None = None
 
     @classmethod
     def of(cls, drives: DrivePower) -> Self:

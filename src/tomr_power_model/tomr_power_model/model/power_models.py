@@ -191,17 +191,19 @@ class Physical:
     def measured(self, motion: MeasuredMotion) -> Means:
         """As inverse dynamics compute, mean over the parts of the tick."""
         sums = tuple([0.0] * WHEELS for _ in range(4))
+        obeyed = [True] * WHEELS
         share = 1.0 / len(self._instants)
         for instant in self._instants:
             for wheel, found in enumerate(self._at(motion, instant + motion.offset)):
                 values = found[0], found[1], found[2] * found[1], found[3]
                 for total, value in zip(sums, values, strict=True):
                     total[wheel] += share * value
+                obeyed[wheel] = obeyed[wheel] and found[at.POWER_OBEYED] > 0.0
         torque, current, at_motor, power = sums
-        return Means(torque, current, at_motor, power)
+        return Means(torque, current, at_motor, power, obeyed=obeyed)
 
     def _at(self, motion: MeasuredMotion, instant: float) -> list[list[float]]:
-        """Torque, current, voltage and power of each drive, `instant` after the middle [s]."""
+        """What `drive_power` says of each drive, `instant` after the middle [s]."""
         row = [motion.yaw_rate, motion.heading]
         for wheel in range(WHEELS):
             speed, change = motion.speed[wheel], motion.acceleration[wheel]
@@ -214,7 +216,8 @@ class Physical:
         out = as_list(found)
         for wheel, power in enumerate(motion.besides.driver):
             out[wheel * at.POWER_WHEEL + at.POWER_DRAWN] += power
-        return [out[first : first + 4] for first in range(0, len(out), at.POWER_WHEEL)]
+        size = at.POWER_WHEEL
+        return [out[first : first + size] for first in range(0, len(out), size)]
 
 
 class FromMotion:

@@ -212,35 +212,37 @@ class PowerPredictor:
             speed = estimate.speed.tolist()
         windows = self._windows(tick)
         said = self._said(tick)
-        motion = self._motion(_Tick(estimate, simulated, gyro, commanded, windows.offset_s, said))
+        motion, volts = self._motion(
+            _Tick(estimate, simulated, gyro, commanded, windows.offset_s, said)
+        )
         is_silent = commanded is None or self._is_silent(tick, commanded, speed)
         if self._has_lost(tick) or is_silent:
             self._resting.forget()
-        says = [math.isfinite(volts) for volts in said]
         if commanded is None or is_silent:
-            alone = self._readings(self._measured.means(motion, None, says))
+            alone = self._readings(self._measured.means(motion, None))
             return Prediction(tick, UNKNOWN, UNKNOWN, _UNKNOWN, UNKNOWN_READING, alone)
         means = self._model.commanded(commanded, windows)
-        beside = Simulated(self._moving_as(motion, simulated), means)
+        beside = Simulated(self._moving_as(motion, simulated, volts), means)
         return Prediction(
             stamp_ns=tick,
             speed=_triple(commanded.speed),
             torque=_triple(means.torque),
             motors=self._readings(means),
             total=self._total(means),
-            from_encoders=self._readings(self._measured.means(motion, beside, says)),
+            from_encoders=self._readings(self._measured.means(motion, beside)),
         )
 
-    def _motion(self, seen: _Tick) -> MeasuredMotion:
-        """Motion of the wheels in a tick, from what the encoders show of it."""
-        inferred = self._resting.voltages(
+    def _motion(self, seen: _Tick) -> tuple[MeasuredMotion, list[float]]:
+        """Motion of the wheels in a tick, from what the encoders show of it, and the voltages of
+        the simulated drivers [V]."""
+        drivers = self._resting.voltages(
             self._path,
             self._moved(seen.estimate, 0.5 * self._period_s),
             seen.estimate.speed.tolist(),
             simulated=seen.simulated.speed.tolist(),
             share=0.5 + seen.offset_s / self._period_s,
         )
-        pairs = zip(seen.said, inferred, strict=True)
+        pairs = zip(seen.said, drivers.held, strict=True)
         wheels = self._flaws.turned(seen.estimate)
         turning = wheels.speed.tolist()
         turned = self._period_s * self._turning(turning, seen.gyro, seen.commanded)
@@ -256,16 +258,20 @@ class PowerPredictor:
             self._path.besides,
         )
         self._heading += turned
-        return motion
+        return motion, drivers.simulated
 
-    def _moving_as(self, motion: MeasuredMotion, simulated: WheelEstimate) -> MeasuredMotion:
-        """The same with the wheels as simulated, and the body as they roll."""
+    def _moving_as(
+        self, motion: MeasuredMotion, simulated: WheelEstimate, held: Sequence[float]
+    ) -> MeasuredMotion:
+        """The same with the wheels and their drivers' voltages as simulated, and the body as they
+        roll."""
         wheels = self._flaws.turned(simulated)
         return evolve(
             motion,
             speed=wheels.speed.tolist(),
             acceleration=wheels.acceleration.tolist(),
             yaw_rate=NAN,
+            held=held,
         )
 
     def _said(self, tick: int) -> list[float]:

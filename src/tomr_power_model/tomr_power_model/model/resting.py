@@ -23,6 +23,8 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
+from attrs import frozen
+
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.holding import Holding
 from tomr_power_model.dynamics.vehicle import vehicle_of
@@ -34,6 +36,7 @@ _FADES = 0.1  # 1/s, of the difference in motion, ...
 _FADES_SOON, _SOON = 2.1, 2.0  # ... and for so many seconds after ...
 _DIFFERS = 0.5  # ... the speed was not as simulated [rad/s]
 _STANDS = 0.05  # rad/s
+_TURNS = 0.2  # rad/s, which an encoder that reads standstill does not show
 _CREEPS = 0.01  # rad/s: faster than it is asked to
 _SLOW = 0.5  # rad/s
 _FOLLOWS = 0.5  # share of the difference in a tick
@@ -56,6 +59,33 @@ class SimulatedDrivers(Protocol):
         ...
 
 
+@frozen
+class Voltages:
+    """Of the drivers at some time, one per wheel [V]; NaN before the first command."""
+
+    held: list[float]
+    simulated: list[float]  # by those of the simulation
+
+    @classmethod
+    def unknown(cls) -> "Voltages":
+        """Of no driver."""
+        return cls([_UNKNOWN] * WHEELS, [_UNKNOWN] * WHEELS)
+
+    def after(self, before: "Voltages", share: float) -> "Voltages":
+        """At a share of the time since `before`, linearly; as now where that is not known."""
+        return Voltages(
+            _between(before.held, self.held, share),
+            _between(before.simulated, self.simulated, share),
+        )
+
+
+def _between(before: Sequence[float], now: Sequence[float], share: float) -> list[float]:
+    return [
+        first + share * (last - first) if first == first else last
+        for first, last in zip(before, now, strict=True)
+    ]
+
+
 class RestingDrivers:
     """Sums of the drivers, one per wheel."""
 
@@ -73,7 +103,7 @@ class RestingDrivers:
     def clear(self) -> None:
         """What the drivers' sums hold is not known until the next command."""
         self._offset = [_UNKNOWN] * WHEELS  # rad
-        self._before = [_UNKNOWN] * WHEELS  # V, at the end of the last tick
+        self._before = Voltages.unknown()  # at the end of the last tick
         self._strange = [False] * WHEELS  # differences that are not the drivers'
         self._soon = [0] * WHEELS  # ticks for which they fade soon
         self._followed = [False] * WHEELS  # in the last tick
@@ -90,8 +120,8 @@ class RestingDrivers:
         *,
         simulated: Sequence[float],
         share: float,
-    ) -> list[float]:
-        """Voltage that each driver holds at some time of a tick [V], NaN before the first command.
+    ) -> Voltages:
+        """Voltages of the drivers at some time of a tick.
 
         Args:
             path: that simulates what the drivers are asked for.
@@ -101,22 +131,24 @@ class RestingDrivers:
             share: of the tick at that time.
         """
         if path.state is None:
-            return [_UNKNOWN] * WHEELS
+            return Voltages.unknown()
         turned, sums, asked = (path.wheel(part) for part in (at.TURNED, at.INTEGRAL, at.ASKED))
         ahead = [turned[wheel] - angle[wheel] for wheel in range(WHEELS)]
-        found, apart = [], []
+        found, expected, apart = [], [], []
         for wheel in range(WHEELS):
+            if abs(speed[wheel]) > _TURNS:
+                self._strange[wheel] = False
             fades = self._fades(wheel, speed[wheel], simulated[wheel])
             apart.append(self._difference(wheel, ahead[wheel], fades))
             known = apart[wheel] if apart[wheel] == apart[wheel] else 0.0
-            error = asked[wheel] - speed[wheel]
-            found.append(self._proportional * error + self._integral * (sums[wheel] + known))
-        self._follow(path, apart, ahead, speed)
-        before, self._before = self._before, found
-        return [
-            first + share * (last - first) if first == first else last
-            for first, last in zip(before, found, strict=True)
-        ]
+            here, there = asked[wheel] - speed[wheel], asked[wheel] - simulated[wheel]
+            expected.append(self._proportional * there + self._integral * sums[wheel])
+            found.append(self._proportional * here + self._integral * (sums[wheel] + known))
+        now = Voltages(found, expected).after(self._before, share)
+        taken = self._follow(path, apart, ahead, speed)
+        after = [volts + self._integral * more for volts, more in zip(expected, taken, strict=True)]
+        self._before = Voltages(found, after)
+        return now
 
     def _fades(self, wheel: int, speed: float, simulated: float) -> float:
         """Share of the difference that a tick takes off, of a wheel that turns so [rad/s]."""
@@ -139,8 +171,6 @@ class RestingDrivers:
         if self._offset[wheel] != self._offset[wheel]:
             self._offset[wheel] = -ahead
         self._offset[wheel] -= fades * (ahead + self._offset[wheel])
-        if fades:
-            self._strange[wheel] = False
         return ahead + self._offset[wheel]
 
     def _follow(
@@ -149,10 +179,12 @@ class RestingDrivers:
         apart: Sequence[float],
         ahead: Sequence[float],
         speed: Sequence[float],
-    ) -> None:
-        """Take the differences over into the simulation, where a push may have left them."""
+    ) -> list[float]:
+        """Take the differences over into the simulation, where a push may have left them; how
+        much, one per wheel [rad]."""
         simulated, asked = path.wheel(at.SPEED), path.wheel(at.ASKED)
         sums, held = path.wheel(at.INTEGRAL), self._held(path)
+        taken = [0.0] * WHEELS
         for wheel in range(WHEELS):
             excess = abs(simulated[wheel]) - abs(asked[wheel])
             if self._followed[wheel] and excess > _CREEPS:
@@ -166,6 +198,8 @@ class RestingDrivers:
             if follows:
                 path.add_to_sum(wheel, more)
                 self._offset[wheel] -= more
+                taken[wheel] = more
+        return taken
 
     def _held(self, path: SimulatedDrivers) -> list[float]:
         """What friction holds each simulated wheel against [V]."""

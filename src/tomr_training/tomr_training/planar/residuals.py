@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.binding import compiled
-from tomr_power_model.model.encoder_path import at_rest, beside
+from tomr_power_model.model.encoder_path import Rests, alike, at_rest, beside
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.robot import WHEELS
 from tomr_training.drives import Drive
@@ -74,26 +74,33 @@ def compare(drive: Drive, signals: Signals) -> Compared:
 def _derived(believed: Expected, commanded: Array, offset: Array) -> Array:
     """Power of each driver by the encoders [W], (ticks, 3): `PowerPredictor`'s encoder path."""
     speed, simulated = believed.speed, believed.simulated_speed
-    return beside(
-        commanded,
-        _inverse(believed, speed, believed.acceleration, offset),
-        _inverse(believed, simulated, believed.simulated_acceleration, offset),
-        (at_rest(speed), at_rest(simulated)),
+    measured, resting = believed.acceleration, (at_rest(speed), at_rest(simulated))
+    expected = alike(measured, believed.simulated_acceleration, resting)
+    inverse, held = _inverse(believed, (speed, measured, believed.held), offset)
+    of_simulated, also = _inverse(
+        believed, (alike(speed, simulated, resting), expected, believed.simulated_held), offset
     )
+    return beside(commanded, inverse, of_simulated, Rests(*resting, held & also))
 
 
-def _inverse(believed: Expected, speed: Array, acceleration: Array, offset: Array) -> Array:
-    """Power of each driver in some motion by inverse dynamics [W], (ticks, 3)."""
+def _inverse(
+    believed: Expected, moves: tuple[Array, Array, Array], offset: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Power of each driver by inverse dynamics [W], (ticks, 3), where wheels move with some speed
+    and acceleration, their drivers at some voltages, (ticks, 3) each; and whether friction can hold
+    a wheel at rest against them."""
+    speed, acceleration, held = moves
     motion = np.zeros((len(speed), at.MOTION_HEADER + WHEELS * at.MOTION_WHEEL))
     motion[:, [at.MOTION_YAW, at.MOTION_HEADING]] = math.nan
     first = at.MOTION_HEADER + at.MOTION_WHEEL * np.arange(WHEELS)
     motion[:, first + at.MOTION_SPEED] = speed + offset[:, None] * acceleration
     motion[:, first + at.MOTION_ACCELERATION] = acceleration
     motion[:, first + at.MOTION_ANGLE] = math.nan
-    motion[:, first + at.MOTION_VOLTAGE] = believed.held
+    motion[:, first + at.MOTION_VOLTAGE] = held
     found = np.empty((len(speed), WHEELS * at.POWER_WHEEL))
     compiled().drive_powers(believed.motion.variant.numbers, motion, found, WHEELS)
-    return found[:, at.POWER_DRAWN :: at.POWER_WHEEL]
+    obeyed = found[:, at.POWER_OBEYED :: at.POWER_WHEEL] > 0.0
+    return found[:, at.POWER_DRAWN :: at.POWER_WHEEL], obeyed
 
 
 def _tick_means(time: Array, values: Array, ticks: int) -> Array:
