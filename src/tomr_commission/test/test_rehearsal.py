@@ -46,7 +46,7 @@ def test_shoves_show_in_the_residuals_and_only_there() -> None:
 @pytest.mark.parametrize(("seed", "stands"), [(80_000_000, True), (80_000_001, False)])
 def test_of_four_drives_one_stands_still_when_it_is_shoved(seed: int, stands: bool) -> None:
     seen = observed_of(shoved_drive(ROBOT, USAGE, Rehearsal(), seed))
-    late = seen.modelled[seen.seconds > 8.0][:, list(SPEEDS)]
+    late = seen.modelled[seen.seconds > 5.0][:, list(SPEEDS)]
     assert bool((np.abs(late) < 0.1).all()) is stands
 
 

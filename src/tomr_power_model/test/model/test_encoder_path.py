@@ -156,29 +156,37 @@ def test_a_driver_that_says_its_voltage_is_believed_of_a_wheel_that_rests() -> N
     assert _powers(last)[1] == pytest.approx([0.5**2 / 0.8 + 1.2, 1.2, 1.2], abs=1e-4)
 
 
+def _of_resting(here: MeasuredMotion, there: MeasuredMotion) -> float:
+    """Power of wheels that friction of 0.7 N m holds, 0.8 V at 0.8 ohm; 5 W are simulated."""
+    robot = _robot({"friction.coulomb": ({"torque": 0.7},) * 3})
+    path = EncoderPath(robot, Physical(robot, 0.05, False), 0.05, is_shown=False)
+    whole = Means([5.0] * 3, [5.0] * 3, [5.0] * 3, [5.0] * 3)
+    return path.means(here, Simulated(there, whole)).power[0]
+
+
+def _resting(held: float, speed: float = 0.0, change: float = 0.0) -> MeasuredMotion:
+    none, speeds, changes = [0.0] * 3, [speed] * 3, [change] * 3
+    return MeasuredMotion(speeds, changes, none, math.nan, 0.0, none, [held] * 3)
+
+
 @pytest.mark.parametrize(
     ("volts", "expected", "difference"),
     [
         (0.5, 0.2, (0.5**2 - 0.2**2) / 0.8),
-        (1.2, 0.2, 0.0),  # friction holds 0.8 V: it would turn, so no driver holds that
+        (1.2, 0.2, 0.0),  # it would turn, so no driver holds that
         (0.5, -1.2, 0.0),
     ],
 )
 def test_of_a_wheel_that_rests_the_drivers_voltages_make_the_difference(
     volts: float, expected: float, difference: float
 ) -> None:
-    """At 0.8 ohm; that both come to rest otherwise makes none."""
-    nothing = [0.0] * 3
+    found = _of_resting(_resting(volts), _resting(expected))
+    assert found == pytest.approx(5.0 + difference)
 
-    def resting(change: float, held: float) -> MeasuredMotion:
-        alike = [change] * 3
-        return MeasuredMotion(nothing, alike, nothing, math.nan, 0.0, nothing, [held] * 3)
 
-    robot = _robot({"friction.coulomb": ({"torque": 0.7},) * 3})
-    path = EncoderPath(robot, Physical(robot, 0.05, False), 0.05, is_shown=False)
-    whole = Means([5.0] * 3, [5.0] * 3, [5.0] * 3, [5.0] * 3)
-    found = path.means(resting(0.1, volts), Simulated(resting(-0.2, expected), whole))
-    assert found.power == pytest.approx([5.0 + difference] * 3)
+@pytest.mark.parametrize(("speed", "change"), [(0.08, 0.0), (0.05, 1.0)])
+def test_how_a_wheel_comes_to_rest_makes_none(speed: float, change: float) -> None:
+    assert _of_resting(_resting(0.3, 0.05), _resting(0.3, speed, change)) == pytest.approx(5.0)
 
 
 def test_what_a_gyro_says_of_the_body_is_no_motion_of_the_simulated_one() -> None:
