@@ -8,8 +8,7 @@ only what the difference between the two motions makes:
 
 For a wheel that rests in both motions that is what the voltages differ by that the two drivers
 hold, no more, and only where friction can hold it against them: how both come to rest is not known
-so well. Of one that rests in the simulation alone
-inverse dynamics speak for themselves.
+so well. Of one that rests in the simulation alone inverse dynamics speak for themselves.
 """
 
 import math
