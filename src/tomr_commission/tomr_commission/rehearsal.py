@@ -32,7 +32,6 @@ _SETTLING = 3.0  # s after a shove that are its own
 _APART = 6.0  # s between shoves
 _PER_DRIVE = 3  # shoves
 _FIRST = 4.0  # s
-_STANDING = 4  # one drive of so many stands still when it is shoved
 _CHUNK = 8
 
 
@@ -68,6 +67,7 @@ class Rehearsal:
     off: float = 0.02  # share by which every value of the robot may be off its explained one
     payload: float = 0.05  # of its mass, at most
     friction: tuple[float, float] = (0.6, 1.0)  # traction of the floor
+    standing: int = 4  # one drive of so many stands still when it is shoved
     shoves_per_hour: float = 30.0  # that a robot meets, for the rate of alarms
     silent: tuple[int, ...] = ()  # residuals that the robot does not report
     done: int = 0  # shoves that came before: these follow
@@ -134,7 +134,7 @@ def shoved_drive(robot: Robot, usage: Usage, plan: Rehearsal, seed: int) -> Driv
     """One drive; it depends on nothing but the arguments."""
     random = np.random.default_rng(seed)
     length = _FIRST + _PER_DRIVE * _APART
-    stands = seed % _STANDING == 0
+    stands = seed % plan.standing == 0
     phase = RandomPhase(
         count=1 if stands else math.ceil(length / 1.5),
         speed=usage.speed,
