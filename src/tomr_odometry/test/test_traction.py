@@ -27,7 +27,7 @@ def _motion(speed: float, change: float) -> list[float]:
 )
 def test_one_of_two_currents_is_that_of_inverse_dynamics(speed: float, change: float) -> None:
     numbers, laws = laid_out(vehicle_of(ROBOT)).tolist(), plain(tuple(ROBOT.physics))
-    motion, power, both = _motion(speed, change), [0.0] * 12, [0.0] * 6
+    motion, power, both = _motion(speed, change), [0.0] * (WHEELS * at.POWER_WHEEL), [0.0] * 6
     laws.drive_power(numbers, motion, power, WHEELS)
     drawn = power[at.POWER_DRAWN :: at.POWER_WHEEL]
     laws.motor_currents(numbers, motion, drawn, both, WHEELS)
@@ -56,7 +56,7 @@ def test_both_currents_leave_the_power_or_are_where_it_is_least(speed: float, dr
 def test_force_of_a_contact_is_what_accelerates_the_body() -> None:
     # Turning on the spot: each of three wheels gives a third of I alpha / R.
     numbers, laws = laid_out(vehicle_of(ROBOT)).tolist(), plain(tuple(ROBOT.physics))
-    motion, power, found = _motion(5.0, 10.0), [0.0] * 12, [0.0] * 6
+    motion, power, found = _motion(5.0, 10.0), [0.0] * (WHEELS * at.POWER_WHEEL), [0.0] * 6
     laws.drive_power(numbers, motion, power, WHEELS)
     laws.tractions(numbers, motion, power[at.POWER_CURRENT :: at.POWER_WHEEL], found, WHEELS)
     turning = -ROBOT.wheel_radius / ROBOT.robot_radius * 10.0
@@ -143,7 +143,7 @@ def _one_of_two(law: float, change: float = -20.0) -> tuple[list[float], float, 
     """Both currents of a power, which is taken for a law's voltage between them, noise, rolling."""
     tractions, motion = Tractions(ROBOT), _motion(4.0, change)
     numbers, laws = laid_out(vehicle_of(ROBOT)).tolist(), plain(tuple(ROBOT.physics))
-    power, both = [0.0] * 12, [0.0] * 6
+    power, both = [0.0] * (WHEELS * at.POWER_WHEEL), [0.0] * 6
     laws.drive_power(numbers, motion, power, WHEELS)
     laws.motor_currents(numbers, motion, power[at.POWER_DRAWN :: at.POWER_WHEEL], both, WHEELS)
     current = both[0] + law * (both[1] - both[0])
