@@ -71,6 +71,7 @@ def test_a_wheel_that_stirs_is_moved_where_none_is_to_turn(
     assert seen([STILL] * 3, [stirs, STILL, STILL]).moved == moved
     assert seen([STILL, STILL, (8.0, 0.0)], [stirs, STILL, (8.0, 0.0)]).moved == ()
     assert seen([STILL] * 3, [(0.2, off), STILL, STILL]).moved == ()  # it may be asked to creep
+    assert seen([STILL] * 3, [(0.2, 0.4), STILL, STILL]).moved == (0,)  # but not so fast
 
 
 def test_a_wheel_that_comes_to_rest_is_moved_by_nobody() -> None:

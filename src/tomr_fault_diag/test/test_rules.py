@@ -103,7 +103,9 @@ def test_no_fault_turns_a_wheel_that_stood_where_others_are_driven() -> None:
 
 
 @pytest.mark.parametrize("channel", [MOTORS.start, DERIVED.start])
-@pytest.mark.parametrize(("drawn", "pushed"), [(-5.0, True), (0.9, True), (1.1, False)])
+@pytest.mark.parametrize(
+    ("drawn", "pushed"), [(-5.0, True), (0.9, True), (1.1, False), (math.nan, True)]
+)
 def test_what_is_not_known_turns_a_wheel_that_stood_only_where_it_draws_more(
     channel: int, drawn: float, pushed: bool
 ) -> None:
@@ -116,11 +118,14 @@ def test_what_is_not_known_turns_a_wheel_that_stood_only_where_it_draws_more(
     assert set(found) == {kind.start for kind in (CONTROLS, ENCODERS, DRAGS, WEAKS)}
 
 
-def test_what_is_not_known_is_as_likely_as_normal_where_a_push_is_not() -> None:
+@pytest.mark.parametrize(("unknown", "less"), [(3.0, {OTHER: -3.0}), (-4.0, {})])
+def test_what_is_not_known_is_no_likelier_than_normal_where_a_push_is_not(
+    unknown: float, less: dict[int, float]
+) -> None:
     moment = evolve(QUIET, unseen=Unseen(moved=(0,)))
-    given = np.where(np.arange(HYPOTHESES) == OTHER, 3.0, 0.0)
+    given = np.where(np.arange(HYPOTHESES) == OTHER, unknown, 0.0)
     given[EXTERNAL] = -2.0
-    assert changed("a wheel that is moved", moment, given) == {OTHER: -3.0}
+    assert changed("a wheel that is moved", moment, given) == less
 
 
 def test_without_speeds_no_encoder_is_likelier_than_another() -> None:

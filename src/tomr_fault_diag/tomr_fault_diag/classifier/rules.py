@@ -94,7 +94,7 @@ def _moved(likelihoods: Array, moment: Moment) -> Array:
 
 
 def _draws(frame: ResidualFrame, wheel: int) -> bool:
-    """Whether a motor draws more than it should."""
+    """Whether a motor draws more than it should, as far as its power is known."""
     paths = frame.residuals[MOTORS[wheel]], frame.residuals[DERIVED[wheel]]
     return any(item.residual > item.band for item in paths)
 

@@ -233,3 +233,14 @@ def test_monitors_lag_alike_in_both_motions_also_after_a_time_without_simulation
     whole = Means([5.0] * 3, [5.0] * 3, [5.0] * 3, [5.0] * 3)
     found = path.means(moving(4.0), Simulated(moving(4.0), whole))
     assert found.power == pytest.approx([5.0] * 3)
+
+
+def test_a_model_that_knows_no_voltages_says_nothing_of_wheels_that_rest() -> None:
+    def moving(speed: float) -> MeasuredMotion:
+        nothing = [0.0] * 3
+        return MeasuredMotion([speed, 0.0, 0.0], nothing, nothing, math.nan, 0.0, nothing, nothing)
+
+    path = EncoderPath(ROBOT, _Drawn(), 0.05, is_shown=True)
+    whole = Means([5.0] * 3, [5.0] * 3, [5.0] * 3, [5.0] * 3)
+    found = path.means(moving(2.0), Simulated(moving(3.0), whole))
+    assert found.power == pytest.approx([5.0 + 2.0 - 3.0, 5.0, 5.0])

@@ -152,7 +152,7 @@ def drive_state(
     k, hot = p[w + CONSTANT], p[w + RESISTANCE] * (1.0 + COPPER * m[a + MOTION_RISE])
     carried += p[w + VISCOUS] * speed + m[a + MOTION_RESISTING]
     moves, held = math.tanh(speed / STICKING_SPEED), m[a + MOTION_VOLTAGE]
-    torque, obeyed = carried, 1.0
+    torque = carried
     for _ in range(MESHING_SWEEPS):  # the gear carries what friction at the axle takes as well
         before = torque
         gear = before - p[w + ROTOR] * m[a + MOTION_ACCELERATION]

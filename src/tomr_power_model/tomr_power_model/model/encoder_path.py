@@ -112,7 +112,7 @@ class EncoderPath:
         )
         of_other = self._model.measured(other)
         off = self._shown(of_other, 1)
-        rests = Rests(*resting, _obeyed(means) & _obeyed(of_other))
+        rests = Rests(*resting, np.array(means.obeyed) & np.array(of_other.obeyed))
 
         def right(*of_tick: Sequence[float]) -> list[float]:
             first, alone, other = map(np.array, of_tick)
@@ -158,11 +158,6 @@ class EncoderPath:
         volts = _voltages(means)
         at_motor = [v * i for v, i in zip(volts, current, strict=True)]
         return evolve(means, current=current, at_motor=at_motor)
-
-
-def _obeyed(means: Means) -> Mask:
-    """Of each wheel; a model that was not asked says the same of both motions."""
-    return np.array([True] * len(means.power) if means.obeyed is None else means.obeyed)
 
 
 def _voltages(means: Means) -> list[float]:

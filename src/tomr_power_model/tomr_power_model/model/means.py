@@ -6,6 +6,7 @@ from typing import Self
 from attrs import frozen
 
 from tomr_power_model.dynamics.drives import DrivePower
+from tomr_power_model.robot import WHEELS
 
 
 @frozen
@@ -19,8 +20,8 @@ class Means:
     other: float | None = None  # of computer and sensors [W]; None: as described
     voltage: float | None = None  # of the supply [V]; None: nominal, less what sags
     drives: float | None = None  # of all drives, where it is known by itself [W]
-    # Whether friction can hold each wheel at rest against its driver; None: not asked.
-    obeyed: Sequence[bool] | None = None
+    # Whether friction is known to hold each wheel, should it rest, against its driver's voltage.
+    obeyed: Sequence[bool] = (False,) * WHEELS
 
     @classmethod
     def of(cls, drives: DrivePower) -> Self:
