@@ -46,7 +46,7 @@ from tomr_fault_diag.classifier.states import FAULTLESS, NORMAL, SLIP, State
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
 from tomr_power_model.cli import run_main
-from tomr_power_model.robot import Robot, shipped_robot
+from tomr_power_model.robot import WHEELS, Robot, shipped_robot
 from tomr_training.drives import Drive, random_drive, severity_of, wheel_of
 from tomr_training.labels import LASTING, SLIPPING, Flags, GroundTruth, Noise, deviates, lasting
 from tomr_training.planar.faults import class_of
@@ -96,7 +96,8 @@ def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[Resid
     """The same residuals in other bands than the usual; what was wider for its noise stays so, and
     what an IMU shows keeps the usual bands."""
     _, modelled = as_arrays(frames)
-    compared = Compared(modelled, modelled)
+    nothing = np.zeros((len(modelled), WHEELS))
+    compared = Compared(modelled, modelled, nothing, nothing)
     (_, usual), (_, band) = (compared.residuals(chosen) for chosen in (BandSettings(), bands))
 
     def width(item: Residual, default: float, wanted: float) -> float:

@@ -14,12 +14,13 @@ from rclpy.qos import QoSProfile
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
-from tomr_power_model.messages.types import BATTERY, DIAGNOSTICS, JOINT_STATE
+from tomr_power_model.messages.outgoing import TYPES
+from tomr_power_model.messages.types import DIAGNOSTICS
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.nodes.stage_node import SENSOR_QOS, STAGE_QOS, message_class, run_node
 from tomr_power_model.robot import shipped_robot
 from tomr_power_model.topics.inputs import model_inputs
-from tomr_power_model.topics.predictions import EXPECTED, prediction_topics
+from tomr_power_model.topics.predictions import prediction_topics
 
 Heard = tuple[str, str, QoSProfile]  # topic, type, QoS
 
@@ -34,10 +35,7 @@ def _power_residuals() -> list[Heard]:
     robot = shipped_robot("reference")
     inputs = residual_inputs(robot, ResidualStage(robot))
     return [
-        *(
-            (t, JOINT_STATE if t == EXPECTED else BATTERY, STAGE_QOS)
-            for t in prediction_topics(robot)
-        ),
+        *((topic, TYPES[kind], STAGE_QOS) for topic, kind in prediction_topics(robot).items()),
         *((item.topic, item.type_name, SENSOR_QOS) for item in inputs),
     ]
 

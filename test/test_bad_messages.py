@@ -17,10 +17,11 @@ from sensor_msgs.msg import BatteryState, JointState
 
 from tomr_fault_diag.classifier.messages import NAME
 from tomr_fault_diag.residuals.frame import residual_names
+from tomr_power_model.messages.outgoing import JointMessage
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.nodes.stage_node import STAGE_QOS
 from tomr_power_model.robot import shipped_robot
-from tomr_power_model.topics.predictions import EXPECTED, prediction_topics
+from tomr_power_model.topics.predictions import prediction_topics
 
 ROBOT = shipped_robot("reference")
 ROBOT_FILE = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")
@@ -28,7 +29,7 @@ WHEELS = ROBOT.wheel_names
 POWER = tuple(f"{topic}/power" for topic in ROBOT.wheel_topics)
 NAMES = residual_names(ROBOT.wheel_topics)
 TOTAL, SPEEDS, DERIVED = NAMES[0], NAMES[4:7], NAMES[7:]
-FRAME = len(NAMES) + 3  # and what an IMU says
+FRAME = len(NAMES) + 6  # and what an IMU and the drivers say
 
 NODES = ("power_model", "power_residuals", "fault_classifier")
 ROUND = 20_000_000  # ns: encoders and power come at 50 Hz
@@ -216,9 +217,9 @@ def _jump(seconds: float) -> Callable[[Bench], None]:
 
 def _broken_predictions(bench: Bench) -> None:
     """A whole set of one stamp, whose arrays are too short."""
-    for topic in prediction_topics(ROBOT):
+    for topic, kind in prediction_topics(ROBOT).items():
         short = JointState(name=list(WHEELS), velocity=[0.0, 0.0], effort=[0.0])
-        message = short if topic == EXPECTED else _supply(STANDBY)
+        message = short if kind is JointMessage else _supply(STANDBY)
         bench.send(topic, message, bench.now + 1)
 
 

@@ -275,6 +275,8 @@ def test_a_faulty_drive_exits_with_1_and_a_bag(
     per_tick = {
         "/predicted/joint_states",
         "/battery_state/predicted",
+        "/motor_voltage/predicted",
+        "/motor_voltage/from_encoders",
         "/residuals",
         *(f"{wheel}/{kind}" for wheel in wheels for kind in ("predicted", "from_encoders")),
     }

@@ -19,11 +19,11 @@ from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_power_model.messages.bag import jazzy_typestore, to_bag
-from tomr_power_model.messages.outgoing import TYPES, DiagnosticMessage, JointMessage, SupplyMessage
+from tomr_power_model.messages.outgoing import TYPES, DiagnosticMessage
 from tomr_power_model.nodes.stage_node import STAGE_QOS, message_class
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import shipped_robot
-from tomr_power_model.topics.predictions import EXPECTED, prediction_topics
+from tomr_power_model.topics.predictions import prediction_topics
 
 BAG = Path(__file__).parents[1] / "bags" / "circle_encoder_lost"
 SENSORS = ("cmd_vel", "joint_states", "wheel_1/power")
@@ -32,10 +32,8 @@ Key = tuple[str, int, str]
 
 
 def _types() -> dict[str, str]:
-    topics = {
-        topic: TYPES[JointMessage if topic == EXPECTED else SupplyMessage]
-        for topic in prediction_topics(shipped_robot("reference"))
-    }
+    predicted = prediction_topics(shipped_robot("reference")).items()
+    topics = {topic: TYPES[kind] for topic, kind in predicted}
     return {**topics, **dict.fromkeys(("residuals", DIAGNOSTICS), TYPES[DiagnosticMessage])}
 
 

@@ -44,6 +44,7 @@ def steady() -> Callable[..., Observed]:
         stamps = 50_000_000 * np.arange(1, ticks + 1, dtype=np.int64)
         missing = np.full(modelled.shape, "", dtype="<U1")
         yaw, along = np.full((ticks, 2), np.nan), np.full((ticks, 4), np.nan)
-        return Observed(name, stamps, residual, modelled, missing, units, yaw, along)
+        volts = np.full((ticks, 6), np.nan)
+        return Observed(name, stamps, residual, modelled, missing, units, yaw, along, volts)
 
     return make

@@ -59,6 +59,17 @@ def test_the_band_of_an_accelerometer_as_well(steady: Steady) -> None:
     assert band(0.2).yaw == usual.yaw
 
 
+def test_the_bands_of_voltages_are_those_of_healthy_drivers(steady: Steady) -> None:
+    usual, drive, random = BandSettings(), steady(), np.random.default_rng(2)
+    volts = np.hstack([random.normal(0.0, 0.03, (4000, 3)), np.full((4000, 3), 6.0)])
+    found = bands_of([evolve(drive, volts=volts)], BandChoice(margin=1.5))
+    width = max(found.voltage, 6.0 * found.voltage_relative)
+    assert width == pytest.approx(1.5 * 3.29 * 0.03, rel=0.1)
+    unknown = bands_of([drive], BandChoice())  # its drivers' law is not known
+    assert unknown.voltage == usual.voltage
+    assert unknown.voltage_relative == usual.voltage_relative
+
+
 def test_regimes_of_a_start_and_a_reversal(steady: Steady) -> None:
     drive = steady(ticks=60)
     modelled = drive.modelled.copy()

@@ -71,6 +71,28 @@ def test_the_gyro_is_seen_with_its_band(healthy: Observed) -> None:
     assert frames_of(drive, narrow)[2].yaw.code == -1
 
 
+def test_the_voltages_are_seen_with_their_bands(healthy: Observed) -> None:
+    volts = np.array(
+        [[np.nan] * 6, [0.1, -0.7, 0.2, 4.0, 6.0, 0.0], [0.1, 0.0, 0.0, 6.0, 6.0, 0.0]]
+    )
+    drive = evolve(healthy.part(slice(0, 3), "three"), volts=volts)
+    bands = BandSettings(voltage=0.5, voltage_relative=0.1, voltage_transient=0.3)
+    unknown, first, second = (frame.voltages for frame in frames_of(drive, bands))
+    assert all(item.stale for item in unknown)
+    shown = [(item.residual, item.modelled, item.unit, item.code) for item in first]
+    assert shown == [(0.1, 4.0, "V", 0), (-0.7, 6.0, "V", -1), (0.2, 0.0, "V", 0)]
+    # A tenth of 6 V, and 0.3 of the 2 V by which the first moved; of the last the least.
+    assert np.isclose([item.band for item in second], [1.2, 0.6, 0.5]).all()
+
+
+def test_a_recording_shows_what_its_drivers_hold(healthy: Observed) -> None:
+    """The simulated robot equals its description: hundredths of a volt."""
+    known = np.isfinite(healthy.volts).all(axis=1)
+    assert known.mean() > 0.9
+    assert np.abs(healthy.volts[known, 3:]).max() > 3.0
+    assert np.sqrt(np.mean(healthy.volts[known, :3] ** 2)) < 0.1
+
+
 def test_the_accelerometer_is_seen_with_its_bands(healthy: Observed) -> None:
     along = np.array([[np.nan] * 4, [0.1, -0.7, 2.0, 1.0], [0.1, -0.7, 3.0, 1.0]])
     drive = evolve(healthy.part(slice(0, 3), "three"), along=along)

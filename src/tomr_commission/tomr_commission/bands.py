@@ -10,13 +10,15 @@ from tomr_commission.observed import (
     Observed,
     along_bands_of,
     band_of,
+    moved,
     reports_currents,
     yaw_band_of,
 )
 from tomr_commission.request import BandChoice
-from tomr_fault_diag.residuals.calibrated import fit_bands, widened
+from tomr_fault_diag.residuals.calibrated import fit_band, fit_bands, widened
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL
 from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_power_model.robot import WHEELS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -47,6 +49,7 @@ def bands_of(drives: Sequence[Observed], choice: BandChoice) -> BandSettings:
         choice.within,
     )
     wide = _inertial_widened(drives, widened(fitted, choice.margin, choice.speed_factor), choice)
+    wide = _with_voltages(drives, wide, choice)
     return BandSettings(**{name: float(f"{value:.4g}") for name, value in asdict(wide).items()})
 
 
@@ -70,6 +73,23 @@ def _inertial_widened(
         yaw_relative=yaw * bands.yaw_relative,
         along=along * bands.along,
         along_relative=along * bands.along_relative,
+    )
+
+
+def _with_voltages(
+    drives: Sequence[Observed], bands: BandSettings, choice: BandChoice
+) -> BandSettings:
+    """Bands in which voltages of healthy drivers stay; as they are where these are not known."""
+    volts = np.concatenate([drive.volts for drive in drives])
+    change = np.concatenate([moved(drive.volts[:, WHEELS:]) for drive in drives])
+    band = fit_band(volts[:, :WHEELS], volts[:, WHEELS:], change, choice.within)
+    if band is None:
+        return bands
+    return evolve(
+        bands,
+        voltage=choice.margin * band.least,
+        voltage_relative=choice.margin * band.relative,
+        voltage_transient=choice.margin * band.transient,
     )
 
 

@@ -17,6 +17,7 @@ from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import (
     MOTORS,
+    NO_ENCODERS,
     NO_IMU,
     NOT_MEASURED,
     RESIDUALS,
@@ -31,7 +32,7 @@ from tomr_fault_diag.residuals.frame import (
 from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.recordings import open_recording
-from tomr_power_model.robot import Robot
+from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
 
@@ -50,6 +51,7 @@ class Observed:
     units: NDArray[np.str_]  # of the residuals, (10,)
     yaw: Array  # gyro less wheels, and yaw rate as the wheels show [rad/s], (n, 2)
     along: Array  # accelerometer less wheels along x and y, and as the wheels show [m/s^2], (n, 4)
+    volts: Array  # what drivers hold less what is simulated, and what is [V], (n, 6)
 
     @classmethod
     def of(cls, name: str, frames: list[ResidualFrame]) -> Self:
@@ -75,12 +77,18 @@ class Observed:
                     for frame in frames
                 ]
             ),
+            np.array(
+                [
+                    [*(v.residual for v in frame.voltages), *(v.modelled for v in frame.voltages)]
+                    for frame in frames
+                ]
+            ),
         )
 
     @property
     def change(self) -> Array:
         """How far each modelled value moved over three ticks, (n, 10); 0 where it is not known."""
-        return _moved(self.modelled)
+        return moved(self.modelled)
 
     @property
     def hours(self) -> float:
@@ -126,10 +134,11 @@ class Observed:
             self.units,
             self.yaw[rows],
             self.along[rows],
+            self.volts[rows],
         )
 
 
-def _moved(values: Array) -> Array:
+def moved(values: Array) -> Array:
     """How far each column moved over three ticks; 0 where it is not known."""
     low, high = values.copy(), values.copy()
     for back in range(1, _TRANSIENT_TICKS):
@@ -178,19 +187,25 @@ def band_of(observed: Observed, bands: BandSettings) -> Array:
 def yaw_band_of(observed: Observed, bands: BandSettings) -> Array:
     """Half widths of the band of the yaw rate [rad/s], (n,)."""
     row = bands.yaw, bands.yaw_relative, bands.yaw_transient
-    return _inertial_bands(observed.yaw[:, 1:], *row)[:, 0]
+    return _bands_around(observed.yaw[:, 1:], *row)[:, 0]
 
 
 def along_bands_of(observed: Observed, bands: BandSettings) -> Array:
     """Half widths of the bands of the acceleration along x and y [m/s^2], (n, 2)."""
     row = bands.along, bands.along_relative, bands.along_transient
-    return _inertial_bands(observed.along[:, 2:], *row)
+    return _bands_around(observed.along[:, 2:], *row)
 
 
-def _inertial_bands(wheels: Array, least: float, relative: float, transient: float) -> Array:
-    """Of what an IMU measures, around what the wheels show, (n, m) each."""
-    width = np.maximum(least, relative * np.abs(np.nan_to_num(wheels)))
-    return np.asarray(width + transient * _moved(wheels))
+def voltage_bands_of(observed: Observed, bands: BandSettings) -> Array:
+    """Half widths of the bands of the drivers' voltages [V], (n, 3)."""
+    row = bands.voltage, bands.voltage_relative, bands.voltage_transient
+    return _bands_around(observed.volts[:, WHEELS:], *row)
+
+
+def _bands_around(modelled: Array, least: float, relative: float, transient: float) -> Array:
+    """Around what is expected, as what wheels show of what an IMU measures, (n, m) each."""
+    width = np.maximum(least, relative * np.abs(np.nan_to_num(modelled)))
+    return np.asarray(width + transient * moved(modelled))
 
 
 def frames_of(observed: Observed, bands: BandSettings) -> list[ResidualFrame]:
@@ -205,6 +220,7 @@ def frames_of(observed: Observed, bands: BandSettings) -> list[ResidualFrame]:
         observed.missing.tolist(),
         zip(observed.yaw.tolist(), yaw_band_of(observed, bands).tolist(), strict=True),
         zip(observed.along.tolist(), along_bands_of(observed, bands).tolist(), strict=True),
+        zip(observed.volts.tolist(), voltage_bands_of(observed, bands).tolist(), strict=True),
         strict=True,
     )
     return [
@@ -221,13 +237,25 @@ def frames_of(observed: Observed, bands: BandSettings) -> list[ResidualFrame]:
                 _of_imu(x, x_band, x_wheels, "m/s^2"),
                 _of_imu(y, y_band, y_wheels, "m/s^2"),
             ),
+            voltages=_voltages(volts, volt_bands),
         )
         for (
             *(stamp, residuals, widths, models, absent),
             ((yaw, wheels), band),
             ((x, y, x_wheels, y_wheels), (x_band, y_band)),
+            (volts, volt_bands),
         ) in rows
     ]
+
+
+def _voltages(
+    volts: Sequence[float], bands: Sequence[float]
+) -> tuple[Residual, Residual, Residual]:
+    first, second, third = (
+        Residual(residual, rounded(band), model, "V", "" if residual == residual else NO_ENCODERS)
+        for residual, model, band in zip(volts[:WHEELS], volts[WHEELS:], bands, strict=True)
+    )
+    return first, second, third
 
 
 def _of_imu(residual: float, band: float, wheels: float, unit: Unit) -> Residual:

@@ -195,4 +195,5 @@ def observed_of(drive: Drive) -> Observed:
         units,
         np.full((len(residual), 2), np.nan),  # an IMU is not simulated
         np.full((len(residual), 4), np.nan),
+        np.hstack([compared.held - compared.voltage, compared.voltage]),
     )

@@ -5,6 +5,7 @@ from attrs import frozen
 from tomr_demo.score import DIAGNOSTICS as DIAGNOSIS
 from tomr_demo.score import TRUTH
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
+from tomr_power_model.messages.outgoing import TYPES
 from tomr_power_model.messages.types import (
     BATTERY,
     DIAGNOSTICS,
@@ -14,7 +15,7 @@ from tomr_power_model.messages.types import (
     TWIST_STAMPED,
 )
 from tomr_power_model.robot import Robot
-from tomr_power_model.topics.predictions import EXPECTED, prediction_topics
+from tomr_power_model.topics.predictions import prediction_topics
 
 # The processes, in the order in which data passes through them, and the modules they run.
 PROCESSES = {
@@ -52,8 +53,8 @@ def all_topics(robot: Robot) -> dict[str, Topic]:
         "ground_truth/odom": Topic(ODOMETRY, "sim_bridge"),
         TRUTH: Topic(DIAGNOSTICS, "sim_bridge", decoded=True),
         **{
-            topic: Topic(JOINT_STATE if topic == EXPECTED else BATTERY, "power_model")
-            for topic in prediction_topics(robot)
+            topic: Topic(TYPES[kind], "power_model")
+            for topic, kind in prediction_topics(robot).items()
         },
         RESIDUALS: Topic(DIAGNOSTICS, "power_residuals", decoded=True),
         DIAGNOSIS: Topic(DIAGNOSTICS, "fault_classifier", decoded=True),

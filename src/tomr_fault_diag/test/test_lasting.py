@@ -39,6 +39,8 @@ TICK = 50_000_000
 BAND = 0.7  # W
 WIDE = 6.0  # W: a band that hides a fifth of a motor's power
 SECOND = 20  # ticks
+FAR = float(0.25 * 24.0 / (ROBOT.controller.proportional + WHEELS.constant[0]))  # rad/s
+VOLTS = 0.3  # V, band
 
 
 def speeds(tick: int) -> Array:
@@ -76,6 +78,24 @@ def of_friction(tick: int, wheel: int, share: float) -> Array:
     return np.asarray(np.where(np.arange(3) == wheel, off, 0.0))
 
 
+def with_volts(item: ResidualFrame, off: Array, band: float = VOLTS) -> ResidualFrame:
+    """The same with what the drivers hold beyond what is expected of them [V]."""
+    random = np.random.default_rng([8, item.stamp_ns // TICK])
+    shown = off + 0.15 * band * random.standard_normal(3)
+    first, second, third = (Residual(volts, band, 5.0, "V") for volts in shown.tolist())
+    return evolve(item, voltages=(first, second, third))
+
+
+def weak(tick: int, wheel: int, *, rise: float = 0.0, loss: float = 0.0) -> ResidualFrame:
+    """Of a motor whose winding has so much more resistance, or whose magnet gives less."""
+    current, speed = 2.0 * np.sign(speeds(tick)), speeds(tick)
+    drop = WHEELS.resistance * current
+    volts = rise * drop + loss * (drop - WHEELS.constant * speed)
+    power = (rise + 2.0 * loss) * drop * current
+    here = np.arange(3) == wheel
+    return with_volts(frame(tick, np.where(here, power, 0.0), band=WIDE), np.where(here, volts, 0))
+
+
 def gathered(frames: list[ResidualFrame], robot: Robot = ROBOT, is_well: bool = True) -> Array:
     """Evidence of all ticks together, (19,)."""
     watch, found = LastingWatch(robot), np.zeros(HYPOTHESES)
@@ -85,6 +105,85 @@ def gathered(frames: list[ResidualFrame], robot: Robot = ROBOT, is_well: bool = 
 
 
 NOTHING = np.zeros(3)
+FEW = range(4 * SECOND)
+
+
+@pytest.mark.parametrize("fault", [{"rise": 0.3}, {"loss": 0.12}])
+def test_voltages_tell_a_weak_motor_from_a_bearing(fault: dict[str, float]) -> None:
+    found = gathered([weak(tick, 2, **fault) for tick in FEW])
+    assert np.argmax(found) == WEAKS.start + 2
+    assert found[WEAKS.start + 2] > 24.0
+    assert found[DRAGS].max() == found[METERS].max() == 0.0
+
+
+def test_a_bearing_shows_in_both_alike() -> None:
+    """Its torque takes tau / k more amperes, and the volts that drive them."""
+    off = 0.5 * WHEELS.friction(5.0) / WHEELS.constant * WHEELS.resistance * [0.0, 1.0, 0.0]
+    ticks = [with_volts(frame(t, of_friction(t, 1, 0.5)), np.sign(speeds(t)) * off) for t in FEW]
+    found = gathered(ticks)
+    assert np.argmax(found) == DRAGS.start + 1
+    assert found[WEAKS].max() == found[METERS].max() == 0.0
+
+
+def test_a_power_sensor_shows_in_no_voltage() -> None:
+    """Whatever the total power says, of which there may be none."""
+    unknown = Residual(math.nan, math.nan, math.nan, "W", "not measured")
+    ticks = [
+        with_volts(frame(t, 0.3 * explained(t) * [1.0, 0.0, 0.0], band=WIDE), NOTHING) for t in FEW
+    ]
+    found = gathered([evolve(t, residuals=(unknown, *t.residuals[1:])) for t in ticks])
+    assert np.argmax(found) == METERS.start
+    assert found[DRAGS].max() == found[WEAKS].max() == 0.0
+
+
+def test_a_force_is_no_weak_motor() -> None:
+    """What it takes of each motor shows as torque does, in power and voltage."""
+
+    def pushed(tick: int) -> ResidualFrame:
+        torque = WHEELS.mass * WHEELS.from_force @ [0.05, 0.08, 0.0]
+        per_torque = (
+            speeds(tick) + 4.0 * np.sign(speeds(tick)) * WHEELS.resistance / WHEELS.constant
+        )
+        volts = WHEELS.resistance / WHEELS.constant * torque
+        return with_volts(frame(tick, per_torque * torque, band=WIDE), volts)
+
+    found = gathered([pushed(tick) for tick in FEW])
+    assert found[WEAKS].max() < 6.0
+
+
+def test_where_the_voltage_is_not_known_the_power_speaks_alone() -> None:
+    ticks = drag(0.5)
+    assert (gathered([with_volts(t, np.full(3, math.nan)) for t in ticks]) == gathered(ticks)).all()
+
+
+def test_less_than_a_tenth_of_a_winding_is_no_fault() -> None:
+    assert gathered([weak(tick, 2, rise=0.08) for tick in FEW])[WEAKS].max() < 6.0
+    assert gathered([weak(tick, 2, rise=0.16) for tick in FEW])[WEAKS].max() > 24.0
+
+
+def test_a_driver_that_may_not_have_obeyed_its_law_says_nothing_for_a_while() -> None:
+    ticks = [weak(tick, 2, rise=0.3) for tick in range(15 * SECOND)]
+    stray = tuple(
+        evolve(item, residual=1.01 * FAR) if index == SPEEDS[2] else item
+        for index, item in enumerate(ticks[10].residuals)
+    )
+    ticks[10] = evolve(ticks[10], residuals=stray)
+    watch = LastingWatch(ROBOT)
+    said = np.array([watch.take(item, False)[WEAKS.start + 2] for item in ticks])
+    alone = LastingWatch(ROBOT)
+    volts = (Residual(math.nan, math.nan, 5.0, "V"),) * 3
+    blind = np.array([alone.take(evolve(t, voltages=volts), False) for t in ticks])
+    assert said[21:201].max() == pytest.approx(blind[21:201, WEAKS.start + 2].max(), abs=1.0)
+    assert said[-3 * SECOND :].max() == pytest.approx(12.0)
+
+
+def test_what_is_far_beyond_a_band_counts_less_in_both_alike() -> None:
+    """Else a bearing whose power is cut off looks like a winding."""
+    ticks = [weak(tick, 2, rise=3.0) for tick in FEW]
+    assert max(item.voltages[2].residual for item in ticks) > 12.0 * VOLTS
+    found = gathered(ticks)
+    assert np.argmax(found) == WEAKS.start + 2
+    assert found[DRAGS].max() == 0.0
 
 
 def drag(share: float, seconds: int = 4, band: float = BAND) -> list[ResidualFrame]:
@@ -222,10 +321,11 @@ def test_wheels_that_turn_otherwise_than_they_should_say_nothing_for_a_while() -
     astray = evolve(
         ticks[60],
         residuals=tuple(
-            evolve(item, residual=0.6) if index == SPEEDS[0] else item
+            evolve(item, residual=1.01 * FAR / 2.0) if index == SPEEDS[0] else item
             for index, item in enumerate(ticks[60].residuals)
         ),
     )
+    assert astray.residuals[SPEEDS[0]].code
     watch = LastingWatch(ROBOT)
     said = [watch.take(item, True) for item in [*ticks[:60], astray, *ticks[61:]]]
     assert said[59].any()

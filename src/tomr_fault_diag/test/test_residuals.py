@@ -24,7 +24,7 @@ from tomr_power_model.robot import Robot, shipped_robot
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
-FRAME = 13  # statuses of a frame
+FRAME = 16  # statuses of a frame
 NAN = math.nan
 SPEED = (4.0, -4.0, 0.0)
 

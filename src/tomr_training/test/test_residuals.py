@@ -62,3 +62,8 @@ def test_the_same_residuals_as_the_stages(chosen: Callable[..., Drive], seed: in
     found[still], wanted[still] = np.abs(found[still]), np.abs(wanted[still])
     np.testing.assert_allclose(found, wanted, atol=2e-4)
     np.testing.assert_allclose(band[ticks], streamed[..., 1], atol=2e-4)
+    volts = np.array([[(v.residual, v.modelled) for v in frame.voltages] for frame in frames])
+    beyond = compared.held - compared.voltage
+    assert np.abs(beyond[ticks]).max() > 3.0  # of a driver whose encoder reads standstill
+    np.testing.assert_allclose(beyond[ticks], volts[..., 0], atol=2e-4)
+    np.testing.assert_allclose(compared.voltage[ticks], volts[..., 1], atol=2e-4)

@@ -10,19 +10,20 @@ from tomr_power_model.model.ticks import NANOSECONDS
 Array = NDArray[np.float64]
 
 
-def by_sudden_force(shown: Array, shared: Array, forces: Sequence[float], scatter: float) -> float:
-    """Log-likelihood of a force of this tick alone over none, as strong as explains most; at
+def by_sudden_force(shown: Array, shared: Array, forces: Sequence[float], scatter: float) -> Array:
+    """Log-likelihoods (...) of a force of this tick alone over none, as strong as explains most; at
     least 0.
 
-    `shown`: residuals of the wheels [bands], (3,); `shared`: what forces along and across of
-    1 N/kg and their moment do to them, (3, 3); `forces`: deviations [N/kg].
+    `shown`: residuals of the wheels [bands], (..., n); `shared`: what forces along and across of
+    1 N/kg and their moment do to them, (n, 3); `forces`: deviations [N/kg].
     """
     variances, ways = np.linalg.eigh(shared @ shared.T)
-    seen = (ways.T @ shown) ** 2 / scatter**2
-    most = 0.0
+    seen = (shown @ ways) ** 2 / scatter**2
+    most = np.zeros(shown.shape[:-1])
     for force in forces:
         ratio = 1.0 + force**2 * np.maximum(variances, 0.0) / scatter**2
-        most = max(most, 0.5 * float(np.sum(seen * (1.0 - 1.0 / ratio) - np.log(ratio))))
+        found = 0.5 * (seen @ (1.0 - 1.0 / ratio) - np.log(ratio).sum())
+        most = np.maximum(most, found)
     return most
 
 

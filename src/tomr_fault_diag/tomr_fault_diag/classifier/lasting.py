@@ -5,11 +5,17 @@ drags a little, windings that lose more, or a power sensor whose scale is off mo
 wheel by no more than that, too little for a window of 0.4 s, but for as long as the wheel turns. Of
 each such fault the size theta is fitted to the last seconds,
 
-    r = theta phi + noise,  phi: (omega + 2 R i / k) tau,  R i^2,  P
+    r = theta phi + noise
 
-of the axle's friction tau, a winding's loss and the power shown (tau / k and i where currents are
-measured), and how much better than nothing it predicts the next tick is evidence, which the belief
-gathers. No more counts than is left
+of the residuals of its power P and of its driver's voltage, where
+
+    a bearing drags         phi: (omega + 2 R i / k) tau,  R tau / k,       tau: the axle's friction
+    a winding loses more         R i^2,                    R i
+    a magnet is weak             2 R i^2,                  R i - k omega
+    a power sensor is off        P,                        0
+
+(tau / k, 0, i and i in place of the powers where currents are measured), and how much better than
+nothing it predicts the next tick is evidence, which the belief gathers. No more counts than is left
 
 - by a force on the body, which is shared out among the wheels, sudden, or of a slope,
 - by the total power, which tells a motor that draws more from a sensor that shows more,
@@ -52,12 +58,13 @@ class SmallFault:
 
 FAULTS = (
     SmallFault(DRAGS, 1.0, 0.2),  # of the axle's friction
-    SmallFault(WEAKS, 1.0, 0.2),  # of the winding's losses
+    SmallFault(WEAKS, 1.0, 0.1),  # of the winding's resistance
+    SmallFault(WEAKS, 0.3, 0.05),  # of the torque constant
     SmallFault(METERS, 0.3, 0.08, is_signed=True, in_total=False),  # of the power shown
 )
 _COUNT = len(FAULTS)
-_TYPICAL = np.array([fault.typical for fault in FAULTS])[:, None]
-_NEGLIGIBLE = np.array([fault.negligible for fault in FAULTS])[:, None]
+_TYPICAL = np.array([fault.typical for fault in FAULTS])[:, None, None]
+_NEGLIGIBLE = np.array([fault.negligible for fault in FAULTS])[:, None, None]
 _SIGNED = np.array([fault.is_signed for fault in FAULTS])[:, None]
 _IN_TOTAL = np.array([1.0 if fault.in_total else -1.0 for fault in FAULTS])[:, None]
 _OTHERS = np.array([[1, 2], [0, 2], [0, 1]])  # wheels beside each
@@ -77,7 +84,7 @@ class LastingSettings:
     scatter: float = 0.2  # bands: 3.3 standard deviations of noise, and half as much again
     total_scatter: float = 0.25  # bands of the total power
     little: float = 0.08  # bands by which a healthy robot's residuals may lie off nothing
-    clip: float = 2.0  # bands: what is larger is the network's
+    clip: float = 6.0  # bands: what is larger counts no more
     forces: tuple[float, ...] = (0.1, 0.3, 1.0)  # N/kg, deviations of a force on the body
     steady: float = 1.0  # N/kg, deviation of one that stays
     alike: float = 0.5  # by which a fault and such a force explain the same
@@ -86,7 +93,12 @@ class LastingSettings:
     most: float = 2.0  # that it says
     least: float = -0.2  # a fault may be none of these, and large
     against: float = -3.0  # that its total power says
-    pause: int = to_ns(0.5)  # after a wheel did not turn as it should
+    # After a wheel has turned so far off, by what a share of the supply's voltage amounts to, its
+    # driver may not have obeyed its law: as long the voltage says nothing.
+    far: float = 0.25
+    doubt: int = to_ns(10.0)
+    strange: float = 0.5  # of that, after which nothing is said for ...
+    pause: int = to_ns(0.5)  # ... so long
 
 
 class LastingWatch:
@@ -96,6 +108,8 @@ class LastingWatch:
         self.settings = settings or LastingSettings()
         self._motors = motors = Motors(robot)
         self._friction = motors.friction(_SPEED)
+        per_speed = robot.controller.proportional + motors.constant
+        self._far = self.settings.far * robot.supply.nominal_voltage / per_speed  # rad/s
         lever = self.settings.lever * robot.robot_radius
         self._shares = motors.mass * motors.from_force * np.array([1.0, 1.0, lever])
         s = self.settings
@@ -106,9 +120,10 @@ class LastingWatch:
         """Forget all."""
         self._newest = 0  # ns
         self._resumes = 0  # ns
+        self._doubted = np.zeros(WHEELS, dtype=np.int64)  # ns, until when voltages are
         self._said = np.zeros(HYPOTHESES)
         self._steady.clear()
-        # Sums of phi^2 and phi r, (3, 3): faults and wheels; and of all faults at each wheel.
+        # Sums of phi^2 and phi r, (4, 3): faults and wheels; and of all faults at each wheel.
         self._squares = np.zeros((_COUNT, WHEELS))
         self._products = np.zeros((_COUNT, WHEELS))
         self._normal = np.zeros((WHEELS, _COUNT, _COUNT))
@@ -124,13 +139,15 @@ class LastingWatch:
             return self._said
         elapsed, self._newest = frame.stamp_ns - self._newest, frame.stamp_ns
         self._said = np.zeros(HYPOTHESES)
-        if any(abs(item.residual) > item.band for item in _of(frame, SPEEDS)):
+        off = np.abs([item.residual for item in _of(frame, SPEEDS)])
+        self._doubted[off > self._far] = frame.stamp_ns + self.settings.doubt
+        if (off > self.settings.strange * self._far).any():
             self._resumes = frame.stamp_ns + self.settings.pause
         if frame.stamp_ns < self._resumes:
             return self._said
         with np.errstate(over="ignore", invalid="ignore"):
             effects, shared = self._effects(frame)
-        shown = _shown(frame, self.settings.clip)
+        shown = self._shown(frame)
         # False where something is not known.
         if not all((np.abs(part) < _BEYOND).all() for part in (shown, effects, shared)):
             return self._said
@@ -138,75 +155,110 @@ class LastingWatch:
         if is_well:
             self._learn_slowly(shown, effects, elapsed)
         turning = float(self._motors.to_twist[2] @ [measured_speed(i) for i in _of(frame, SPEEDS)])
-        steady = self._steady.take(sudden, shared, elapsed, turning)
+        steady = self._steady.take(sudden.T.ravel(), shared, elapsed, turning)
         found = self._predicted(sudden, effects, shared, steady, frame)
         self._learn(sudden, effects, elapsed)
-        for fault, row in zip(FAULTS, found, strict=True):
-            self._said[fault.hypotheses] = self.settings.worth * row
+        said = np.full(HYPOTHESES, -np.inf)
+        for fault, row in zip(FAULTS, self.settings.worth * found, strict=True):
+            said[fault.hypotheses] = np.maximum(said[fault.hypotheses], row)
+        self._said = np.where(np.isinf(said), 0.0, said)
         return self._said
 
     def _effects(self, frame: ResidualFrame) -> tuple[Array, Array]:
-        """What each fault of its typical size adds to each wheel's residual [bands], (3, 3), and
-        what forces along and across of 1 N/kg and their moment do, (3, 3); 0 where it stands."""
+        """What each fault of its typical size adds to each wheel's residuals of power and voltage
+        [bands], (4, 3, 2), and what forces along and across of 1 N/kg and their moment do to all
+        powers, then voltages, (6, 3); 0 where it stands."""
         motors, derived = self._motors, _of(frame, ENCODERS)
         speed = np.array([measured_speed(item) for item in _of(frame, SPEEDS)])
         power = np.array([item.modelled for item in derived])
         way = np.where(speed < 0.0, -1.0, 1.0)
         current = motors.currents(power, speed, way)
-        per_torque, loss = motors.per_torque(speed, current), motors.resistance * current**2
+        per_torque, drop = motors.per_torque(speed, current), motors.resistance * current
+        loss, weak = drop * current, 2.0 * drop * current
         if motors.reports_currents:
-            loss = np.zeros(WHEELS)
+            loss, weak = np.zeros(WHEELS), power
             if not motors.reports_signs:
                 per_torque = way * per_torque
-        moves = (np.abs(speed) > MOVES) / np.array([item.band for item in derived])
-        effects = np.array([way * per_torque * self._friction, loss, power])
-        return _TYPICAL * effects * moves, (per_torque * moves)[:, None] * self._shares
+        volts = motors.resistance / motors.constant  # V/(N m)
+        bands = np.array([[item.band for item in part] for part in (derived, frame.voltages)])
+        is_known = [not item.stale for item in frame.voltages] & (frame.stamp_ns > self._doubted)
+        known = np.array([[True] * WHEELS, is_known])
+        moves = np.where(known, (np.abs(speed) > MOVES) / bands, 0.0)  # (2, 3)
+        drags, friction = np.array([per_torque, volts]) * moves, way * self._friction
+        effects = np.array(
+            [
+                friction * drags,
+                np.array([loss, drop]) * moves,
+                np.array([weak * is_known, drop - motors.constant * speed]) * moves,
+                np.array([power, np.zeros(WHEELS)]) * moves,
+            ]
+        )
+        shared = drags[:, :, None] * self._shares
+        return _TYPICAL * effects.transpose(0, 2, 1), shared.reshape(-1, 3)
+
+    def _shown(self, frame: ResidualFrame) -> Array:
+        """Residuals of power and voltage of each motor [bands], (3, 2): of its two powers the
+        smaller, for either is late at times; 0 for a voltage that is not known."""
+        by_encoder, by_command, volts = (
+            np.array([item.residual / item.band for item in items])
+            for items in (_of(frame, ENCODERS), _of(frame, MOTORS), frame.voltages)
+        )
+        is_smaller = np.abs(by_command) < np.abs(by_encoder)  # not where it is NaN
+        power = np.where(is_smaller, by_command, by_encoder)
+        shown = np.stack([power, np.nan_to_num(volts)], axis=1)
+        over = np.maximum(np.abs(shown).max(axis=1, keepdims=True) / self.settings.clip, 1.0)
+        return np.asarray(shown / over)  # both less alike: which fault it is depends on both
 
     def _predicted(
         self, sudden: Array, effects: Array, shared: Array, steady: float, frame: ResidualFrame
     ) -> Array:
         """How much better each fault predicts a tick than nothing does, or a force on the body,
-        and what the total power leaves of it, (3, 3)."""
+        and what the total power leaves of it, (4, 3)."""
         s = self.settings
         size = self._products / (self._squares + s.scatter**2)
         size = _beyond_others(np.where(_SIGNED, size, np.maximum(size, 0.0)))
-        mean = size * effects
+        mean = size[:, :, None] * effects
         little = np.maximum(_NEGLIGIBLE / _TYPICAL * np.abs(effects), s.little)
-        found = _better(sudden, np.clip(mean, -little, little), mean, s.scatter)
-        found -= by_sudden_force(sudden, shared, s.forces, s.scatter)
+        little = np.clip(mean, -little, little)
+        found = _better(sudden, little, mean, s.scatter)
+        found -= by_sudden_force(_left(sudden, little), shared, s.forces, s.scatter)
         beyond = _better(sudden, np.zeros(1), mean, s.scatter) - steady
         beyond = np.sign(beyond) * np.maximum(np.abs(beyond) - s.alike, 0.0)
-        found = np.minimum(np.minimum(found, beyond), s.most)
-        return np.maximum(found + self._against(mean, frame), s.least)
+        found = np.minimum(found, beyond)
+        # By as much as the best explains a wheel better than another fault does, it is likelier.
+        over = np.maximum(found.max(axis=0) - s.most, 0.0)
+        return np.asarray(np.maximum(found - over + self._against(mean[:, :, 0], frame), s.least))
 
     def _against(self, mean: Array, frame: ResidualFrame) -> Array:
-        """What the total power says against a motor that draws so much more [bands], (2, 3), and
-        against a sensor that only shows it, (3,)."""
+        """What the total power says against motors that draw so much more [bands], (3, 3), and
+        against sensors that only show it, (3,)."""
         total = frame.residuals[TOTAL]
         if total.stale:
             return np.zeros_like(mean)
         s, bands = self.settings, np.array([item.band for item in _of(frame, ENCODERS)])
         drawn = np.clip(np.full(WHEELS, total.residual / total.band), -s.clip, s.clip)
-        shows = _better(drawn, np.zeros(1), mean * bands / total.band, s.total_scatter)
+        added = (mean * bands / total.band)[:, :, None]
+        shows = _better(drawn[:, None], np.zeros(1), added, s.total_scatter)
         return np.asarray(np.clip(_IN_TOTAL * shows, s.against, 0.0))
 
     def _learn(self, shown: Array, effects: Array, elapsed: int) -> None:
         kept = np.exp(-elapsed / self.settings.memory)
-        self._squares = kept * self._squares + effects**2
-        self._products = kept * self._products + effects * shown
+        self._squares = kept * self._squares + (effects**2).sum(axis=2)
+        self._products = kept * self._products + (effects * shown).sum(axis=2)
 
     def _came_slowly(self, effects: Array) -> Array:
-        """What that adds to each wheel's residual [bands], (3,)."""
+        """What that adds to each wheel's residuals [bands], (3, 2)."""
         s = self.settings
-        added = (effects.T * self._slow).sum(axis=1)
+        added = (effects * self._slow.T[:, :, None]).sum(axis=0)
         return np.asarray(np.clip(added, -s.most_slow, s.most_slow))
 
     def _learn_slowly(self, shown: Array, effects: Array, elapsed: int) -> None:
         if not effects.any():
             return
         kept = np.exp(-elapsed / self.settings.long)
-        self._normal = kept * self._normal + effects.T[:, :, None] * effects.T[:, None, :]
-        self._right = kept * self._right + effects.T * shown[:, None]
+        at_wheels = effects.transpose(1, 0, 2)  # (3, 4, 2)
+        self._normal = kept * self._normal + at_wheels @ at_wheels.transpose(0, 2, 1)
+        self._right = kept * self._right + (at_wheels @ shown[:, :, None])[:, :, 0]
         prior = self.settings.scatter**2 * np.eye(_COUNT)
         sizes = np.linalg.solve(self._normal + prior, self._right[:, :, None])[:, :, 0]
         self._slow += min(elapsed, NANOSECONDS) / self.settings.slowly * (sizes - self._slow)
@@ -214,17 +266,6 @@ class LastingWatch:
 
 def _of(frame: ResidualFrame, channels: range) -> list[Residual]:
     return [frame.residuals[index] for index in channels]
-
-
-def _shown(frame: ResidualFrame, most: float) -> Array:
-    """Residual of each motor [bands]: of its two the smaller, for either is late at times."""
-    by_encoder, by_command = (
-        np.array([item.residual / item.band for item in _of(frame, channels)])
-        for channels in (ENCODERS, MOTORS)
-    )
-    is_smaller = np.abs(by_command) < np.abs(by_encoder)  # not where it is NaN
-    shown = np.where(is_smaller, by_command, by_encoder)
-    return np.asarray(np.clip(shown, -most, most))
 
 
 def _beyond_others(size: Array) -> Array:
@@ -235,6 +276,15 @@ def _beyond_others(size: Array) -> Array:
     return np.asarray(np.where(size > 0.0, up, down))
 
 
+def _left(shown: Array, little: Array) -> Array:
+    """What is shown (wheels, channels) beyond a little of each fault (faults, wheels, channels) of
+    each wheel: of all powers, then voltages, (faults, wheels, 6)."""
+    own = np.eye(WHEELS)[:, :, None] * little[:, :, None, :]  # (faults, wheels, wheels, channels)
+    return np.swapaxes(shown - own, -1, -2).reshape(*little.shape[:2], -1)
+
+
 def _better(shown: Array, nothing: Array, mean: Array, scatter: float) -> Array:
-    """Log-likelihood of one mean over that of another."""
-    return np.asarray(((shown - nothing) ** 2 - (shown - mean) ** 2) / (2.0 * scatter**2))
+    """Log-likelihood of one mean over that of another, (faults, wheels), of what all channels show,
+    (faults, wheels, channels)."""
+    better = ((shown - nothing) ** 2 - (shown - mean) ** 2) / (2.0 * scatter**2)
+    return np.asarray(better.sum(axis=2))

@@ -13,12 +13,12 @@ from tomr_fault_diag.diagnosis.pipeline import Pipeline, Step
 from tomr_fault_diag.diagnosis.settings import PARAMETERS, STAGE_NODES, DiagnosisSettings
 from tomr_fault_diag.nodes.fault_classifier_node import offer_clearing
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
-from tomr_power_model.messages.outgoing import DiagnosticMessage, JointMessage, SupplyMessage
+from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.nodes.command_line import node_arguments, parameter_files
 from tomr_power_model.nodes.stage_node import StageNode, run_node
 from tomr_power_model.robot import read_node_sections
 from tomr_power_model.topics.inputs import Input
-from tomr_power_model.topics.predictions import EXPECTED, prediction_topics
+from tomr_power_model.topics.predictions import prediction_topics
 
 NAME = "tomr_diagnosis"
 UNMANAGED = LifecycleState("unmanaged", State.PRIMARY_STATE_UNKNOWN)
@@ -50,8 +50,8 @@ class DiagnosisNode(LifecycleNodeMixin, StageNode):
         self.offer(DIAGNOSTICS, DiagnosticMessage)
         if self.values["intermediate_topics"]:
             self.offer(RESIDUALS, DiagnosticMessage)
-            for topic in prediction_topics(self._robot):
-                self.offer(topic, JointMessage if topic == EXPECTED else SupplyMessage)
+            for topic, kind in prediction_topics(self._robot).items():
+                self.offer(topic, kind)
         self._clearing = offer_clearing(self, lambda: self.pipeline.release())
         return TransitionCallbackReturn.SUCCESS
 

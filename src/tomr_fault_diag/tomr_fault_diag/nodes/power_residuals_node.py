@@ -11,18 +11,13 @@ from tomr_fault_diag.residuals.settings import (
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.messages.intake import stamp_of
-from tomr_power_model.messages.outgoing import DiagnosticMessage
-from tomr_power_model.messages.types import BATTERY, JOINT_STATE
+from tomr_power_model.messages.outgoing import TYPES, DiagnosticMessage
 from tomr_power_model.model.input_health import TOPIC as DIAGNOSTICS
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.nodes.command_line import node_arguments
 from tomr_power_model.nodes.stage_node import STAGE_QOS, StageNode, run_node
 from tomr_power_model.topics.inputs import Input, guarded
-from tomr_power_model.topics.predictions import (
-    EXPECTED,
-    PredictionAssembler,
-    prediction_topics,
-)
+from tomr_power_model.topics.predictions import PredictionAssembler, prediction_topics
 
 
 class PowerResidualsNode(StageNode):
@@ -34,18 +29,19 @@ class PowerResidualsNode(StageNode):
         self._assembler = PredictionAssembler(self._robot)
         self.offer(TOPIC, DiagnosticMessage)
         self.offer(DIAGNOSTICS, DiagnosticMessage)
-        predictions = [self._prediction(topic) for topic in prediction_topics(self._robot)]
+        topics = prediction_topics(self._robot).items()
+        predictions = [self._prediction(topic, TYPES[kind]) for topic, kind in topics]
         self.listen(predictions, self._advance, STAGE_QOS)
         self.listen(residual_inputs(self._robot, self.stage), self._advance)
         self.on_change(lambda values: self.stage.retune(BandSettings.of(values)))
 
-    def _prediction(self, topic: str) -> Input:
+    def _prediction(self, topic: str, type_name: str) -> Input:
         def take(message: Any, receive_ns: int) -> Arrival | None:
             stamp = stamp_of(message, receive_ns)
             prediction = self._assembler.add(topic, stamp, message)
             return None if prediction is None else self.stage.prediction(prediction)
 
-        return Input(topic, JOINT_STATE if topic == EXPECTED else BATTERY, guarded(take))
+        return Input(topic, type_name, guarded(take))
 
     def _advance(self) -> None:
         for frame in self.stage.due():

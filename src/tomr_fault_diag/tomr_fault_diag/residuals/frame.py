@@ -1,4 +1,5 @@
-"""The ten residuals of one tick, in the order of Wang 2024, Table 1, and what a gyro says."""
+"""The ten residuals of one tick, in the order of Wang 2024, Table 1, and what an IMU and the
+drivers' voltages say."""
 
 import math
 from collections.abc import Mapping
@@ -35,8 +36,8 @@ NO_ENCODERS = "no fresh joint_states"
 NO_WEIGHT = "imu/data does not feel gravity along z"
 FROZEN = " repeats itself while the motor works"  # and before it which stream
 
-Unit = Literal["W", "A", "rad/s", "m/s^2"]
-UNITS: dict[str, Unit] = {"W": "W", "A": "A", "rad/s": "rad/s", "m/s^2": "m/s^2"}
+Unit = Literal["W", "A", "V", "rad/s", "m/s^2"]
+UNITS: dict[str, Unit] = {"W": "W", "A": "A", "V": "V", "rad/s": "rad/s", "m/s^2": "m/s^2"}
 
 
 def rounded(value: float) -> float:
@@ -67,6 +68,7 @@ class Residual:
 
 UNKNOWN_YAW = Residual(math.nan, math.nan, math.nan, "rad/s", NO_IMU)
 UNKNOWN_FORCE = Residual(math.nan, math.nan, math.nan, "m/s^2", NO_IMU)
+UNKNOWN_VOLTAGE = Residual(math.nan, math.nan, math.nan, "V", NO_COMMAND)
 
 
 @frozen
@@ -80,6 +82,8 @@ class ResidualFrame:
     supply: float = float("nan")  # voltage of the supply over the nominal one, where it is measured
     yaw: Residual = UNKNOWN_YAW  # gyro - wheels
     along: tuple[Residual, Residual] = (UNKNOWN_FORCE, UNKNOWN_FORCE)  # accelerometer - wheels
+    # Of the drivers of motors 1-3: what they hold - simulated.
+    voltages: tuple[Residual, Residual, Residual] = (UNKNOWN_VOLTAGE,) * 3
 
     @property
     def codes(self) -> tuple[int, ...]:
@@ -91,6 +95,11 @@ def measured_speed(residual: Residual) -> float:
     """What the encoder showed [rad/s]: residuals of speed count in the expected direction."""
     sign = -1.0 if residual.modelled < 0.0 else 1.0
     return residual.modelled + sign * residual.residual
+
+
+def voltage_names(wheel_topics: tuple[str, str, str]) -> tuple[str, ...]:
+    """Stable status names of the drivers' voltages."""
+    return tuple(f"residuals: {wheel} voltage of its driver" for wheel in wheel_topics)
 
 
 def residual_names(wheel_topics: tuple[str, str, str]) -> tuple[str, ...]:

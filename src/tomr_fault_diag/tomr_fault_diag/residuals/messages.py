@@ -15,11 +15,12 @@ from tomr_fault_diag.residuals.frame import (
     Residual,
     ResidualFrame,
     residual_names,
+    voltage_names,
 )
 from tomr_power_model.messages.intake import Unusable
 from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.plain import Level, Status
-from tomr_power_model.robot import Robot
+from tomr_power_model.robot import WHEELS, Robot
 
 TOPIC = "residuals"
 
@@ -33,15 +34,19 @@ def residual_message(
         _status(name, residual, hardware_id, [("supply", f"{frame.supply:.6g}")] * (not place))
         for place, (name, residual) in enumerate(zip(names, frame.residuals, strict=True))
     )
-    inertial = tuple(
-        _inertial(_status(name, residual, hardware_id, ()), residual)
-        for name, residual in zip((YAW, *ALONG), (frame.yaw, *frame.along), strict=True)
+    beside = tuple(
+        _beside(_status(name, residual, hardware_id, ()), residual)
+        for name, residual in zip(
+            (YAW, *ALONG, *voltage_names(robot.wheel_topics)),
+            (frame.yaw, *frame.along, *frame.voltages),
+            strict=True,
+        )
     )
-    return DiagnosticMessage(TOPIC, frame.stamp_ns, (*statuses, *inertial))
+    return DiagnosticMessage(TOPIC, frame.stamp_ns, (*statuses, *beside))
 
 
-def _inertial(status: Status, residual: Residual) -> Status:
-    """Of an IMU: a robot need not have one."""
+def _beside(status: Status, residual: Residual) -> Status:
+    """Of an IMU, which a robot need not have, or of what drivers hold, which need not be known."""
     return evolve(status, level=Level.OK) if residual.stale else status
 
 
@@ -86,11 +91,12 @@ def sentence(residual: Residual) -> str:
 def frame_of(message: Any, stamp_ns: int) -> ResidualFrame:
     """The frame that a message carries; raises Unusable if it carries none."""
     statuses = message.status
-    count = RESIDUALS + 1 + len(ALONG)
+    count = RESIDUALS + 1 + len(ALONG) + WHEELS
     if len(statuses) != count:
         raise Unusable(f"{len(statuses)} statuses, a frame has {count}")
-    *residuals, yaw, x, y = (_residual(status) for status in statuses)
-    return ResidualFrame(stamp_ns, tuple(residuals), _supply(statuses[TOTAL]), yaw, (x, y))
+    *residuals, yaw, x, y, first, second, third = (_residual(status) for status in statuses)
+    supply, voltages = _supply(statuses[TOTAL]), (first, second, third)
+    return ResidualFrame(stamp_ns, tuple(residuals), supply, yaw, (x, y), voltages)
 
 
 def _supply(status: Any) -> float:

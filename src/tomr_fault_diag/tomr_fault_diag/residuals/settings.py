@@ -50,6 +50,9 @@ RESIDUAL_PARAMETERS: tuple[ParameterSpec, ...] = (
     ),
     _live("band.along_relative", "of the acceleration that the wheels show", 0.15),
     _live("band.along_transient", "part of that acceleration's change over the last ticks", 0.3),
+    _live("band.voltage", "least band of a driver's voltage", 0.3, "V", LEAST_BAND),
+    _live("band.voltage_relative", "of the simulated voltage", 0.1),
+    _live("band.voltage_transient", "part of that voltage's change over the last ticks", 0.1),
 )
 
 
@@ -58,8 +61,8 @@ class BandSettings:
     """How far a residual may stray before it counts as one.
 
     The defaults hold 99.9 % of the residuals of healthy simulated robots that are up to 5 % off
-    their description (`residuals.calibrated`), those of speed with a margin of three: the loop of
-    a real driver is not known as well.
+    their description (`residuals.calibrated`), those of speed and voltage with a margin: the loop
+    of a real driver is not known as well.
     """
 
     relative: float = 0.6
@@ -77,6 +80,9 @@ class BandSettings:
     along: float = 0.3  # m/s^2
     along_relative: float = 0.15
     along_transient: float = 0.3
+    voltage: float = 0.3  # V
+    voltage_relative: float = 0.1
+    voltage_transient: float = 0.1
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:

@@ -28,6 +28,7 @@ from tomr_fault_diag.residuals.measured import Measured, SupplyWindow
 from tomr_fault_diag.residuals.repeats import RepeatWatch, Work
 from tomr_fault_diag.residuals.scatter import ScatterWatch
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
+from tomr_fault_diag.residuals.voltages import VoltageWatch
 from tomr_power_model.drive.plausible import PowerLimits, fastest_wheel
 from tomr_power_model.drive.sources import (
     ARRAY_TOPIC,
@@ -101,13 +102,13 @@ class ResidualStage:
         self.settings = settings or ResidualSettings()
         self._robot = robot
         self._topics = robot.wheel_topics
-        ticks = self.settings.ticks
-        self._clock = TickClock(ticks, expected=(PREDICTIONS,))
+        self._clock = TickClock(self.settings.ticks, expected=(PREDICTIONS,))
+        period = self.settings.ticks.period
         signed = robot.measurement.signed
         # Of the motors, then of the whole robot.
         self._supplies = (*self._topics, TOTAL_TOPIC)
         self._windows = [
-            SupplyWindow(ticks.period, self.settings.stale, signed or supply == TOTAL_TOPIC)
+            SupplyWindow(period, self.settings.stale, signed or supply == TOTAL_TOPIC)
             for supply in self._supplies
         ]
         self._flows = [Continuity(POWER_TOLERANCE) for _ in self._supplies]
@@ -116,15 +117,16 @@ class ResidualStage:
         self._health = InputReporter()
         fastest = fastest_wheel(robot)
         self._encoders = EncoderWindow(
-            self.settings.encoder_window, ticks.period, self.settings.stale, fastest
+            self.settings.encoder_window, period, self.settings.stale, fastest
         )
         self._has_motor_power = bool(motor_topics(robot))
         self._predictions: dict[int, Prediction] = {}
-        lately = max(_FEWEST, round(_TRANSIENT / ticks.period))
+        lately = max(_FEWEST, round(_TRANSIENT / period))
         self._recent: deque[_Modelled] = deque(maxlen=lately)
         self._scatter = ScatterWatch(fastest)
-        self._gyro = GyroWatch(ticks.period, lately)
-        self._accelerometer = AccelerometerWatch(ticks.period, lately)
+        self._gyro = GyroWatch(period, lately)
+        self._accelerometer = AccelerometerWatch(period, lately)
+        self._voltages = VoltageWatch(lately)
         self._flaws = EncoderFlaws.of(robot)
         self._to_twist = Body.of(robot).to_twist
         self._decided = 0  # newest tick
@@ -230,6 +232,7 @@ class ResidualStage:
             self._scatter.clear()
             self._gyro.clear()
             self._accelerometer.clear()
+            self._voltages.clear()
             self._predictions.clear()
             self._recent.clear()
         return arrival
@@ -238,8 +241,7 @@ class ResidualStage:
         for stamp in [stamp for stamp in self._predictions if stamp < tick]:
             del self._predictions[stamp]
         known = self._predictions.pop(tick, None)
-        prediction = known or _no_prediction(tick)
-        self._recent.append(_Modelled.of(prediction))
+        self._recent.append(_Modelled.of(known or _no_prediction(tick)))
         absent = "" if known else "no prediction: is the power_model node running?"
         estimate = self._encoders.at(tick)
         speeds = self._speeds(tick, estimate, absent)
@@ -254,6 +256,7 @@ class ResidualStage:
             self._supply_share(tick),
             self._gyro.residual(tick, float(twist[2]), bands),
             self._accelerometer.residuals(tick, twist, bands, is_well=is_well),
+            self._voltages.residuals(known, bands),
         )
 
     def _supply_share(self, tick: int) -> float:

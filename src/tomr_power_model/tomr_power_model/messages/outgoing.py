@@ -28,13 +28,13 @@ class SupplyMessage:
 
 @frozen
 class JointMessage:
-    """A sensor_msgs/JointState without positions."""
+    """A sensor_msgs/JointState without positions, and of some topics without speeds."""
 
     topic: str
     stamp_ns: int
     names: tuple[str, ...]
     velocity: tuple[float, ...]  # rad/s
-    effort: tuple[float, ...]  # N m
+    effort: tuple[float, ...]  # N m, or V of the motors' drivers
 
     @property
     def plain(self) -> Plain:

@@ -74,7 +74,8 @@ def joint_state(
     velocity: Iterable[float] = (),
     effort: Iterable[float] = (),
 ) -> Plain:
-    """sensor_msgs/JointState [rad, rad/s, N m]; effort [A] for robots that publish currents so."""
+    """sensor_msgs/JointState [rad, rad/s, N m]; effort [A] for robots that publish currents so,
+    [V] of drivers."""
     return Plain(
         JOINT_STATE,
         {

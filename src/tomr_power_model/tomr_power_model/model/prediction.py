@@ -2,7 +2,7 @@
 
 from attrs import frozen
 
-from tomr_power_model.messages.readings import SupplyReading
+from tomr_power_model.messages.readings import NAN, SupplyReading
 
 Triple = tuple[float, float, float]
 Readings = tuple[SupplyReading, SupplyReading, SupplyReading]
@@ -18,3 +18,6 @@ class Prediction:
     motors: Readings  # from the command
     total: SupplyReading  # from the command, with auxiliary power
     from_encoders: Readings  # from the measured wheel speeds
+    # Of the drivers [V]: as simulated, and as they say or their law has it on the measured speeds.
+    voltage: Triple = (NAN, NAN, NAN)
+    held: Triple = (NAN, NAN, NAN)

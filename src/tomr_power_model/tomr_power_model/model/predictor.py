@@ -31,7 +31,7 @@ from tomr_power_model.model.input_health import InputReporter, InputState, Terms
 from tomr_power_model.model.means import Means
 from tomr_power_model.model.power_models import POWER_MODELS, MeasuredMotion, Windows
 from tomr_power_model.model.prediction import Prediction, Readings
-from tomr_power_model.model.resting import RestingDrivers
+from tomr_power_model.model.resting import RestingDrivers, Voltages
 from tomr_power_model.model.settings import ModelSettings
 from tomr_power_model.model.ticks import Arrival, TickClock, of_tick, to_ns
 from tomr_power_model.robot import WHEELS, Robot
@@ -212,7 +212,7 @@ class PowerPredictor:
             speed = estimate.speed.tolist()
         windows = self._windows(tick)
         said = self._said(tick)
-        motion, volts = self._motion(
+        motion, drivers = self._motion(
             _Tick(estimate, simulated, gyro, commanded, windows.offset_s, said)
         )
         is_silent = commanded is None or self._is_silent(tick, commanded, speed)
@@ -222,7 +222,7 @@ class PowerPredictor:
             alone = self._readings(self._measured.means(motion, None))
             return Prediction(tick, UNKNOWN, UNKNOWN, _UNKNOWN, UNKNOWN_READING, alone)
         means = self._model.commanded(commanded, windows)
-        beside = Simulated(self._moving_as(motion, simulated, volts), means)
+        beside = Simulated(self._moving_as(motion, simulated, drivers.simulated), means)
         return Prediction(
             stamp_ns=tick,
             speed=_triple(commanded.speed),
@@ -230,11 +230,13 @@ class PowerPredictor:
             motors=self._readings(means),
             total=self._total(means),
             from_encoders=self._readings(self._measured.means(motion, beside)),
+            voltage=_triple(drivers.simulated),
+            held=_triple(_first_known(said, drivers.by_law)),
         )
 
-    def _motion(self, seen: _Tick) -> tuple[MeasuredMotion, list[float]]:
+    def _motion(self, seen: _Tick) -> tuple[MeasuredMotion, Voltages]:
         """Motion of the wheels in a tick, from what the encoders show of it, and the voltages of
-        the simulated drivers [V]."""
+        the drivers."""
         drivers = self._resting.voltages(
             self._path,
             self._moved(seen.estimate, 0.5 * self._period_s),
@@ -242,7 +244,6 @@ class PowerPredictor:
             simulated=seen.simulated.speed.tolist(),
             share=0.5 + seen.offset_s / self._period_s,
         )
-        pairs = zip(seen.said, drivers.held, strict=True)
         wheels = self._flaws.turned(seen.estimate)
         turning = wheels.speed.tolist()
         turned = self._period_s * self._turning(turning, seen.gyro, seen.commanded)
@@ -253,12 +254,12 @@ class PowerPredictor:
             seen.gyro,
             self._heading + 0.5 * turned,
             self._path.wheel(at.RISE) or self._cold,
-            [own if math.isfinite(own) else other for own, other in pairs],
+            _first_known(seen.said, drivers.held),
             seen.offset_s,
             self._path.besides,
         )
         self._heading += turned
-        return motion, drivers.simulated
+        return motion, drivers
 
     def _moving_as(
         self, motion: MeasuredMotion, simulated: WheelEstimate, held: Sequence[float]
@@ -371,6 +372,12 @@ class PowerPredictor:
 def _triple(values: Sequence[float] | Array) -> Triple:
     first, second, third = (float(value) for value in values)
     return first, second, third
+
+
+def _first_known(first: Sequence[float], other: Sequence[float]) -> list[float]:
+    """Of each wheel the first value that is known."""
+
+    return [a if math.isfinite(a) else b for a, b in zip(first, other, strict=True)]
 
 
 def _is_half_known(speed: Sequence[float]) -> bool:

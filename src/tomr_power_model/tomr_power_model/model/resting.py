@@ -23,11 +23,12 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-from attrs import frozen
+from attrs import evolve, frozen
 
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.holding import Holding
 from tomr_power_model.dynamics.vehicle import vehicle_of
+from tomr_power_model.model.driver_law import DriverLaw
 from tomr_power_model.robot import WHEELS, Robot
 
 _UNKNOWN = float("nan")
@@ -65,17 +66,19 @@ class Voltages:
 
     held: list[float]
     simulated: list[float]  # by those of the simulation
+    by_law: list[float]  # by the drivers as their law alone has it, see `DriverLaw`
 
     @classmethod
     def unknown(cls) -> "Voltages":
         """Of no driver."""
-        return cls([_UNKNOWN] * WHEELS, [_UNKNOWN] * WHEELS)
+        return cls(*([_UNKNOWN] * WHEELS for _ in range(3)))
 
     def after(self, before: "Voltages", share: float) -> "Voltages":
         """At a share of the time since `before`, linearly; as now where that is not known."""
         return Voltages(
             _between(before.held, self.held, share),
             _between(before.simulated, self.simulated, share),
+            self.by_law,
         )
 
 
@@ -98,6 +101,7 @@ class RestingDrivers:
         self._proportional = robot.controller.proportional
         self._integral = robot.controller.integral
         self._holding = Holding(vehicle_of(robot))
+        self._law = DriverLaw(robot, period_s)
         self.clear()
 
     def clear(self) -> None:
@@ -107,10 +111,12 @@ class RestingDrivers:
         self._strange = [False] * WHEELS  # differences that are not the drivers'
         self._soon = [0] * WHEELS  # ticks for which they fade soon
         self._followed = [False] * WHEELS  # in the last tick
+        self._law.clear()
 
     def forget(self) -> None:
         """The drivers were asked for what is not known: what their sums differ by means nothing."""
         self._offset = [_UNKNOWN] * WHEELS
+        self._law.forget()
 
     def voltages(
         self,
@@ -144,11 +150,14 @@ class RestingDrivers:
             here, there = asked[wheel] - speed[wheel], asked[wheel] - simulated[wheel]
             expected.append(self._proportional * there + self._integral * sums[wheel])
             found.append(self._proportional * here + self._integral * (sums[wheel] + known))
-        now = Voltages(found, expected).after(self._before, share)
+        now = Voltages(found, expected, []).after(self._before, share)
+        beyond = self._law.beyond(ahead, speed, simulated, expected=expected, share=share)
         taken = self._follow(path, apart, ahead, speed)
+        self._law.taken_over(taken)
         after = [volts + self._integral * more for volts, more in zip(expected, taken, strict=True)]
-        self._before = Voltages(found, after)
-        return now
+        self._before = Voltages(found, after, [])
+        by_law = [volts + more for volts, more in zip(now.simulated, beyond, strict=True)]
+        return evolve(now, by_law=by_law)
 
     def _fades(self, wheel: int, speed: float, simulated: float) -> float:
         """Share of the difference that a tick takes off, of a wheel that turns so [rad/s]."""

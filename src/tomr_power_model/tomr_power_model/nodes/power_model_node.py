@@ -1,17 +1,13 @@
 """Node `power_model`: the predicted power of each motor."""
 
-from tomr_power_model.messages.outgoing import DiagnosticMessage, JointMessage, SupplyMessage
+from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.model.input_health import TOPIC as DIAGNOSTICS
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.model.settings import MODEL_PARAMETERS, ModelSettings
 from tomr_power_model.nodes.command_line import node_arguments
 from tomr_power_model.nodes.stage_node import StageNode, run_node
 from tomr_power_model.topics.inputs import model_inputs
-from tomr_power_model.topics.predictions import (
-    EXPECTED,
-    prediction_messages,
-    prediction_topics,
-)
+from tomr_power_model.topics.predictions import prediction_messages, prediction_topics
 
 
 class PowerModelNode(StageNode):
@@ -21,8 +17,8 @@ class PowerModelNode(StageNode):
     def __init__(self) -> None:
         super().__init__("power_model", MODEL_PARAMETERS)
         self._predictor = PowerPredictor(self._robot, ModelSettings.of(self.values))
-        for topic in prediction_topics(self._robot):
-            self.offer(topic, JointMessage if topic == EXPECTED else SupplyMessage)
+        for topic, kind in prediction_topics(self._robot).items():
+            self.offer(topic, kind)
         self.offer(DIAGNOSTICS, DiagnosticMessage)
         self.listen(model_inputs(self._robot, self._predictor), self._advance)
 

@@ -10,30 +10,41 @@ from tomr_power_model.robot import WHEELS, Robot
 
 EXPECTED = "predicted/joint_states"
 TOTAL = "battery_state/predicted"
+VOLTAGE = "motor_voltage/predicted"
+HELD = "motor_voltage/from_encoders"
 _UNFINISHED = 40  # stamps that may wait for their last part
 
 
-def prediction_topics(robot: Robot) -> tuple[str, ...]:
-    """Topics of a prediction: joints, three motors, the total, three motors from encoders."""
+def prediction_topics(robot: Robot) -> dict[str, type[Outgoing]]:
+    """Topics of a prediction and what they carry: joints, three motors, the total, three motors
+    from encoders, the drivers' voltages."""
     wheels = robot.wheel_topics
-    return (
-        EXPECTED,
+    supplies = (
         *(f"{wheel}/power/predicted" for wheel in wheels),
         TOTAL,
         *(f"{wheel}/power/from_encoders" for wheel in wheels),
     )
+    joints = dict.fromkeys((VOLTAGE, HELD), JointMessage)
+    return {EXPECTED: JointMessage, **dict.fromkeys(supplies, SupplyMessage), **joints}
 
 
 def prediction_messages(robot: Robot, prediction: Prediction) -> tuple[Outgoing, ...]:
-    """The eight messages of one prediction, all with its stamp."""
-    topics = prediction_topics(robot)
-    stamp = prediction.stamp_ns
+    """The ten messages of one prediction, all with its stamp."""
+    stamp, names = prediction.stamp_ns, robot.wheel_names
     supplies = (*prediction.motors, prediction.total, *prediction.from_encoders)
-    joints = JointMessage(topics[0], stamp, robot.wheel_names, prediction.speed, prediction.torque)
-    return joints, *(
-        SupplyMessage(topic, stamp, reading)
-        for topic, reading in zip(topics[1:], supplies, strict=True)
+    return (
+        JointMessage(EXPECTED, stamp, names, prediction.speed, prediction.torque),
+        *(
+            SupplyMessage(topic, stamp, reading)
+            for topic, reading in zip(_supply_topics(robot), supplies, strict=True)
+        ),
+        JointMessage(VOLTAGE, stamp, names, (), prediction.voltage),
+        JointMessage(HELD, stamp, names, (), prediction.held),
     )
+
+
+def _supply_topics(robot: Robot) -> list[str]:
+    return [topic for topic, kind in prediction_topics(robot).items() if kind is SupplyMessage]
 
 
 class PredictionAssembler:
@@ -43,6 +54,7 @@ class PredictionAssembler:
         self._robot = robot
         self._parts: dict[int, dict[str, Any]] = {}
         self._topics = prediction_topics(robot)
+        self._supplies = _supply_topics(robot)
 
     def add(self, topic: str, stamp_ns: int, message: Any) -> Prediction | None:
         """Take one message; returns the prediction when its last part has come."""
@@ -54,7 +66,7 @@ class PredictionAssembler:
             return None
         for stamp in [stamp for stamp in self._parts if stamp <= stamp_ns]:
             del self._parts[stamp]
-        supplies = [_reading(parts[topic]) for topic in self._topics[1:]]
+        supplies = [_reading(parts[topic]) for topic in self._supplies]
         joints = parts[EXPECTED]
         return Prediction(
             stamp_ns,
@@ -63,6 +75,8 @@ class PredictionAssembler:
             (supplies[0], supplies[1], supplies[2]),
             supplies[WHEELS],
             (supplies[4], supplies[5], supplies[6]),
+            _triple(parts[VOLTAGE].effort),
+            _triple(parts[HELD].effort),
         )
 
 

@@ -33,13 +33,14 @@ class Expected:
     motion: Motion
     # Of each tick, (ticks, 3): speeds and accelerations in its middle as `EncoderWindow.beside`
     # gives them, measured and simulated [rad/s, rad/s^2], voltages of the drivers as the power
-    # sensors see them, and of the simulated ones [V].
+    # sensors see them, of the simulated ones, and by their law alone [V].
     speed: Array = field(repr=False)
     acceleration: Array = field(repr=False)
     simulated_speed: Array = field(repr=False)
     simulated_acceleration: Array = field(repr=False)
     held: Array = field(repr=False)
     simulated_held: Array = field(repr=False)
+    by_law: Array = field(repr=False)
 
 
 class _Path:
@@ -78,7 +79,7 @@ def run_believed(drive: Drive, signals: Signals, share: Array) -> Expected:
     step = simulation.period_s / steps
     out = np.empty((len(inputs), steps * simulation.row))
     ends = np.zeros((len(inputs) * steps + 1, WHEELS))
-    shown = np.empty((6, ticks, WHEELS))  # as in `Expected`
+    shown = np.empty((7, ticks, WHEELS))  # as in `Expected`
     fits = Fits.over(signals.encoder_time, ticks, LONG_S)
     borders = np.round(TICK * np.arange(ticks + 1) / simulation.period_s).astype(np.int64)
     borders[-1] = len(inputs)
@@ -96,7 +97,8 @@ def run_believed(drive: Drive, signals: Signals, share: Array) -> Expected:
         angle, speed, acceleration = _seen(fits, k, until, step, (mean, change), signals)
         seen = angle.tolist(), speed.tolist()
         volts = drivers.voltages(path, *seen, simulated=mean.tolist(), share=float(share[k]))
-        shown[:, k] = speed, acceleration, mean, change, volts.held, volts.simulated
+        drives = volts.held, volts.simulated, volts.by_law
+        shown[:, k] = speed, acceleration, mean, change, *drives
         before = after
     variant = Variant(np.asarray(simulation.numbers))
     motion = Motion(variant, from_rest(inputs), Steps.of(out, WHEELS), step, ticks)

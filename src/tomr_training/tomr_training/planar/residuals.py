@@ -34,6 +34,8 @@ class Compared:
 
     modelled: Array  # as in a frame: total, motors, speeds, motors from encoders; 10 channels
     measured: Array  # the same
+    voltage: Array  # of the drivers as simulated [V], (ticks, 3)
+    held: Array  # and as their law has it on the measured speeds
 
     def residuals(self, bands: BandSettings) -> tuple[Array, Array]:
         """Residuals and bands, (ticks, 10), as `ResidualStage` gives them."""
@@ -68,6 +70,8 @@ def compare(drive: Drive, signals: Signals) -> Compared:
     return Compared(
         np.hstack([total, commanded, expected.tick_means(expected.steps.speed), derived]),
         np.hstack([drawn[:, 3:], drawn[:, :3], speed, drawn[:, :3]]),
+        believed.simulated_held,
+        believed.by_law,
     )
 
 

@@ -1,0 +1,159 @@
+"""Voltages of the drivers beyond the simulated ones, in hand-worked motions."""
+
+import math
+
+import pytest
+from attrs import evolve
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tomr_power_model.model.driver_law import DriverLaw
+from tomr_power_model.robot import shipped_robot
+
+ROBOT = shipped_robot("reference")
+PROPORTIONAL, INTEGRAL = ROBOT.controller.proportional, ROBOT.controller.integral
+TICK = 0.05
+STILL = [0.0, 0.0, 0.0]
+TURNING = [5.0, -5.0, 5.0]
+
+
+def beyond(
+    law: DriverLaw,
+    ahead: list[float],
+    speed: list[float] | None = None,
+    simulated: list[float] | None = None,
+    *,
+    expected: list[float] | None = None,
+    share: float = 1.0,
+) -> list[float]:
+    """Of a tick, by default at its end and of wheels that stand."""
+    given = STILL if speed is None else speed
+    same = given if simulated is None else simulated
+    return law.beyond(ahead, given, same, expected=expected or STILL, share=share)
+
+
+@pytest.fixture
+def law() -> DriverLaw:
+    found = DriverLaw(ROBOT, TICK)
+    beyond(found, STILL)
+    return found
+
+
+def test_what_a_wheel_falls_behind_is_summed_up(law: DriverLaw) -> None:
+    found = beyond(law, [0.01, 0.0, -0.02])
+    assert found == pytest.approx([0.01 * INTEGRAL, 0.0, -0.02 * INTEGRAL])
+
+
+def test_a_wheel_that_is_slower_is_driven_at_once(law: DriverLaw) -> None:
+    found = beyond(law, STILL, [-0.2, 0.0, 0.0], STILL)
+    assert found == pytest.approx([0.2 * PROPORTIONAL, 0.0, 0.0])
+
+
+def test_within_a_tick_the_sum_grows_evenly(law: DriverLaw) -> None:
+    beyond(law, [0.01, 0.0, 0.0])
+    found = beyond(law, [0.03, 0.0, 0.0], share=0.25)
+    assert found[0] == pytest.approx(INTEGRAL * (0.01 + 0.25 * 0.02))
+
+
+@pytest.mark.parametrize("restart", [DriverLaw.clear, DriverLaw.forget])
+def test_where_nothing_is_known_the_sums_are_taken_for_equal(
+    law: DriverLaw, restart: object
+) -> None:
+    beyond(law, [0.5, 0.5, 0.5])
+    restart(law)  # type: ignore[operator]
+    assert beyond(law, [0.5, 0.5, 0.5]) == STILL
+    assert beyond(law, [0.51, 0.5, 0.5]) == pytest.approx([0.01 * INTEGRAL, 0.0, 0.0])
+
+
+def test_an_angle_that_is_not_known_leaves_the_other_wheels_alone(law: DriverLaw) -> None:
+    first, second, third = beyond(law, [math.nan, 0.01, 0.0], [math.nan, 0.0, 0.0], STILL)
+    assert math.isnan(first)
+    assert (second, third) == (pytest.approx(0.01 * INTEGRAL), 0.0)
+    for _ in range(3):  # nor does it spoil what is learnt
+        found = beyond(law, [0.02, 0.01, 0.0], TURNING)
+    assert found[0] == pytest.approx(0.02 * INTEGRAL, rel=0.02)
+
+
+def test_what_the_simulation_takes_over_is_no_difference_any_more(law: DriverLaw) -> None:
+    beyond(law, [0.02, 0.0, 0.0])
+    law.taken_over([0.02, 0.0, 0.0])
+    assert beyond(law, [0.02, 0.0, 0.0], share=0.0) == pytest.approx(STILL)
+    assert beyond(law, [0.02, 0.0, 0.0]) == pytest.approx(STILL)
+
+
+def test_a_lasting_difference_fades_in_half_a_minute_of_motion_not_at_rest(law: DriverLaw) -> None:
+    for _ in range(600):
+        found = beyond(law, [0.02, 0.0, 0.0])
+    assert found[0] == pytest.approx(0.02 * INTEGRAL)
+    for _ in range(round(1.0 / 0.03 / TICK)):
+        found = beyond(law, [0.02, 0.0, 0.0], [5.0, 0.0, 0.0])
+    assert found[0] == pytest.approx(0.02 * INTEGRAL / math.e, rel=0.01)
+
+
+def test_drivers_that_begin_later_hold_no_other_voltage(law: DriverLaw) -> None:
+    late = 0.002  # s, less than a period
+    ahead = [late * speed for speed in TURNING]
+    first = beyond(law, ahead, TURNING)
+    assert first[0] == pytest.approx(late * TURNING[0] * INTEGRAL, rel=0.01)
+    for _ in range(200):
+        last = beyond(law, ahead, TURNING)
+    assert max(map(abs, last)) < 0.1 * first[0]
+
+
+def test_one_wheel_alone_is_not_late(law: DriverLaw) -> None:
+    behind = [0.02, 0.0, 0.0]
+    for _ in range(100):
+        found = beyond(law, behind, TURNING)
+    assert found == pytest.approx([0.02 * INTEGRAL * math.exp(-0.03 * 5.0), 0.0, 0.0], rel=0.01)
+
+
+def test_no_driver_is_later_than_a_period(law: DriverLaw) -> None:
+    period = 1.0 / ROBOT.controller.rate
+    late = 4.0 * period
+    ahead = [late * speed for speed in TURNING]
+    for _ in range(200):
+        found = beyond(law, ahead, TURNING)
+    left = (late * math.exp(-0.03 * 10.0) - period) * TURNING[0] * INTEGRAL
+    assert found[0] == pytest.approx(left, rel=0.02)
+
+
+def test_wheels_that_turn_otherwise_than_simulated_say_nothing_of_a_delay(law: DriverLaw) -> None:
+    behind = [0.002 * speed for speed in TURNING]
+    for _ in range(200):
+        beyond(law, behind, TURNING, [speed + 1.0 for speed in TURNING])
+    found = beyond(law, behind, TURNING)
+    assert found[0] == pytest.approx(behind[0] * INTEGRAL * math.exp(-0.03 * 10.0), rel=0.02)
+
+
+def test_a_driver_gives_no_more_than_its_supply_and_does_not_sum_up_then(law: DriverLaw) -> None:
+    most = ROBOT.supply.nominal_voltage
+    found = beyond(law, [9.0, 0.0, 0.0], expected=[4.0, 0.0, 0.0])
+    assert found[0] == pytest.approx(most - 4.0)
+    # As soon as the wheel catches up the voltage falls.
+    after = beyond(law, [8.9, 0.0, 0.0], expected=[4.0, 0.0, 0.0])
+    assert after[0] == pytest.approx(most - 4.0 - 0.1 * INTEGRAL)
+    back = beyond(law, [-9.0, 0.0, 0.0], expected=[4.0, 0.0, 0.0])
+    assert back[0] == pytest.approx(-most - 4.0)
+
+
+def test_a_driver_without_an_integral_holds_what_the_speeds_say() -> None:
+    robot = evolve(ROBOT, controller=evolve(ROBOT.controller, integral=0.0))
+    law = DriverLaw(robot, TICK)
+    beyond(law, STILL)
+    found = beyond(law, [50.0, 0.0, 0.0], [-0.1, 0.0, 0.0], STILL)
+    assert found == pytest.approx([0.1 * PROPORTIONAL, 0.0, 0.0])
+
+
+@given(st.lists(st.floats(-0.05, 0.05), min_size=3, max_size=3), st.integers(0, 2))
+def test_it_does_not_matter_which_wheel_is_called_the_first(ahead: list[float], shift: int) -> None:
+    one, other = DriverLaw(ROBOT, TICK), DriverLaw(ROBOT, TICK)
+
+    def turned(values: list[float]) -> list[float]:
+        return values[shift:] + values[:shift]
+
+    for _ in range(3):
+        found = beyond(one, ahead, TURNING)
+        same = beyond(other, turned(ahead), turned(TURNING))
+        assert turned(found) == same
+        beyond(one, STILL, TURNING)
+        beyond(other, STILL, turned(TURNING))
