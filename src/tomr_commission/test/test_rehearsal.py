@@ -9,7 +9,14 @@ from attrs import evolve
 
 from tomr_commission import simulated
 from tomr_commission.observed import Observed
-from tomr_commission.rehearsal import Rehearsal, Usage, observed_of, rehearse, shoved_drive
+from tomr_commission.rehearsal import (
+    Rehearsal,
+    Usage,
+    electrical_off,
+    observed_of,
+    rehearse,
+    shoved_drive,
+)
 from tomr_commission.simulated import KINDS, cases, simulated_fault, try_simulated
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.frame import MOTORS, SPEEDS
@@ -48,6 +55,40 @@ def test_of_four_drives_one_stands_still_when_it_is_shoved(seed: int, stands: bo
     seen = observed_of(shoved_drive(ROBOT, USAGE, Rehearsal(), seed))
     late = seen.modelled[seen.seconds > 5.0][:, list(SPEEDS)]
     assert bool((np.abs(late) < 0.1).all()) is stands
+
+
+def test_motors_are_no_farther_off_than_their_drivers_voltages_say() -> None:
+    usual, known = (
+        shoved_drive(ROBOT, USAGE, plan, 80_000_001)
+        for plan in (Rehearsal(), Rehearsal(electrical=0.005))
+    )
+    for before, drawn, nominal in zip(
+        usual.plant.motors, known.plant.motors, ROBOT.motors, strict=True
+    ):
+        assert 0.0 < abs(before.resistance / nominal.resistance - 1.0) <= 0.02
+        for name in ("resistance", "torque_constant"):
+            far, near = (
+                getattr(motor, name) / getattr(nominal, name) - 1.0 for motor in (before, drawn)
+            )
+            assert math.isclose(near, 0.25 * far, rel_tol=1e-6)
+        assert drawn.rotor_inertia == before.rotor_inertia
+    assert evolve(known.plant, motors=usual.plant.motors) == usual.plant
+
+
+def test_what_voltages_say_is_their_scatter_over_what_they_are(
+    steady: Callable[..., Observed],
+) -> None:
+    random = np.random.default_rng(3)
+    volts = np.hstack([random.normal(0.0, 0.02, (4000, 3)), np.full((4000, 3), -8.0)])
+    drive = steady()
+    found = electrical_off([evolve(drive, volts=volts)], 0.02)
+    assert math.isclose(found, 3.29 * 0.02 / 8.0, rel_tol=0.1)
+    assert electrical_off([evolve(drive, volts=10.0 * volts)], 0.02) < 0.02  # both
+    wide = np.hstack([10.0 * volts[:, :3], volts[:, 3:]])
+    assert electrical_off([evolve(drive, volts=wide)], 0.02) == 0.02
+    assert electrical_off([drive], 0.02) == 0.02  # nothing is known of them
+    still = np.hstack([volts[:, :3], np.zeros((4000, 3))])
+    assert electrical_off([evolve(drive, volts=still)], 0.02) == 0.02
 
 
 def test_rehearsal_depends_on_its_arguments_alone() -> None:

@@ -23,7 +23,7 @@ from tomr_commission.healthy import MOST_GATHERED, Healthy, decided, healthy
 from tomr_commission.injected import kinds_for, try_injected
 from tomr_commission.observed import Observed, observe, reports_currents, unit_of_motors
 from tomr_commission.parallel import on_all_cores
-from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, rehearse
+from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, electrical_off, rehearse
 from tomr_commission.request import CommissionRequest
 from tomr_commission.simulated import try_simulated
 from tomr_commission.store import Store, digest, fingerprint
@@ -274,6 +274,7 @@ class _Work:
     ) -> Tuned:
         """The narrowest bands with which false alarms can be as rare as wanted."""
         robot, choice, share = str(self.source(described)), self.request.bands, 0.55
+        plan = evolve(plan, electrical=electrical_off(fitted, plan.off))
         while True:
             self.progress("simulating healthy hours", share)
             bands = bands_of(fitted, choice)

@@ -1,11 +1,13 @@
 """Hours of healthy driving of the explained robot, simulated: shoved about, loaded, on any floor.
 
 An evening of real driving holds a few shoves at most, a year holds thousands. The robot is a little
-off its description in every value, as an explained one is; floor and payload vary from drive to
-drive. Simulated in the power model's own dynamics, which also train the classifier.
+off its description in every value, as an explained one is, resistances and torque constants by no
+more than its drivers' voltages allow; floor and payload vary from drive to drive. Simulated in the
+power model's own dynamics, which also train the classifier.
 """
 
 import math
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -18,7 +20,8 @@ from tomr_commission.parallel import on_all_cores
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.residuals.frame import RESIDUALS, SPEEDS
 from tomr_fault_diag.residuals.settings import BandSettings
-from tomr_power_model.robot import Robot, load_robot
+from tomr_power_model.robot import WHEELS, Robot, load_robot
+from tomr_power_model.robot.description import Motor
 from tomr_sim_bridge.missions.mission import Mission
 from tomr_sim_bridge.missions.schema import RandomPhase, TwistPhase
 from tomr_training.drives import Bump, Drive, every_value
@@ -64,7 +67,8 @@ class Rehearsal:
     first: int = 90  # of them, that show whether the others are worth while
     force: tuple[float, float] = (0.5, 3.0)  # N per kg of the robot
     duration: tuple[float, float] = (0.03, 0.2)  # s
-    off: float = 0.02  # share by which every value of the robot may be off its explained one
+    off: float = 0.02  # share by which every value of the robot may be off its explained one, ...
+    electrical: float = 0.02  # ... and resistance and torque constant of each motor
     payload: float = 0.05  # of its mass, at most
     friction: tuple[float, float] = (0.6, 1.0)  # traction of the floor
     standing: int = 4  # one drive of so many stands still when it is shoved
@@ -89,6 +93,18 @@ class Shoved:
     def followed_by(self, more: "Shoved") -> "Shoved":
         """With those of other drives as well."""
         return Shoved(self.peaks + more.peaks, self.hours + more.hours)
+
+
+def electrical_off(drives: Sequence[Observed], most: float) -> float:
+    """Share by which resistances and torque constants can be off, at most so much: their drivers'
+    voltages in healthy drives would show more."""
+    volts = np.abs(np.concatenate([drive.volts for drive in drives]))
+    beyond, expected = volts[:, :WHEELS], volts[:, WHEELS:]
+    known = np.isfinite(beyond) & np.isfinite(expected)
+    if not known.any():
+        return most
+    usual = float(np.quantile(expected[known], 0.98))
+    return min(most, float(np.quantile(beyond[known], 0.999)) / usual) if usual > 0.0 else most
 
 
 def rehearse(
@@ -158,9 +174,23 @@ def shoved_drive(robot: Robot, usage: Usage, plan: Rehearsal, seed: int) -> Driv
     plant = every_value(
         robot, lambda value: float(value * random.uniform(1.0 - plan.off, 1.0 + plan.off))
     )
+    closer = min(plan.electrical / plan.off, 1.0) if plan.off else 1.0
+    motors = (_closer(*pair, closer) for pair in zip(plant.motors, robot.motors, strict=True))
+    first, second, third = motors
+    plant = evolve(plant, motors=(first, second, third))
     starts = _FIRST + _APART * np.arange(_PER_DRIVE) + random.uniform(0.0, 1.0, _PER_DRIVE)
     shoves = tuple(_shove(robot, plan, float(start), random) for start in starts)
     return Drive(seed, plant, robot, mission, shoves)
+
+
+def _closer(drawn: Motor, described: Motor, share: float) -> Motor:
+    """A motor whose resistance and constant are off by a share of what was drawn."""
+    r, k = described.resistance, described.torque_constant
+    return evolve(
+        drawn,
+        resistance=r + share * (drawn.resistance - r),
+        torque_constant=k + share * (drawn.torque_constant - k),
+    )
 
 
 def _stop(seconds: float) -> TwistPhase:

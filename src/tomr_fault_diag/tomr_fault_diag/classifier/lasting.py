@@ -63,6 +63,7 @@ FAULTS = (
     SmallFault(METERS, 0.3, 0.08, is_signed=True, in_total=False),  # of the power shown
 )
 _COUNT = len(FAULTS)
+_MOTOR = [index for index, fault in enumerate(FAULTS) if fault.hypotheses == WEAKS]
 _TYPICAL = np.array([fault.typical for fault in FAULTS])[:, None, None]
 _NEGLIGIBLE = np.array([fault.negligible for fault in FAULTS])[:, None, None]
 _SIGNED = np.array([fault.is_signed for fault in FAULTS])[:, None]
@@ -83,8 +84,10 @@ class LastingSettings:
     most_slow: float = 0.5  # bands: ... and add no more
     scatter: float = 0.2  # bands: 3.3 standard deviations of noise, and half as much again
     total_scatter: float = 0.25  # bands of the total power
-    little: float = 0.08  # bands by which a healthy robot's residuals may lie off nothing
-    clip: float = 6.0  # bands: what is larger counts no more
+    # Bands by which a healthy robot's residuals of power, and of voltage, may lie off nothing: what
+    # came into a driver's sum and is not known stays there for seconds, and may be anything.
+    little: tuple[float, float] = (0.08, 0.6)
+    clip: tuple[float, float] = (6.0, 20.0)  # bands of power, of voltage: more counts no more
     forces: tuple[float, ...] = (0.1, 0.3, 1.0)  # N/kg, deviations of a force on the body
     steady: float = 1.0  # N/kg, deviation of one that stays
     alike: float = 0.5  # by which a fault and such a force explain the same
@@ -206,7 +209,8 @@ class LastingWatch:
         is_smaller = np.abs(by_command) < np.abs(by_encoder)  # not where it is NaN
         power = np.where(is_smaller, by_command, by_encoder)
         shown = np.stack([power, np.nan_to_num(volts)], axis=1)
-        over = np.maximum(np.abs(shown).max(axis=1, keepdims=True) / self.settings.clip, 1.0)
+        most = (np.abs(shown) / self.settings.clip).max(axis=1, keepdims=True)
+        over = np.maximum(most, 1.0)
         return np.asarray(shown / over)  # both less alike: which fault it is depends on both
 
     def _predicted(
@@ -219,9 +223,14 @@ class LastingWatch:
         size = _beyond_others(np.where(_SIGNED, size, np.maximum(size, 0.0)))
         mean = size[:, :, None] * effects
         little = np.maximum(_NEGLIGIBLE / _TYPICAL * np.abs(effects), s.little)
-        little = np.clip(mean, -little, little)
-        found = _better(sudden, little, mean, s.scatter)
-        found -= by_sudden_force(_left(sudden, little), shared, s.forces, s.scatter)
+        little = np.clip(
+            np.stack(np.broadcast_arrays(mean[:, :, 0], sudden[:, 1]), 2), -little, little
+        )
+        none = _better(sudden, np.zeros(1), little, s.scatter)
+        none += by_sudden_force(_left(sudden, little), shared, s.forces, s.scatter)
+        # Nor does a description know the winding and the magnet of a motor, which voltages show.
+        motor = np.where(effects[_MOTOR, :, 1].any(axis=0), none[_MOTOR].max(axis=0), -np.inf)
+        found = _better(sudden, np.zeros(1), mean, s.scatter) - np.maximum(none, motor)
         beyond = _better(sudden, np.zeros(1), mean, s.scatter) - steady
         beyond = np.sign(beyond) * np.maximum(np.abs(beyond) - s.alike, 0.0)
         found = np.minimum(found, beyond)
@@ -236,7 +245,7 @@ class LastingWatch:
         if total.stale:
             return np.zeros_like(mean)
         s, bands = self.settings, np.array([item.band for item in _of(frame, ENCODERS)])
-        drawn = np.clip(np.full(WHEELS, total.residual / total.band), -s.clip, s.clip)
+        drawn = np.clip(np.full(WHEELS, total.residual / total.band), -s.clip[0], s.clip[0])
         added = (mean * bands / total.band)[:, :, None]
         shows = _better(drawn[:, None], np.zeros(1), added, s.total_scatter)
         return np.asarray(np.clip(_IN_TOTAL * shows, s.against, 0.0))
