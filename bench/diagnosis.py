@@ -48,7 +48,16 @@ from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
 from tomr_power_model.cli import run_main
 from tomr_power_model.robot import WHEELS, Robot, shipped_robot
 from tomr_training.drives import Drive, random_drive, severity_of, wheel_of
-from tomr_training.labels import LASTING, SLIPPING, Flags, GroundTruth, Noise, deviates, lasting
+from tomr_training.labels import (
+    LASTING,
+    SLIPPING,
+    Flags,
+    GroundTruth,
+    Noise,
+    deviates,
+    lasting,
+    spread,
+)
 from tomr_training.planar.faults import class_of
 from tomr_training.planar.generate import BEYOND, PAPER_OF
 from tomr_training.planar.residuals import Compared
@@ -100,6 +109,10 @@ def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[Resid
     compared = Compared(modelled, modelled, nothing, nothing)
     (_, usual), (_, band) = (compared.residuals(chosen) for chosen in (BandSettings(), bands))
 
+    volts = np.array([[item.modelled for item in frame.voltages] for frame in frames])
+    held = np.maximum(bands.voltage, bands.voltage_relative * np.abs(volts))
+    held += bands.voltage_transient * spread(volts)
+
     def width(item: Residual, default: float, wanted: float) -> float:
         return max(wanted, item.band) if item.band > _WIDER * default else wanted
 
@@ -110,8 +123,13 @@ def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[Resid
                 evolve(item, band=width(item, float(default), float(wanted)))
                 for item, default, wanted in zip(frame.residuals, *row, strict=True)
             ),
+            voltages=(
+                evolve(frame.voltages[0], band=float(voltages[0])),
+                evolve(frame.voltages[1], band=float(voltages[1])),
+                evolve(frame.voltages[2], band=float(voltages[2])),
+            ),
         )
-        for frame, *row in zip(frames, usual, band, strict=True)
+        for frame, *row, voltages in zip(frames, usual, band, held, strict=True)
     ]
 
 

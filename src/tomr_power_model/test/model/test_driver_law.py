@@ -34,9 +34,30 @@ def beyond(
 
 @pytest.fixture
 def law() -> DriverLaw:
+    """Whose wheels have turned for two seconds, and stand."""
     found = DriverLaw(ROBOT, TICK)
+    for _ in range(40):
+        beyond(found, STILL, TURNING)
+    found._squares, found._products = STILL.copy(), STILL.copy()  # nothing is learnt yet
     beyond(found, STILL)
     return found
+
+
+def test_what_a_push_left_before_the_first_command_is_soon_forgotten() -> None:
+    law = DriverLaw(ROBOT, TICK)
+    beyond(law, STILL)
+    for _ in range(20):
+        found = beyond(law, [0.03, 0.0, 0.0], [5.0, 0.0, 0.0])
+    assert found[0] == pytest.approx(0.03 * INTEGRAL * math.exp(-2.1), rel=0.01)
+    for _ in range(20):
+        beyond(law, [0.03, 0.0, 0.0], [5.0, 0.0, 0.0])
+    later = beyond(law, [0.06, 0.0, 0.0], [5.0, 0.0, 0.0])[0]
+    assert later == pytest.approx(0.03 * INTEGRAL, rel=0.05)  # what comes then stays
+    law.forget()
+    beyond(law, [0.06, 0.0, 0.0])
+    for _ in range(20):
+        found = beyond(law, [0.09, 0.0, 0.0], [5.0, 0.0, 0.0])
+    assert found[0] == pytest.approx(0.03 * INTEGRAL * math.exp(-2.1), rel=0.01)
 
 
 def test_what_a_wheel_falls_behind_is_summed_up(law: DriverLaw) -> None:

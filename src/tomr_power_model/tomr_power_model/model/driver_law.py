@@ -3,9 +3,10 @@
     v - v_sim = k_p (omega_sim - omega) + k_i (theta_sim - theta + offset)
 
 for both are asked for the same, and sum up their errors. The motion alone shows it, whatever
-friction there is. The offset is what the two sums differed by at the beginning; jitter of the
-commands adds to it, so it fades while the wheel turns, slowly: what stays in the voltage shows for
-minutes. A driver gives no more than its supply, and then does not sum up.
+friction there is. The offset is what the two sums differed by at the beginning, which a push may
+have left: it fades in the first two seconds of motion. Jitter of the commands adds to it later, so
+it goes on to fade while the wheel turns, slowly: what stays in the voltage shows for minutes. A
+driver gives no more than its supply, and then does not sum up.
 
 Real drivers take up a command when their period begins, up to half a period before or after the
 simulated ones do. A wheel at omega is ahead by omega times that, all three alike: the middle one of
@@ -19,7 +20,8 @@ from tomr_power_model.robot import WHEELS, Robot
 
 _UNKNOWN = float("nan")
 _MOVING = 1.0  # rad/s
-_FADES = 0.03  # 1/s, of the difference in motion
+_FADES = 0.03  # 1/s, of the difference in motion, ...
+_FADES_FIRST, _FIRST = 2.1, 2.0  # ... and in its first so many seconds
 _LIKE = 0.5  # rad/s, by which a wheel turns as simulated
 _MEMORY = 30.0  # s, over which the delay of the drivers is estimated
 _LITTLE = 90.0  # (rad/s)^2: half a second at 3 rad/s, before which there is taken to be none
@@ -33,7 +35,10 @@ class DriverLaw:
         self._proportional = robot.controller.proportional
         self._integral = robot.controller.integral
         self._most = robot.supply.nominal_voltage
-        self._fades = -math.expm1(-_FADES * period_s)
+        self._later, self._first = (
+            -math.expm1(-rate * period_s) for rate in (_FADES, _FADES_FIRST)
+        )
+        self._lasts = round(_FIRST / period_s)
         self._forgets = math.exp(-period_s / _MEMORY)
         self._longest = 1.0 / robot.controller.rate
         self.clear()
@@ -48,6 +53,7 @@ class DriverLaw:
         """They were asked for what is not known: what their sums differ by means nothing."""
         self._offset = [_UNKNOWN] * WHEELS  # rad
         self._before = [_UNKNOWN] * WHEELS  # what the sums differed by at the end of the last tick
+        self._begins = [self._lasts] * WHEELS  # ticks of motion in which an offset fades soon
 
     def beyond(
         self,
@@ -74,7 +80,9 @@ class DriverLaw:
             if self._offset[wheel] != self._offset[wheel]:
                 self._offset[wheel] = -ahead[wheel]
             if abs(speed[wheel]) > _MOVING:
-                self._offset[wheel] -= self._fades * (ahead[wheel] + self._offset[wheel])
+                fades = self._first if self._begins[wheel] else self._later
+                self._begins[wheel] = max(self._begins[wheel] - 1, 0)
+                self._offset[wheel] -= fades * (ahead[wheel] + self._offset[wheel])
             apart = self._limited(
                 wheel, ahead[wheel], expected[wheel] + self._proportional * slower
             )
