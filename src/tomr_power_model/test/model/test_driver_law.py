@@ -121,6 +121,23 @@ def test_drivers_that_begin_later_hold_no_other_voltage(law: DriverLaw) -> None:
     assert max(map(abs, last)) < 0.1 * first[0]
 
 
+def test_a_delay_that_changes_is_followed_within_a_minute(law: DriverLaw) -> None:
+    for late in (0.002, -0.002):
+        ahead = [late * speed for speed in TURNING]
+        for _ in range(1200):
+            found = beyond(law, ahead, TURNING)
+    assert abs(found[0]) < 0.5 * 0.002 * TURNING[0] * INTEGRAL
+    law.clear()  # of another robot, or after a leap of the clock, none is known
+    beyond(law, STILL, TURNING)
+    again = beyond(law, [0.002 * speed for speed in TURNING], TURNING, share=1.0)
+    assert again[0] == pytest.approx(0.9 * 0.002 * TURNING[0] * INTEGRAL, rel=0.02)
+
+
+def test_an_angle_that_is_lost_in_motion_spoils_no_delay(law: DriverLaw) -> None:
+    beyond(law, [math.nan, math.nan, 0.0], TURNING)
+    assert all(map(math.isfinite, beyond(law, STILL, TURNING)))
+
+
 def test_one_wheel_alone_is_not_late(law: DriverLaw) -> None:
     behind = [0.02, 0.0, 0.0]
     for _ in range(100):
