@@ -15,7 +15,7 @@ from tomr_power_model.errors import InputError
 from tomr_power_model.files.arrays import DAMAGED
 from tomr_power_model.files.write import make_folder, write_bytes, write_text
 
-_FORMAT = 2  # of the kept files: a change makes all of them anew
+_FORMAT = 3  # of the kept files: a change makes all of them anew
 
 
 def digest(parts: Iterable[str]) -> str:

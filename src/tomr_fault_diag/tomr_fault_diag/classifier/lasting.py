@@ -150,7 +150,7 @@ class LastingWatch:
             return self._said
         with np.errstate(over="ignore", invalid="ignore"):
             effects, shared = self._effects(frame)
-        shown = self._shown(frame)
+        shown = self._shown(frame, effects)
         # False where something is not known.
         if not all((np.abs(part) < _BEYOND).all() for part in (shown, effects, shared)):
             return self._said
@@ -199,16 +199,17 @@ class LastingWatch:
         shared = drags[:, :, None] * self._shares
         return _TYPICAL * effects.transpose(0, 2, 1), shared.reshape(-1, 3)
 
-    def _shown(self, frame: ResidualFrame) -> Array:
+    def _shown(self, frame: ResidualFrame, effects: Array) -> Array:
         """Residuals of power and voltage of each motor [bands], (3, 2): of its two powers the
-        smaller, for either is late at times; 0 for a voltage that is not known."""
+        smaller, for either is late at times; 0 for a voltage that shows no fault."""
         by_encoder, by_command, volts = (
             np.array([item.residual / item.band for item in items])
             for items in (_of(frame, ENCODERS), _of(frame, MOTORS), frame.voltages)
         )
         is_smaller = np.abs(by_command) < np.abs(by_encoder)  # not where it is NaN
         power = np.where(is_smaller, by_command, by_encoder)
-        shown = np.stack([power, np.nan_to_num(volts)], axis=1)
+        shows = effects[:, :, 1].any(axis=0)
+        shown = np.stack([power, np.where(shows, volts, 0.0)], axis=1)
         most = (np.abs(shown) / self.settings.clip).max(axis=1, keepdims=True)
         over = np.maximum(most, 1.0)
         return np.asarray(shown / over)  # both less alike: which fault it is depends on both
