@@ -40,13 +40,14 @@ from diagnosis_report import NAMES, Codes, Onset, Outcome, publish, report
 from stages import as_arrays
 from tqdm import tqdm
 
+from tomr_commission.observed import bands_around
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import FAULTLESS, NORMAL, SLIP, State
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
 from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
 from tomr_power_model.cli import run_main
-from tomr_power_model.robot import WHEELS, Robot, shipped_robot
+from tomr_power_model.robot import Robot, shipped_robot
 from tomr_training.drives import Drive, random_drive, severity_of, wheel_of
 from tomr_training.labels import (
     LASTING,
@@ -56,11 +57,10 @@ from tomr_training.labels import (
     Noise,
     deviates,
     lasting,
-    spread,
 )
 from tomr_training.planar.faults import class_of
 from tomr_training.planar.generate import BEYOND, PAPER_OF
-from tomr_training.planar.residuals import Compared
+from tomr_training.planar.residuals import widths
 from tomr_training.simulated_drive import LabelledDrive, healthy_twin, simulated_drive
 
 FIRST_SEED = 1_000_000  # of faulty drives; healthy ones follow a million later
@@ -105,13 +105,11 @@ def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[Resid
     """The same residuals in other bands than the usual; what was wider for its noise stays so, and
     what an IMU shows keeps the usual bands."""
     _, modelled = as_arrays(frames)
-    nothing = np.zeros((len(modelled), WHEELS))
-    compared = Compared(modelled, modelled, nothing, nothing)
-    (_, usual), (_, band) = (compared.residuals(chosen) for chosen in (BandSettings(), bands))
-
+    usual, band = (widths(modelled, chosen) for chosen in (BandSettings(), bands))
     volts = np.array([[item.modelled for item in frame.voltages] for frame in frames])
-    held = np.maximum(bands.voltage, bands.voltage_relative * np.abs(volts))
-    held += bands.voltage_transient * spread(volts)
+    held = bands_around(
+        volts, bands.voltage, bands.voltage_relative, bands.voltage_transient
+    ).tolist()
 
     def width(item: Residual, default: float, wanted: float) -> float:
         return max(wanted, item.band) if item.band > _WIDER * default else wanted
@@ -123,14 +121,17 @@ def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[Resid
                 evolve(item, band=width(item, float(default), float(wanted)))
                 for item, default, wanted in zip(frame.residuals, *row, strict=True)
             ),
-            voltages=(
-                evolve(frame.voltages[0], band=float(voltages[0])),
-                evolve(frame.voltages[1], band=float(voltages[1])),
-                evolve(frame.voltages[2], band=float(voltages[2])),
-            ),
+            voltages=_in_bands(frame, voltages),
         )
         for frame, *row, voltages in zip(frames, usual, band, held, strict=True)
     ]
+
+
+def _in_bands(frame: ResidualFrame, bands: Sequence[float]) -> tuple[Residual, Residual, Residual]:
+    """The drivers' voltages in other bands."""
+    pairs = zip(frame.voltages, bands, strict=True)
+    first, second, third = (evolve(item, band=band) for item, band in pairs)
+    return first, second, third
 
 
 def named_by(kind: Kind, frames: Sequence[ResidualFrame], robot: Robot) -> Codes:

@@ -187,22 +187,22 @@ def band_of(observed: Observed, bands: BandSettings) -> Array:
 def yaw_band_of(observed: Observed, bands: BandSettings) -> Array:
     """Half widths of the band of the yaw rate [rad/s], (n,)."""
     row = bands.yaw, bands.yaw_relative, bands.yaw_transient
-    return _bands_around(observed.yaw[:, 1:], *row)[:, 0]
+    return bands_around(observed.yaw[:, 1:], *row)[:, 0]
 
 
 def along_bands_of(observed: Observed, bands: BandSettings) -> Array:
     """Half widths of the bands of the acceleration along x and y [m/s^2], (n, 2)."""
     row = bands.along, bands.along_relative, bands.along_transient
-    return _bands_around(observed.along[:, 2:], *row)
+    return bands_around(observed.along[:, 2:], *row)
 
 
 def voltage_bands_of(observed: Observed, bands: BandSettings) -> Array:
     """Half widths of the bands of the drivers' voltages [V], (n, 3)."""
     row = bands.voltage, bands.voltage_relative, bands.voltage_transient
-    return _bands_around(observed.volts[:, WHEELS:], *row)
+    return bands_around(observed.volts[:, WHEELS:], *row)
 
 
-def _bands_around(modelled: Array, least: float, relative: float, transient: float) -> Array:
+def bands_around(modelled: Array, least: float, relative: float, transient: float) -> Array:
     """Around what is expected, as what wheels show of what an IMU measures, (n, m) each."""
     width = np.maximum(least, relative * np.abs(np.nan_to_num(modelled)))
     return np.asarray(width + transient * moved(modelled))

@@ -29,6 +29,7 @@ from tomr_fault_diag.residuals.repeats import RepeatWatch, Work
 from tomr_fault_diag.residuals.scatter import ScatterWatch
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_fault_diag.residuals.voltages import VoltageWatch
+from tomr_fault_diag.residuals.widths import width
 from tomr_power_model.drive.plausible import PowerLimits, fastest_wheel
 from tomr_power_model.drive.sources import (
     ARRAY_TOPIC,
@@ -342,8 +343,8 @@ class ResidualStage:
             model = models[-1]
             # Against the set direction: "slower than commanded" is negative whichever way it turns.
             sign = -1.0 if model < 0.0 else 1.0
-            spread = bands.speed_transient * _spread(models)
-            band = max(bands.speed, bands.speed_relative * abs(model)) + spread
+            row = bands.speed, bands.speed_relative, bands.speed_transient
+            band = width(models, *row)
             noise = estimate.gain * max(scatter * max(abs(model), abs(value)), counts)
             unsure = unsure or noise > _UNSURE * band
             missing = _missing(NAN if disorder else value, model, reason, absent)
@@ -377,16 +378,9 @@ class ResidualStage:
     ) -> Residual:
         bands, model = self.settings.bands, models[-1]
         share = bands.relative if relative is None else relative
-        band = max(least, share * abs(model)) + bands.transient * _spread(models)
+        band = width(models, least, share, bands.transient)
         reason = _missing(value, model, missing, absent, unmodelled)
         return Residual(rounded(value - model), rounded(band), rounded(model), unit, reason)
-
-
-def _spread(models: list[float]) -> float:
-    """How far the model moved lately; 0 where it is not known."""
-    if math.isnan(sum(models)):
-        models = [model for model in models if not math.isnan(model)]
-    return max(models) - min(models) if models else 0.0
 
 
 def _missing(

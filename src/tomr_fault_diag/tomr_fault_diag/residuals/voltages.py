@@ -15,6 +15,7 @@ from tomr_fault_diag.residuals.frame import (
     rounded,
 )
 from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_fault_diag.residuals.widths import width
 from tomr_power_model.model.prediction import Prediction, Triple
 from tomr_power_model.robot import WHEELS
 
@@ -43,11 +44,9 @@ class VoltageWatch:
         return first, second, third
 
     def _residual(self, wheel: int, held: float, bands: BandSettings) -> Residual:
-        known = [past[wheel] for past in self._recent if past[wheel] == past[wheel]]
-        model = self._recent[-1][wheel]
-        moved = max(known) - min(known) if known else 0.0
-        band = max(bands.voltage, bands.voltage_relative * abs(model))
-        band += bands.voltage_transient * moved
+        models = [past[wheel] for past in self._recent]
+        row = bands.voltage, bands.voltage_relative, bands.voltage_transient
+        model, band = models[-1], width(models, *row)
         missing = "" if held == held else NO_ENCODERS
         if model != model:
             missing = NO_COMMAND

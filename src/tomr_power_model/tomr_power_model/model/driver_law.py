@@ -16,9 +16,9 @@ the three delays that the last half minute shows is no difference of voltages.
 import math
 from collections.abc import Sequence
 
+from tomr_power_model.model.offsets import UNKNOWN, Offsets, between
 from tomr_power_model.robot import WHEELS, Robot
 
-_UNKNOWN = float("nan")
 _MOVING = 1.0  # rad/s
 _FADES = 0.03  # 1/s, of the difference in motion, ...
 _FADES_FIRST, _FIRST = 2.1, 2.0  # ... and in its first so many seconds
@@ -51,8 +51,8 @@ class DriverLaw:
 
     def forget(self) -> None:
         """They were asked for what is not known: what their sums differ by means nothing."""
-        self._offset = [_UNKNOWN] * WHEELS  # rad
-        self._before = [_UNKNOWN] * WHEELS  # what the sums differed by at the end of the last tick
+        self._offsets = Offsets()
+        self._before = [UNKNOWN] * WHEELS  # what the sums differed by at the end of the last tick
         self._begins = [self._lasts] * WHEELS  # ticks of motion in which an offset fades soon
 
     def beyond(
@@ -73,36 +73,41 @@ class DriverLaw:
             expected: voltages of the simulated drivers then [V].
             share: of the tick at the time that is asked about.
         """
-        found = []
-        delay = self._delay()
+        slower = [there - here for there, here in zip(simulated, speed, strict=True)]
+        now = []
         for wheel in range(WHEELS):
-            slower = simulated[wheel] - speed[wheel]
-            if self._offset[wheel] != self._offset[wheel]:
-                self._offset[wheel] = -ahead[wheel]
-            if abs(speed[wheel]) > _MOVING:
-                fades = self._first if self._begins[wheel] else self._later
-                self._begins[wheel] = max(self._begins[wheel] - 1, 0)
-                self._offset[wheel] -= fades * (ahead[wheel] + self._offset[wheel])
-            apart = self._limited(
-                wheel, ahead[wheel], expected[wheel] + self._proportional * slower
-            )
-            before = self._before[wheel] if self._before[wheel] == self._before[wheel] else apart
-            self._before[wheel] = apart
-            more = before + share * (apart - before) - delay * simulated[wheel]
-            found.append(self._proportional * slower + self._integral * more)
-            if abs(slower) < _LIKE and apart == apart:
+            apart = UNKNOWN  # an angle that is lost for a moment leaves the offset as it is
+            if ahead[wheel] == ahead[wheel]:
+                apart = self._offsets.beyond(wheel, ahead[wheel], self._fades(wheel, speed[wheel]))
+            volts = expected[wheel] + self._proportional * slower[wheel]
+            now.append(self._limited(wheel, apart, volts))
+        delay, sums = self._delay(), between(self._before, now, share)
+        for wheel, apart in enumerate(now):
+            if abs(slower[wheel]) < _LIKE and apart == apart:
                 self._learn(wheel, simulated[wheel], apart)
-        return found
+        self._before = now
+        return [
+            self._proportional * less + self._integral * (apart - delay * turns)
+            for less, apart, turns in zip(slower, sums, simulated, strict=True)
+        ]
 
-    def _limited(self, wheel: int, ahead: float, volts: float) -> float:
-        """By how much a driver's sum is ahead [rad], that gives so much [V] without that."""
-        apart = ahead + self._offset[wheel]
+    def _fades(self, wheel: int, speed: float) -> float:
+        """Share of an offset that a tick takes off, of a wheel that turns so [rad/s]."""
+        if not abs(speed) > _MOVING:
+            return 0.0
+        if not self._begins[wheel]:
+            return self._later
+        self._begins[wheel] -= 1
+        return self._first
+
+    def _limited(self, wheel: int, apart: float, volts: float) -> float:
+        """By how much a driver's sum can be ahead [rad], that gives so much [V] without that."""
         over = abs(volts + self._integral * apart) - self._most
-        if over > 0.0 and self._integral:
-            less = math.copysign(min(over / self._integral, abs(apart)), apart)
-            self._offset[wheel] -= less
-            apart -= less
-        return apart
+        if not (over > 0.0 and self._integral):  # so if it is not known
+            return apart
+        less = math.copysign(min(over / self._integral, abs(apart)), apart)
+        self._offsets.lower(wheel, less)
+        return apart - less
 
     def _learn(self, wheel: int, speed: float, apart: float) -> None:
         """How far a wheel is ahead at a speed [rad, rad/s]."""
@@ -118,5 +123,5 @@ class DriverLaw:
     def taken_over(self, angles: Sequence[float]) -> None:
         """The simulated drivers have added so much to their sums [rad]."""
         for wheel, angle in enumerate(angles):
-            self._offset[wheel] -= angle
+            self._offsets.lower(wheel, angle)
             self._before[wheel] -= angle

@@ -376,7 +376,6 @@ def _triple(values: Sequence[float] | Array) -> Triple:
 
 def _first_known(first: Sequence[float], other: Sequence[float]) -> list[float]:
     """Of each wheel the first value that is known."""
-
     return [a if math.isfinite(a) else b for a, b in zip(first, other, strict=True)]
 
 

@@ -23,15 +23,15 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-from attrs import evolve, frozen
+from attrs import frozen
 
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.holding import Holding
 from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.model.driver_law import DriverLaw
+from tomr_power_model.model.offsets import UNKNOWN, Offsets, between
 from tomr_power_model.robot import WHEELS, Robot
 
-_UNKNOWN = float("nan")
 _MOVING = 1.0  # rad/s
 _FADES = 0.1  # 1/s, of the difference in motion, ...
 _FADES_SOON, _SOON = 2.1, 2.0  # ... and for so many seconds after ...
@@ -68,26 +68,6 @@ class Voltages:
     simulated: list[float]  # by those of the simulation
     by_law: list[float]  # by the drivers as their law alone has it, see `DriverLaw`
 
-    @classmethod
-    def unknown(cls) -> "Voltages":
-        """Of no driver."""
-        return cls(*([_UNKNOWN] * WHEELS for _ in range(3)))
-
-    def after(self, before: "Voltages", share: float) -> "Voltages":
-        """At a share of the time since `before`, linearly; as now where that is not known."""
-        return Voltages(
-            _between(before.held, self.held, share),
-            _between(before.simulated, self.simulated, share),
-            self.by_law,
-        )
-
-
-def _between(before: Sequence[float], now: Sequence[float], share: float) -> list[float]:
-    return [
-        first + share * (last - first) if first == first else last
-        for first, last in zip(before, now, strict=True)
-    ]
-
 
 class RestingDrivers:
     """Sums of the drivers, one per wheel."""
@@ -106,8 +86,9 @@ class RestingDrivers:
 
     def clear(self) -> None:
         """What the drivers' sums hold is not known until the next command."""
-        self._offset = [_UNKNOWN] * WHEELS  # rad
-        self._before = Voltages.unknown()  # at the end of the last tick
+        self._offsets = Offsets()
+        # At the end of the last tick [V], of the drivers and of the simulated ones.
+        self._before = [UNKNOWN] * WHEELS, [UNKNOWN] * WHEELS
         self._strange = [False] * WHEELS  # differences that are not the drivers'
         self._soon = [0] * WHEELS  # ticks for which they fade soon
         self._followed = [False] * WHEELS  # in the last tick
@@ -115,7 +96,7 @@ class RestingDrivers:
 
     def forget(self) -> None:
         """The drivers were asked for what is not known: what their sums differ by means nothing."""
-        self._offset = [_UNKNOWN] * WHEELS
+        self._offsets.forget()
         self._law.forget()
 
     def voltages(
@@ -137,7 +118,7 @@ class RestingDrivers:
             share: of the tick at that time.
         """
         if path.state is None:
-            return Voltages.unknown()
+            return Voltages(*([UNKNOWN] * WHEELS for _ in range(3)))
         turned, sums, asked = (path.wheel(part) for part in (at.TURNED, at.INTEGRAL, at.ASKED))
         ahead = [turned[wheel] - angle[wheel] for wheel in range(WHEELS)]
         found, expected, apart = [], [], []
@@ -145,19 +126,19 @@ class RestingDrivers:
             if abs(speed[wheel]) > _TURNS:
                 self._strange[wheel] = False
             fades = self._fades(wheel, speed[wheel], simulated[wheel])
-            apart.append(self._difference(wheel, ahead[wheel], fades))
+            apart.append(self._offsets.beyond(wheel, ahead[wheel], fades))
             known = apart[wheel] if apart[wheel] == apart[wheel] else 0.0
             here, there = asked[wheel] - speed[wheel], asked[wheel] - simulated[wheel]
             expected.append(self._proportional * there + self._integral * sums[wheel])
             found.append(self._proportional * here + self._integral * (sums[wheel] + known))
-        now = Voltages(found, expected, []).after(self._before, share)
+        held, simulates = map(between, self._before, (found, expected), (share, share))
         beyond = self._law.beyond(ahead, speed, simulated, expected=expected, share=share)
         taken = self._follow(path, apart, ahead, speed)
         self._law.taken_over(taken)
         after = [volts + self._integral * more for volts, more in zip(expected, taken, strict=True)]
-        self._before = Voltages(found, after, [])
-        by_law = [volts + more for volts, more in zip(now.simulated, beyond, strict=True)]
-        return evolve(now, by_law=by_law)
+        self._before = found, after
+        by_law = [volts + more for volts, more in zip(simulates, beyond, strict=True)]
+        return Voltages(held, simulates, by_law)
 
     def _fades(self, wheel: int, speed: float, simulated: float) -> float:
         """Share of the difference that a tick takes off, of a wheel that turns so [rad/s]."""
@@ -170,17 +151,6 @@ class RestingDrivers:
             return self._slowly
         self._soon[wheel] -= 1
         return self._quickly
-
-    def _difference(self, wheel: int, ahead: float, fades: float) -> float:
-        """What a driver's sum is over the simulation's [rad], NaN where not known.
-
-        `ahead`: by how much the simulated wheel has turned further [rad]; `fades`: share of the
-        difference that motion takes off, 0 at rest.
-        """
-        if self._offset[wheel] != self._offset[wheel]:
-            self._offset[wheel] = -ahead
-        self._offset[wheel] -= fades * (ahead + self._offset[wheel])
-        return ahead + self._offset[wheel]
 
     def _follow(
         self,
@@ -198,7 +168,8 @@ class RestingDrivers:
             excess = abs(simulated[wheel]) - abs(asked[wheel])
             if self._followed[wheel] and excess > _CREEPS:
                 # With such a sum it would turn, and it does not: the difference is another's.
-                self._strange[wheel], self._offset[wheel] = True, -ahead[wheel]
+                self._strange[wheel] = True
+                self._offsets.equal(wheel, ahead[wheel])
             is_slow = excess < _CREEPS and abs(simulated[wheel]) < _SLOW
             rests = is_slow and abs(speed[wheel]) < _STANDS and not self._strange[wheel]
             more = _FOLLOWS * apart[wheel]  # NaN where not known
@@ -206,7 +177,7 @@ class RestingDrivers:
             self._followed[wheel] = follows
             if follows:
                 path.add_to_sum(wheel, more)
-                self._offset[wheel] -= more
+                self._offsets.lower(wheel, more)
                 taken[wheel] = more
         return taken
 

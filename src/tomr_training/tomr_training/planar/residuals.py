@@ -25,6 +25,7 @@ from tomr_training.planar.sensors import Signals
 
 Array = NDArray[np.float64]
 
+_SPEEDS = slice(4, 7)
 _WINDOW = ResidualSettings().encoder_window / NANOSECONDS  # s
 
 
@@ -40,16 +41,19 @@ class Compared:
     def residuals(self, bands: BandSettings) -> tuple[Array, Array]:
         """Residuals and bands, (ticks, 10), as `ResidualStage` gives them."""
         residual = self.measured - self.modelled
-        speeds = slice(4, 7)
-        residual[:, speeds] *= np.where(self.modelled[:, speeds] < 0.0, -1.0, 1.0)
-        motors = [bands.power] * 3
-        floor = np.array([bands.power * bands.total_factor, *motors, *[bands.speed] * 3, *motors])
-        motors = [bands.relative] * 3
-        relative = np.array([bands.total_relative, *motors, *[bands.speed_relative] * 3, *motors])
-        band = np.maximum(floor, relative * np.abs(self.modelled))
-        change = np.full(10, bands.transient)
-        change[speeds] = bands.speed_transient
-        return residual, band + change * spread(self.modelled)
+        residual[:, _SPEEDS] *= np.where(self.modelled[:, _SPEEDS] < 0.0, -1.0, 1.0)
+        return residual, widths(self.modelled, bands)
+
+
+def widths(modelled: Array, bands: BandSettings) -> Array:
+    """Half widths of the bands around modelled values, (ticks, 10) each."""
+    motors = [bands.power] * 3
+    floor = np.array([bands.power * bands.total_factor, *motors, *[bands.speed] * 3, *motors])
+    motors = [bands.relative] * 3
+    relative = np.array([bands.total_relative, *motors, *[bands.speed_relative] * 3, *motors])
+    change = np.full(10, bands.transient)
+    change[_SPEEDS] = bands.speed_transient
+    return np.asarray(np.maximum(floor, relative * np.abs(modelled)) + change * spread(modelled))
 
 
 def compare(drive: Drive, signals: Signals) -> Compared:
