@@ -96,6 +96,16 @@ def test_short_drive_is_a_no_go_that_says_what_to_record(done: Path) -> None:
     assert page.count("data:image/png") == 2
 
 
+def test_simulated_motors_are_as_near_to_their_values_as_voltages_say(
+    done: Path, steps: dict[str, Mock]
+) -> None:
+    """The recorded robot equals its description."""
+    assert (done / "commission.json").exists()
+    plans = [call.args[-1] for call in steps["rehearse"].call_args_list]
+    assert plans
+    assert all(plan.electrical < 0.5 * plan.off for plan in plans)
+
+
 def test_small_faults_are_looked_for_from_then_on(done: Path, steps: dict[str, Mock]) -> None:
     """In simulated hours and in trials as well, as a robot will be judged."""
     written = done / "commissioned.yaml"

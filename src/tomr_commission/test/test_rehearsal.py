@@ -48,6 +48,9 @@ def test_shoves_show_in_the_residuals_and_only_there() -> None:
         near |= (seen.seconds > bump.start - 0.1) & (seen.seconds < bump.start + 2.0)
     assert len(drive.bumps) == 3
     assert size[near].max() > 3.0 * size[~near].max()
+    volts = np.abs(seen.volts[:, :3]).max(axis=1)
+    assert volts[near].max() > 1.0
+    assert volts[seen.seconds < drive.bumps[0].start - 0.1].max() < 0.1
 
 
 @pytest.mark.parametrize(("seed", "stands"), [(80_000_000, True), (80_000_001, False)])

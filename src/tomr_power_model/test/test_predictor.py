@@ -129,6 +129,24 @@ def test_a_wheel_that_turns_is_asked_of_its_motion_and_not_of_its_voltage() -> N
     assert found[0] == found[1]
 
 
+def test_a_driver_holds_what_it_says_else_what_its_law_makes_of_the_motion() -> None:
+    """The robot does as simulated, so both are what the simulation has."""
+    robot = shipped_robot("reference")
+    predictor, predictions = PowerPredictor(robot), []
+    for at_ms, kind in _events(2000):
+        stamp = BASE + at_ms * MS
+        if at_ms > 1000:
+            predictor.voltages(stamp, (7.0, math.nan, math.nan))
+        if kind == "command":
+            predictor.command(stamp, (0.0, 0.0, 0.0))
+        else:
+            predictor.encoders(stamp, (0.0, 0.0, 0.0), NAN3)
+        predictions += predictor.due()
+    said, law = predictions[-1], predictions[10]
+    assert (law.voltage, law.held) == ((0.0,) * 3, (0.0,) * 3)
+    assert (said.voltage, said.held) == ((0.0,) * 3, (7.0, 0.0, 0.0))
+
+
 def test_without_encoders_only_the_commands_speak() -> None:
     events = [(t, kind) for t, kind in _events(2000) if kind == "command" or t < 500]
     last = _run(events)[-1]

@@ -1,6 +1,7 @@
 """What drivers hold while their wheels are at rest, by hand."""
 
 import math
+from collections.abc import Callable
 
 import pytest
 from attrs import evolve
@@ -128,6 +129,29 @@ def test_what_a_push_leaves_in_a_driver_is_expected_of_its_wheel(path: CommandPa
     assert path.wheel(at.INTEGRAL)[0] == pytest.approx(-PUSHED, abs=1e-5)
     assert volts[0] == pytest.approx(-12.0 * PUSHED)  # and none of it counts twice
     assert path.wheel(at.INTEGRAL)[1:] == [0.0, 0.0]
+
+
+def test_by_its_law_a_driver_holds_the_same_whoever_has_summed_it_up(path: CommandPath) -> None:
+    """What the simulation takes over is no difference any more, and what it expects instead."""
+    drivers = RestingDrivers(ROBOT, TICK)
+    _volts(drivers, path, REST)
+    for _ in range(40):
+        found = drivers.voltages(path, (PUSHED, 0.0, 0.0), REST, simulated=REST, share=1.0)
+        assert found.by_law[0] == pytest.approx(-12.0 * PUSHED)
+    assert found.simulated[0] == pytest.approx(-12.0 * PUSHED, abs=1e-4)
+
+
+@pytest.mark.parametrize("restart", [RestingDrivers.clear, RestingDrivers.forget])
+def test_by_its_law_a_driver_begins_as_simulated(
+    path: CommandPath, restart: Callable[[RestingDrivers], None]
+) -> None:
+    drivers = RestingDrivers(ROBOT, TICK)
+    _volts(drivers, path, REST)
+    far = (0.6, 0.0, 0.0)  # more than a push leaves
+    assert drivers.voltages(path, far, REST, simulated=REST, share=1.0).by_law[0] < -7.0
+    restart(drivers)
+    found = drivers.voltages(path, far, REST, simulated=REST, share=1.0)
+    assert found.by_law == found.simulated
 
 
 def test_a_wheel_that_hardly_moves_stands(path: CommandPath) -> None:
