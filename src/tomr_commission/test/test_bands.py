@@ -65,6 +65,9 @@ def test_the_bands_of_voltages_are_those_of_healthy_drivers(steady: Steady) -> N
     found = bands_of([evolve(drive, volts=volts)], BandChoice(margin=1.5))
     width = max(found.voltage, 6.0 * found.voltage_relative)
     assert width == pytest.approx(1.5 * 3.29 * 0.03, rel=0.1)
+    plain = bands_of([evolve(drive, volts=volts)], BandChoice(margin=1.0))
+    for name in ("voltage", "voltage_relative", "voltage_transient"):
+        assert getattr(found, name) == pytest.approx(1.5 * getattr(plain, name), rel=1e-3)
     unknown = bands_of([drive], BandChoice())  # its drivers' law is not known
     assert unknown.voltage == usual.voltage
     assert unknown.voltage_relative == usual.voltage_relative

@@ -39,7 +39,9 @@ def _prediction(stamp: int, power: float = 10.0, current: float | None = None) -
     reading = SupplyReading.rounded(24.0, drawn)
     total = SupplyReading.rounded(24.0, (3 * power + 12.0) / 24.0)
     motors = (reading, reading, reading)
-    return Prediction(stamp, SPEED, (0.1, 0.1, 0.1), motors, total, motors)
+    volts = (power, -power, 0.0)
+    held = (power + 1.0, -power, 0.0)
+    return Prediction(stamp, SPEED, (0.1, 0.1, 0.1), motors, total, motors, volts, held)
 
 
 def _battery(stamp: int, voltage: float, current: float) -> Any:
@@ -97,6 +99,14 @@ def test_a_healthy_robot_has_ten_known_zeros() -> None:
         assert frame.codes == (0,) * 10
         assert not any(residual.stale for residual in frame.residuals)
         assert all(abs(residual.residual) < 1e-2 for residual in frame.residuals)
+
+
+def test_what_a_driver_holds_is_compared_with_what_is_expected_of_it() -> None:
+    frame = _frames(_robot(), ALL)[-1]
+    assert [item.residual for item in frame.voltages] == [1.0, 0.0, 0.0]
+    assert [item.modelled for item in frame.voltages] == [10.0, -10.0, 0.0]
+    bands = ResidualSettings().bands
+    assert [item.band for item in frame.voltages] == [1.0, 1.0, bands.voltage]
 
 
 def test_signs_and_places() -> None:
@@ -260,6 +270,7 @@ def test_after_a_leap_back_the_stage_is_as_at_its_start() -> None:
     again, wanted = frames(used, 14.0, BASE), frames(fresh, 14.0, BASE)
     # Encoders are a gap at first: who knows what happened meanwhile.
     assert repr(again[6:]) == repr(wanted[6:])  # NaN is not equal to itself
+    assert [frame.voltages for frame in again[1:]] == [frame.voltages for frame in wanted[1:]]
     motors = [[frame.residuals[place] for place in MOTORS] for frame in again[1:]]
     assert motors == [[frame.residuals[place] for place in MOTORS] for frame in wanted[1:]]
 
