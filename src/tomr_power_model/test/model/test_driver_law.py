@@ -53,6 +53,9 @@ def test_what_a_push_left_before_the_first_command_is_soon_forgotten() -> None:
         beyond(law, [0.03, 0.0, 0.0], [5.0, 0.0, 0.0])
     later = beyond(law, [0.06, 0.0, 0.0], [5.0, 0.0, 0.0])[0]
     assert later == pytest.approx(0.03 * INTEGRAL, rel=0.05)  # what comes then stays
+    beyond(law, [0.06, 0.0, 0.0], [5.0, 0.0, 0.0], [5.5, 0.0, 0.0])  # nor does a shove change that
+    later = beyond(law, [0.06, 0.0, 0.0], [5.0, 0.0, 0.0])[0]
+    assert later == pytest.approx(0.03 * INTEGRAL, rel=0.05)
     law.forget()
     beyond(law, [0.06, 0.0, 0.0])
     for _ in range(20):
@@ -63,6 +66,19 @@ def test_what_a_push_left_before_the_first_command_is_soon_forgotten() -> None:
 def test_what_a_wheel_falls_behind_is_summed_up(law: DriverLaw) -> None:
     found = beyond(law, [0.01, 0.0, -0.02])
     assert found == pytest.approx([0.01 * INTEGRAL, 0.0, -0.02 * INTEGRAL])
+
+
+def test_what_a_shove_does_while_a_wheel_begins_to_turn_is_forgotten_as_well() -> None:
+    law, turns = DriverLaw(ROBOT, TICK), [5.0, 0.0, 0.0]
+    for _ in range(30):
+        beyond(law, STILL, turns)
+    for _ in range(4):  # behind, and catching up
+        beyond(law, [0.05, 0.0, 0.0], turns, [5.3, 0.0, 0.0])
+    for _ in range(40):
+        found = beyond(law, STILL, turns)
+    assert abs(found[0]) < 0.001 * INTEGRAL
+    later = beyond(law, [0.01, 0.0, 0.0], turns)
+    assert later[0] == pytest.approx(0.01 * INTEGRAL, rel=0.05)
 
 
 def test_a_wheel_that_is_slower_is_driven_at_once(law: DriverLaw) -> None:

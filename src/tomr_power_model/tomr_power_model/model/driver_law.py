@@ -4,9 +4,9 @@
 
 for both are asked for the same, and sum up their errors. The motion alone shows it, whatever
 friction there is. The offset is what the two sums differed by at the beginning, which a push may
-have left: it fades in the first two seconds of motion. Jitter of the commands adds to it later, so
-it goes on to fade while the wheel turns, slowly: what stays in the voltage shows for minutes. A
-driver gives no more than its supply, and then does not sum up.
+have left: it fades until the wheel has turned as simulated for two seconds. Jitter of the commands
+adds to it later, so it goes on to fade while the wheel turns, slowly: what stays in the voltage
+shows for minutes. A driver gives no more than its supply, and then does not sum up.
 
 Real drivers take up a command when their period begins, up to half a period before or after the
 simulated ones do. A wheel at omega is ahead by omega times that, all three alike: the middle one of
@@ -21,7 +21,8 @@ from tomr_power_model.robot import WHEELS, Robot
 
 _MOVING = 1.0  # rad/s
 _FADES = 0.03  # 1/s, of the difference in motion, ...
-_FADES_FIRST, _FIRST = 2.1, 2.0  # ... and in its first so many seconds
+_FADES_FIRST, _FIRST = 2.1, 2.0  # ... and until, so many seconds on end, ...
+_ALIKE = 0.2  # ... the wheel has turned as simulated [rad/s]
 _LIKE = 0.5  # rad/s, by which a wheel turns as simulated
 _MEMORY = 30.0  # s, over which the delay of the drivers is estimated
 _LITTLE = 90.0  # (rad/s)^2: half a second at 3 rad/s, before which there is taken to be none
@@ -78,7 +79,8 @@ class DriverLaw:
         for wheel in range(WHEELS):
             apart = UNKNOWN  # an angle that is lost for a moment leaves the offset as it is
             if ahead[wheel] == ahead[wheel]:
-                apart = self._offsets.beyond(wheel, ahead[wheel], self._fades(wheel, speed[wheel]))
+                fades = self._fades(wheel, speed[wheel], slower[wheel])
+                apart = self._offsets.beyond(wheel, ahead[wheel], fades)
             volts = expected[wheel] + self._proportional * slower[wheel]
             now.append(self._limited(wheel, apart, volts))
         delay, sums = self._delay(), between(self._before, now, share)
@@ -91,13 +93,16 @@ class DriverLaw:
             for less, apart, turns in zip(slower, sums, simulated, strict=True)
         ]
 
-    def _fades(self, wheel: int, speed: float) -> float:
-        """Share of an offset that a tick takes off, of a wheel that turns so [rad/s]."""
+    def _fades(self, wheel: int, speed: float, slower: float) -> float:
+        """Share of an offset that a tick takes off, of a wheel that turns so, and so much slower
+        than simulated [rad/s]."""
         if not abs(speed) > _MOVING:
             return 0.0
         if not self._begins[wheel]:
             return self._later
         self._begins[wheel] -= 1
+        if abs(slower) > _ALIKE:
+            self._begins[wheel] = self._lasts
         return self._first
 
     def _limited(self, wheel: int, apart: float, volts: float) -> float:
