@@ -127,24 +127,36 @@ def test_a_lasting_difference_fades_in_half_a_minute_of_motion_not_at_rest(law: 
     assert found[0] == pytest.approx(0.02 * INTEGRAL / math.e, rel=0.01)
 
 
+def late_by(law: DriverLaw, delay: float, ticks: int) -> list[float]:
+    """Of drivers that much late [s], of wheels that turn to and fro; the last tick's voltages."""
+    for tick in range(ticks):
+        speeds = TURNING if tick % 20 < 10 else [-speed for speed in TURNING]
+        found = beyond(law, [delay * speed for speed in speeds], speeds)
+    return found
+
+
 def test_drivers_that_begin_later_hold_no_other_voltage(law: DriverLaw) -> None:
-    late = 0.002  # s, less than a period
-    ahead = [late * speed for speed in TURNING]
-    first = beyond(law, ahead, TURNING)
-    assert first[0] == pytest.approx(late * TURNING[0] * INTEGRAL, rel=0.01)
-    for _ in range(200):
-        last = beyond(law, ahead, TURNING)
-    assert max(map(abs, last)) < 0.1 * first[0]
+    first, *_ = late_by(law, 0.002, 11)  # less than a period, and they have just turned round
+    last = late_by(law, 0.002, 200)
+    assert max(map(abs, last)) < 0.1 * abs(first)
+
+
+def test_a_delay_that_an_offset_has_swallowed_is_none_when_wheels_turn_round() -> None:
+    law, late = DriverLaw(ROBOT, TICK), [0.002 * speed for speed in TURNING]
+    beyond(law, STILL)
+    for _ in range(40):
+        beyond(law, late, TURNING)  # at once in the offset
+    late_by(law, 0.002, 200)
+    assert max(map(abs, beyond(law, late, TURNING))) < 0.1 * 0.002 * TURNING[0] * INTEGRAL
+    assert max(map(abs, beyond(law, STILL))) < 0.1 * 0.002 * TURNING[0] * INTEGRAL
 
 
 def test_a_delay_that_changes_is_followed_within_a_minute(law: DriverLaw) -> None:
     for late in (0.002, -0.002):
-        ahead = [late * speed for speed in TURNING]
-        for _ in range(1200):
-            found = beyond(law, ahead, TURNING)
+        found = late_by(law, late, 1200)
     assert abs(found[0]) < 0.5 * 0.002 * TURNING[0] * INTEGRAL
     law.clear()  # of another robot, or after a leap of the clock, none is known
-    beyond(law, STILL, TURNING)
+    beyond(law, STILL)
     again = beyond(law, [0.002 * speed for speed in TURNING], TURNING, share=1.0)
     assert again[0] == pytest.approx(0.9 * 0.002 * TURNING[0] * INTEGRAL, rel=0.02)
 
@@ -163,12 +175,9 @@ def test_one_wheel_alone_is_not_late(law: DriverLaw) -> None:
 
 def test_no_driver_is_later_than_a_period(law: DriverLaw) -> None:
     period = 1.0 / ROBOT.controller.rate
-    late = 4.0 * period
-    ahead = [late * speed for speed in TURNING]
-    for _ in range(200):
-        found = beyond(law, ahead, TURNING)
-    left = (late * math.exp(-0.03 * 10.0) - period) * TURNING[0] * INTEGRAL
-    assert found[0] == pytest.approx(left, rel=0.02)
+    before, *_ = late_by(law, 4.0 * period, 600)
+    after, *_ = late_by(law, 4.0 * period, 1)  # they turn round
+    assert after - before == pytest.approx(2.0 * 3.0 * period * TURNING[0] * INTEGRAL, rel=0.02)
 
 
 def test_wheels_that_turn_otherwise_than_simulated_say_nothing_of_a_delay(law: DriverLaw) -> None:

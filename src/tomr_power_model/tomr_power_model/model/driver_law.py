@@ -4,13 +4,15 @@
 
 for both are asked for the same, and sum up their errors. The motion alone shows it, whatever
 friction there is. The offset is what the two sums differed by at the beginning, which a push may
-have left: it fades until the wheel has turned as simulated for two seconds. Jitter of the commands
-adds to it later, so it goes on to fade while the wheel turns, slowly: what stays in the voltage
-shows for minutes. A driver gives no more than its supply, and then does not sum up.
+have left: it fades until the wheel has turned as simulated for two seconds on end, but not while
+it turns otherwise, for then the sums do differ. Jitter of the commands adds to it later, so it goes
+on to fade while the wheel turns, slowly: what stays in the voltage shows for minutes. A driver
+gives no more than its supply, and then does not sum up.
 
 Real drivers take up a command when their period begins, up to half a period before or after the
-simulated ones do. A wheel at omega is ahead by omega times that, all three alike: the middle one of
-the three delays that the last half minute shows is no difference of voltages.
+simulated ones do. A wheel that turns faster by omega is ahead by omega times that, all three alike:
+the middle one of the three delays that the last half minute shows is no difference of voltages.
+Faster than in the motion in which the offset faded, for that is part of the offset.
 """
 
 import math
@@ -54,6 +56,7 @@ class DriverLaw:
         """They were asked for what is not known: what their sums differ by means nothing."""
         self._offsets = Offsets()
         self._before = [UNKNOWN] * WHEELS  # what the sums differed by at the end of the last tick
+        self._usual = [UNKNOWN] * WHEELS  # speeds that the offsets stand for [rad/s]
         self._begins = [self._lasts] * WHEELS  # ticks of motion in which an offset fades soon
 
     def beyond(
@@ -81,16 +84,18 @@ class DriverLaw:
             if ahead[wheel] == ahead[wheel]:
                 fades = self._fades(wheel, speed[wheel], slower[wheel])
                 apart = self._offsets.beyond(wheel, ahead[wheel], fades)
+                self._follow_usual(wheel, simulated[wheel], fades)
             volts = expected[wheel] + self._proportional * slower[wheel]
             now.append(self._limited(wheel, apart, volts))
         delay, sums = self._delay(), between(self._before, now, share)
+        faster = [turns - usual for turns, usual in zip(simulated, self._usual, strict=True)]
         for wheel, apart in enumerate(now):
             if abs(slower[wheel]) < _LIKE and apart == apart:
-                self._learn(wheel, simulated[wheel], apart)
+                self._learn(wheel, faster[wheel], apart)
         self._before = now
         return [
-            self._proportional * less + self._integral * (apart - delay * turns)
-            for less, apart, turns in zip(slower, sums, simulated, strict=True)
+            self._proportional * less + self._integral * (apart - delay * more)
+            for less, apart, more in zip(slower, sums, faster, strict=True)
         ]
 
     def _fades(self, wheel: int, speed: float, slower: float) -> float:
@@ -100,10 +105,17 @@ class DriverLaw:
             return 0.0
         if not self._begins[wheel]:
             return self._later
-        self._begins[wheel] -= 1
         if abs(slower) > _ALIKE:
             self._begins[wheel] = self._lasts
+            return self._later
+        self._begins[wheel] -= 1
         return self._first
+
+    def _follow_usual(self, wheel: int, simulated: float, fades: float) -> None:
+        """Let the speed that an offset stands for fade as the offset does."""
+        if self._usual[wheel] != self._usual[wheel]:
+            self._usual[wheel] = simulated
+        self._usual[wheel] += fades * (simulated - self._usual[wheel])
 
     def _limited(self, wheel: int, apart: float, volts: float) -> float:
         """By how much a driver's sum can be ahead [rad], that gives so much [V] without that."""
@@ -115,7 +127,7 @@ class DriverLaw:
         return apart - less
 
     def _learn(self, wheel: int, speed: float, apart: float) -> None:
-        """How far a wheel is ahead at a speed [rad, rad/s]."""
+        """How far a wheel is ahead that turns faster by so much [rad, rad/s]."""
         self._squares[wheel] = self._forgets * self._squares[wheel] + speed * speed
         self._products[wheel] = self._forgets * self._products[wheel] + speed * apart
 
