@@ -21,6 +21,7 @@ from tomr_demo.acts import twist_at
 from tomr_demo.topics import Topic
 from tomr_power_model.messages.bag import jazzy_typestore
 from tomr_power_model.messages.plain import NANOSECONDS
+from tomr_power_model.nodes.leaving import leave
 from tomr_power_model.nodes.stage_node import message_class, to_ros
 from tomr_power_model.recordings import RecordingWriter
 from tomr_power_model.robot.parameters import Value
@@ -99,7 +100,7 @@ class Director(Node):
     def close(self) -> None:
         """Leave the graph."""
         self._executor.shutdown()
-        self.destroy_node()
+        leave(self)
 
     def _listen(self, name: str, topic: Topic) -> None:
         reliability = (

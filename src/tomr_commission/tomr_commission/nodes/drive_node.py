@@ -18,6 +18,7 @@ from tomr_power_model.errors import InputError
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.messages.types import IMU, MULTI_ARRAY, ODOMETRY, TWIST, TWIST_TYPES
 from tomr_power_model.nodes.command_type import chosen_type
+from tomr_power_model.nodes.leaving import leave
 from tomr_power_model.nodes.stage_node import SENSOR_QOS, make_executor, message_class, to_ros
 from tomr_power_model.recordings import RecordingWriter
 from tomr_power_model.robot import Robot
@@ -160,7 +161,7 @@ class DriveNode(Node):
     def close(self) -> None:
         """Leave the graph."""
         self._executor.shutdown()
-        self.destroy_node()
+        leave(self)
 
     def _encoders(
         self, stamp_ns: int, position: tuple[float, ...], velocity: tuple[float, ...]

@@ -28,6 +28,7 @@ from tomr_power_model.errors import InputError, one_line
 from tomr_power_model.messages.outgoing import TYPES, DiagnosticMessage, Outgoing
 from tomr_power_model.messages.plain import Plain, build
 from tomr_power_model.nodes.command_type import CommandType
+from tomr_power_model.nodes.leaving import leave
 from tomr_power_model.nodes.reliability import subscription_qos
 from tomr_power_model.nodes.robot_parameters import declare_robot, declare_specs
 from tomr_power_model.robot import Robot
@@ -330,7 +331,7 @@ def run_node(make: Callable[[], Node], arguments: list[str] | None = None) -> in
         executor.spin_once(_SIGNAL_CHECK_S)
         failure = getattr(node, "failure", None)
     executor.shutdown()
-    node.destroy_node()
+    leave(node)
     rclpy.try_shutdown()
     if failure is not None:
         raise failure

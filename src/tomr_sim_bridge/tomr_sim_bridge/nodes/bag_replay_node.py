@@ -22,6 +22,7 @@ from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.nodes.command_line import node_arguments
+from tomr_power_model.nodes.leaving import leave
 from tomr_power_model.nodes.robot_parameters import declare_specs
 from tomr_power_model.nodes.stage_node import StopRequest, message_class
 from tomr_power_model.recordings import Recording, open_recording
@@ -193,7 +194,7 @@ def run_replay(arguments: Sequence[str] | None = None) -> int:
         try:
             BagReplay(node, lambda: stop.is_set).replay()
         finally:
-            node.destroy_node()
+            leave(node)
     finally:
         rclpy.shutdown()
     return EXIT_OK
