@@ -92,6 +92,18 @@ def test_table_shows_the_scatter(steady: Steady) -> None:
     assert line.regime == "steady"
     assert line.rms == pytest.approx(0.1, rel=0.05)
     assert line.high == pytest.approx(0.329, rel=0.1)  # 99.9 % of |normal|: 3.29 sigma
+    assert not any(one.kind == "driver's voltage" for one in lines)  # which is not known
+
+
+def test_table_shows_the_drivers_voltages(steady: Steady) -> None:
+    drive = steady()
+    volts = np.full((len(drive.stamp_ns), 6), 0.2)
+    volts[:, 3:] = 5.0
+    bands = evolve(BandSettings(), voltage=0.1, voltage_relative=0.0)
+    lines = regime_table([evolve(drive, volts=volts)], bands)
+    line = next(one for one in lines if one.kind == "driver's voltage")
+    assert (line.regime, line.unit, line.count) == ("steady", "V", 3 * len(volts))
+    assert (line.rms, line.high, line.outside) == pytest.approx((0.2, 0.2, 1.0))
 
 
 def test_drag_is_power_over_speed(steady: Steady) -> None:

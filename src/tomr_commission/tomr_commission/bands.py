@@ -1,6 +1,6 @@
 """Bands of one robot: how its residuals scatter in healthy driving, and in which regime."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from attrs import asdict, evolve, frozen
@@ -12,6 +12,7 @@ from tomr_commission.observed import (
     band_of,
     moved,
     reports_currents,
+    voltage_bands_of,
     yaw_band_of,
 )
 from tomr_commission.request import BandChoice
@@ -131,31 +132,45 @@ class RegimeLine:
 def regime_table(drives: Sequence[Observed], bands: BandSettings) -> list[RegimeLine]:
     """Residuals of drives by regime and kind."""
     masks = [regimes(drive) for drive in drives]
-    widths = [band_of(drive, bands) for drive in drives]
+    parts = [[*_by_kind(drive, bands)] for drive in drives]
     lines = []
     for regime in masks[0]:
-        for kind, channels in KINDS.items():
+        for same in zip(*parts, strict=True):
             sizes, ratios = [], []
-            for drive, mask, width in zip(drives, masks, widths, strict=True):
-                rows = mask[regime] if len(channels) > 1 else _any_or_all(mask, regime)
-                known = rows & np.isfinite(drive.residual[:, channels])
-                size = np.abs(drive.residual[:, channels])[known]
+            for mask, one in zip(masks, same, strict=True):
+                wide = one.residual.shape[1] > 1
+                rows = mask[regime] if wide else _any_or_all(mask, regime)
+                known = rows & np.isfinite(one.residual)
+                size = np.abs(one.residual)[known]
                 sizes.append(size)
-                ratios.append(size / width[:, channels][known])
+                ratios.append(size / one.band[known])
             size, ratio = np.concatenate(sizes), np.concatenate(ratios)
             if len(size):
-                lines.append(
-                    RegimeLine(
-                        regime,
-                        kind,
-                        str(drives[0].units[channels[0]]),
-                        len(size),
-                        float(np.sqrt(np.mean(size**2))),
-                        float(np.quantile(size, 0.999)),
-                        float(np.mean(ratio > 1.0)),
-                    )
-                )
+                rms, high = float(np.sqrt(np.mean(size**2))), float(np.quantile(size, 0.999))
+                share = float(np.mean(ratio > 1.0))
+                kind, unit = same[0].kind, same[0].unit
+                lines.append(RegimeLine(regime, kind, unit, len(size), rms, high, share))
     return lines
+
+
+@frozen
+class _Part:
+    """Residuals of one kind in a drive, and half widths of their bands, (n, k) each."""
+
+    kind: str
+    unit: str
+    residual: Array
+    band: Array
+
+
+def _by_kind(drive: Observed, bands: BandSettings) -> Iterator[_Part]:
+    """The residuals that bands are fitted to, and those of the drivers' voltages."""
+    widths = band_of(drive, bands)
+    for kind, channels in KINDS.items():
+        unit = str(drive.units[channels[0]])
+        yield _Part(kind, unit, drive.residual[:, channels], widths[:, channels])
+    volts = drive.volts[:, :WHEELS]
+    yield _Part("driver's voltage", "V", volts, voltage_bands_of(drive, bands))
 
 
 def _any_or_all(mask: Mapping[str, Mask], regime: str) -> Mask:
