@@ -1,10 +1,14 @@
 """How a node leaves ROS, and that it does whatever DDS does."""
 
+import faulthandler
 import sys
 from collections.abc import Callable
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
+
+from tomr_power_model.nodes.leaving import leave
 
 NODE = """
 import ctypes, sys
@@ -41,3 +45,15 @@ def test_a_node_takes_its_topics_back_and_ends_even_if_dds_holds_it(
     node.wait_for_output("is up")
     assert node.stop() == code
     assert said in node.output
+
+
+def test_a_process_that_goes_on_is_not_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = Mock()
+    for name in ("dump_traceback_later", "cancel_dump_traceback_later"):
+        monkeypatch.setattr(faulthandler, name, getattr(calls, name))
+    leave(Mock(subscriptions=[], publishers=[], services=[], destroy_node=calls.destroy_node))
+    assert [name for name, *_ in calls.mock_calls] == [
+        "dump_traceback_later",
+        "destroy_node",
+        "cancel_dump_traceback_later",
+    ]

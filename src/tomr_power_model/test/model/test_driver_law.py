@@ -68,17 +68,18 @@ def test_what_a_wheel_falls_behind_is_summed_up(law: DriverLaw) -> None:
     assert found == pytest.approx([0.01 * INTEGRAL, 0.0, -0.02 * INTEGRAL])
 
 
-def test_what_a_shove_does_while_a_wheel_begins_to_turn_is_forgotten_as_well() -> None:
-    law, turns = DriverLaw(ROBOT, TICK), [5.0, 0.0, 0.0]
+def test_what_a_shove_leaves_while_a_wheel_begins_to_turn_is_forgotten_as_well() -> None:
+    law, turns, behind = DriverLaw(ROBOT, TICK), [5.0, 0.0, 0.0], [0.05, 0.0, 0.0]
     for _ in range(30):
         beyond(law, STILL, turns)
-    for _ in range(4):  # behind, and catching up
-        beyond(law, [0.05, 0.0, 0.0], turns, [5.3, 0.0, 0.0])
-    for _ in range(40):
-        found = beyond(law, STILL, turns)
-    assert abs(found[0]) < 0.001 * INTEGRAL
-    later = beyond(law, [0.01, 0.0, 0.0], turns)
-    assert later[0] == pytest.approx(0.01 * INTEGRAL, rel=0.05)
+    for _ in range(4):
+        shoved = beyond(law, behind, turns, [5.3, 0.0, 0.0])
+    assert shoved[0] == pytest.approx(0.05 * INTEGRAL + 0.3 * PROPORTIONAL, rel=0.01)  # it is real
+    for _ in range(40):  # two seconds anew
+        found = beyond(law, behind, turns)
+    assert found[0] == pytest.approx(0.05 * INTEGRAL * math.exp(-2.0 * 2.1), rel=0.02)
+    behind = [0.06, 0.0, 0.0]
+    assert beyond(law, behind, turns)[0] == pytest.approx(0.01 * INTEGRAL + found[0], rel=0.02)
 
 
 def test_a_wheel_that_is_slower_is_driven_at_once(law: DriverLaw) -> None:
@@ -149,6 +150,12 @@ def test_a_delay_that_an_offset_has_swallowed_is_none_when_wheels_turn_round() -
     late_by(law, 0.002, 200)
     assert max(map(abs, beyond(law, late, TURNING))) < 0.1 * 0.002 * TURNING[0] * INTEGRAL
     assert max(map(abs, beyond(law, STILL))) < 0.1 * 0.002 * TURNING[0] * INTEGRAL
+
+
+def test_wheels_that_turn_when_commands_begin_are_no_later_for_it(law: DriverLaw) -> None:
+    late_by(law, 0.002, 200)
+    law.forget()  # of offsets, not of the delay
+    assert beyond(law, STILL, TURNING) == STILL
 
 
 def test_a_delay_that_changes_is_followed_within_a_minute(law: DriverLaw) -> None:
