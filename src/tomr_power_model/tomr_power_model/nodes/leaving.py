@@ -13,7 +13,7 @@ import time
 from rclpy.node import Node
 
 _AFTER_S, _APART_S, _TIMES = 0.1, 0.05, 8  # after the topics, and by how much processes differ
-_LONGEST_S = 3.0
+_LONGEST_S = 4.0
 
 
 def leave(node: Node) -> None:
