@@ -331,7 +331,7 @@ def run_node(make: Callable[[], Node], arguments: list[str] | None = None) -> in
         executor.spin_once(_SIGNAL_CHECK_S)
         failure = getattr(node, "failure", None)
     executor.shutdown()
-    leave(node)
+    leave(node, EXIT_OK if failure is None else EXIT_BAD_INPUT)
     rclpy.try_shutdown()
     if failure is not None:
         raise failure
