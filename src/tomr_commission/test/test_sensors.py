@@ -108,7 +108,7 @@ def test_total_alone_is_all_that_is_rehearsed(tmp_path: Path, rehearse: Mock) ->
     assert all(call.args[4].silent == SILENT for call in rehearse.call_args_list)
     assert [trial["kind"] for trial in found["trials"]] == [SIMULATED]  # no motor's sensor to fail
     kinds = {line["kind"] for line in found["regimes"]}
-    assert kinds == {"total power", "wheel speed"}
+    assert kinds == {"total power", "wheel speed", "driver's voltage"}
 
 
 @pytest.mark.parametrize("is_known", [True, False])
