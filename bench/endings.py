@@ -15,6 +15,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 
 from tqdm import tqdm
 
@@ -22,23 +23,7 @@ from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK, run_main
 
 _LONGEST_S = 10.0
 _TOGETHER_S = 1.0  # in which they find each other
-_NODE = """
-import sys
-from rclpy.node import Node
-from std_msgs.msg import String
-from tomr_power_model.nodes.stage_node import run_node
-
-class Talker(Node):
-    def __init__(self):
-        super().__init__("talker")
-        for number in range(12):
-            self.create_publisher(String, f"topic_{number}", 10)
-        for number in range(8):
-            self.create_subscription(String, f"topic_{number}", lambda _: None, 10)
-        print("is up", flush=True)
-
-sys.exit(run_node(Talker))
-"""
+_NODE = Path(__file__).with_name("talker_node.py")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -52,7 +37,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _together(count: int) -> tuple[Counter[str], float]:
     """Start nodes and end them: how often each outcome, and the longest that one took [s]."""
-    command = [sys.executable, "-c", _NODE]
+    command = [sys.executable, str(_NODE)]
     nodes = [
         subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
         for _ in range(count)

@@ -35,7 +35,7 @@ class _Event(ctypes.Structure):
 
 def leave(node: Node, code: int = 1) -> None:
     """Destroy a node; a process that DDS holds all the same says where, and ends with `code`."""
-    timer = _ends_later(code)
+    timer = ends_later(code)
     faulthandler.dump_traceback_later(_SAID_S)
     for subscription in [*node.subscriptions]:
         node.destroy_subscription(subscription)
@@ -49,7 +49,7 @@ def leave(node: Node, code: int = 1) -> None:
     ctypes.CDLL(None).timer_delete(timer)
 
 
-def _ends_later(code: int) -> ctypes.c_void_p:
+def ends_later(code: int) -> ctypes.c_void_p:
     """The timer by which the system ends this process."""
     libc, timer = ctypes.CDLL(None), ctypes.c_void_p()
     exits = ctypes.cast(libc._exit, ctypes.c_void_p).value
