@@ -49,15 +49,7 @@ from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
 from tomr_power_model.cli import run_main
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_training.drives import Drive, random_drive, severity_of, wheel_of
-from tomr_training.labels import (
-    LASTING,
-    SLIPPING,
-    Flags,
-    GroundTruth,
-    Noise,
-    deviates,
-    lasting,
-)
+from tomr_training.labels import LASTING, SLIPPING, Flags, GroundTruth, Noise, deviates, lasting
 from tomr_training.planar.faults import class_of
 from tomr_training.planar.generate import BEYOND, PAPER_OF
 from tomr_training.planar.residuals import widths
@@ -107,9 +99,8 @@ def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[Resid
     _, modelled = as_arrays(frames)
     usual, band = (widths(modelled, chosen) for chosen in (BandSettings(), bands))
     volts = np.array([[item.modelled for item in frame.voltages] for frame in frames])
-    held = bands_around(
-        volts, bands.voltage, bands.voltage_relative, bands.voltage_transient
-    ).tolist()
+    row = bands.voltage, bands.voltage_relative, bands.voltage_transient
+    held = bands_around(volts, *row).tolist()
 
     def width(item: Residual, default: float, wanted: float) -> float:
         return max(wanted, item.band) if item.band > _WIDER * default else wanted
@@ -119,11 +110,11 @@ def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[Resid
             frame,
             residuals=tuple(
                 evolve(item, band=width(item, float(default), float(wanted)))
-                for item, default, wanted in zip(frame.residuals, *row, strict=True)
+                for item, default, wanted in zip(frame.residuals, *pair, strict=True)
             ),
             voltages=_in_bands(frame, voltages),
         )
-        for frame, *row, voltages in zip(frames, usual, band, held, strict=True)
+        for frame, *pair, voltages in zip(frames, usual, band, held, strict=True)
     ]
 
 

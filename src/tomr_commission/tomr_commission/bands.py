@@ -138,8 +138,8 @@ def regime_table(drives: Sequence[Observed], bands: BandSettings) -> list[Regime
         for same in zip(*parts, strict=True):
             sizes, ratios = [], []
             for mask, one in zip(masks, same, strict=True):
-                wide = one.residual.shape[1] > 1
-                rows = mask[regime] if wide else _any_or_all(mask, regime)
+                is_of_wheels = one.residual.shape[1] > 1
+                rows = mask[regime] if is_of_wheels else _any_or_all(mask, regime)
                 known = rows & np.isfinite(one.residual)
                 size = np.abs(one.residual)[known]
                 sizes.append(size)
