@@ -234,6 +234,24 @@ def test_a_wheel_without_dry_friction_holds_nothing() -> None:
     assert path.wheel(at.INTEGRAL)[0] == 0.0
 
 
+@pytest.mark.parametrize(("held", "follows"), [(0.0, True), (0.05, False), (-0.05, True)])
+def test_of_a_wheel_that_stands_while_others_turn_friction_holds_what_is_left(
+    path: CommandPath, held: float, follows: bool
+) -> None:
+    # Its sum of 0.1 rad makes 1.2 V, 1.05 N m, and friction can hold 0.06 N m of these: it bears
+    # the rest for the body. 2 mrad more are 0.024 V, 0.021 N m.
+    drivers = RestingDrivers(ROBOT, TICK)
+    assert path.state is not None
+    wheel = at.STATE_HEADER
+    path.state[wheel + at.STATE_WHEEL + at.SPEED] = 3.0
+    path.state[wheel + at.STATE_WHEEL + at.ASKED] = 3.0
+    path.state[wheel + at.INTEGRAL] = 0.1
+    path.state[wheel + at.HELD] = held
+    _volts(drivers, path, (0.0, 0.0, 0.0))
+    _volts(drivers, path, (-PUSHED, 0.0, 0.0))
+    assert (path.wheel(at.INTEGRAL)[0] > 0.1) is follows
+
+
 def test_after_what_is_not_known_the_sums_are_taken_for_equal(path: CommandPath) -> None:
     drivers = RestingDrivers(ROBOT, TICK)
     _volts(drivers, path, REST)

@@ -162,7 +162,7 @@ class RestingDrivers:
         """Take the differences over into the simulation, where a push may have left them; how
         much, one per wheel [rad]."""
         simulated, asked = path.wheel(at.SPEED), path.wheel(at.ASKED)
-        sums, held = path.wheel(at.INTEGRAL), self._held(path)
+        held, limits = self._held(path)
         taken = [0.0] * WHEELS
         for wheel in range(WHEELS):
             excess = abs(simulated[wheel]) - abs(asked[wheel])
@@ -173,7 +173,7 @@ class RestingDrivers:
             is_slow = excess < _CREEPS and abs(simulated[wheel]) < _SLOW
             rests = is_slow and abs(speed[wheel]) < _STANDS and not self._strange[wheel]
             more = _FOLLOWS * apart[wheel]  # NaN where not known
-            follows = rests and self._integral * abs(sums[wheel] + more) < held[wheel]
+            follows = rests and abs(held[wheel] + self._integral * more) < limits[wheel]
             self._followed[wheel] = follows
             if follows:
                 path.add_to_sum(wheel, more)
@@ -181,6 +181,16 @@ class RestingDrivers:
                 taken[wheel] = more
         return taken
 
-    def _held(self, path: SimulatedDrivers) -> list[float]:
-        """What friction holds each simulated wheel against [V]."""
-        return self._holding.voltages(*map(path.wheel, (at.DRY, at.SIDE_LIMIT, at.HOT)))
+    def _held(self, path: SimulatedDrivers) -> tuple[list[float], list[float]]:
+        """What friction holds each simulated wheel against, and could at most [V].
+
+        While the robot moves, a wheel that stands bears its part of what turns the body aside, so
+        friction holds what is left of its voltage; and rollers that slide hold nothing more.
+        """
+        dry, side, hot = map(path.wheel, (at.DRY, at.SIDE_LIMIT, at.HOT))
+        if all(abs(speed) < _CREEPS for speed in path.wheel(at.SPEED)):
+            held = [self._integral * angle for angle in path.wheel(at.INTEGRAL)]
+            return held, self._holding.voltages(dry, side, hot)
+        axles, nothing = path.wheel(at.HELD), [0.0] * WHEELS
+        held, limits = (self._holding.voltages(part, nothing, hot) for part in (axles, dry))
+        return held, limits
