@@ -22,6 +22,7 @@ from tomr_fault_diag.classifier.states import (
     WAITING,
 )
 from tomr_fault_diag.residuals.frame import MOTORS, Residual, ResidualFrame
+from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.messages.plain import Level
 from tomr_power_model.robot import shipped_robot
 
@@ -71,6 +72,23 @@ def named(frames: list[ResidualFrame], judge: int = NORMAL) -> list[tuple[int, s
         if diagnosis is not None and diagnosis.changed:
             found.append(((diagnosis.stamp_ns - BASE) // MS, diagnosis.state.name))
     return found
+
+
+def test_a_robot_that_brakes_unasked_does_not_follow_before_it_stands() -> None:
+    """From 1 m/s at its drivers' 2 m/s^2; that it stands is known 0.3 s later at the earliest."""
+    robot = shipped_robot("reference")
+    first, second, third = (float(speed) for speed in twist_to_wheels(robot) @ [1.0, 0.0, 0.0])
+    ahead = first, second, third
+    classifier = FaultClassifier.around(Sure(NORMAL), robot)
+    named_at = 0
+    for at_ms in range(50, 2000, 50):
+        left = max(0.0, 1.0 - max(at_ms - 1000, 0) / 500)
+        slower = twist_to_wheels(robot) @ [left, 0.0, 0.0]
+        one, two, three = (float(speed) for speed in slower)
+        diagnosis = classifier.classify(frame(at_ms, ahead, (one, two, three)))
+        if diagnosis is not None and diagnosis.state is DISOBEYS and not named_at:
+            named_at = at_ms
+    assert 1300 <= named_at <= 1350
 
 
 @pytest.mark.parametrize("period", [10, 50, 200])

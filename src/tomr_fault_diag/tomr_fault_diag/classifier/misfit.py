@@ -6,8 +6,10 @@ These rules ask nothing but the residuals themselves.
 
 from collections.abc import Sequence
 
+import numpy as np
 from attrs import frozen
 
+from tomr_fault_diag.classifier.braking import BrakingWatch
 from tomr_fault_diag.residuals.frame import (
     MOTORS,
     RESIDUALS,
@@ -15,6 +17,7 @@ from tomr_fault_diag.residuals.frame import (
     TOTAL,
     Residual,
     ResidualFrame,
+    measured_speed,
 )
 from tomr_power_model.model.ticks import to_ns
 
@@ -47,13 +50,18 @@ class MisfitWatch:
     """Remembers since when [ns] nothing follows, the supply is low, and each residual lies far out
     of its band."""
 
-    def __init__(self, idle: Sequence[float] = ()) -> None:
-        """`idle`: what each motor draws that is not driven, in the unit of its residual."""
+    def __init__(self, idle: Sequence[float] = (), braking: BrakingWatch | None = None) -> None:
+        """`idle`: what each motor draws that is not driven, in the unit of its residual; without
+        `braking` a robot that is to brake and does not stand yet is not known to ignore commands.
+        """
         self._idle = tuple(idle)
+        self._braking = braking
         self.clear()
 
     def clear(self) -> None:
         """Forget what was seen."""
+        if self._braking is not None:
+            self._braking.clear()
         self._halting_since: int | None = None
         self._unpowered_since: int | None = None
         self._far_since: dict[int, int] = {}
@@ -81,12 +89,22 @@ class MisfitWatch:
         unpowered = not is_low and self._is_unpowered(frame, speeds)
         self._unpowered_since = _since(self._unpowered_since, now, holds=unpowered)
         stands = ignores and _lasts(self._halting_since, now, _IGNORED_FOR)
+        brakes = self._brakes(now, speeds)
         return Misfit(
-            ignores,
-            stands or _lasts(self._unpowered_since, now, _IGNORED_FOR),
+            ignores or brakes,
+            stands or brakes or _lasts(self._unpowered_since, now, _IGNORED_FOR),
             any(now - since >= _FAR_FOR for since in self._far_since.values()),
             _lasts(self._low_since, now, _LOW_FOR),
         )
+
+    def _brakes(self, now: int, speeds: list[Residual]) -> bool:
+        """Whether it brakes to a halt that it is not asked for."""
+        if self._braking is None:
+            return False
+        measured = np.array([measured_speed(item) for item in speeds])
+        expected = np.array([item.modelled for item in speeds])
+        far = sum(is_far(item) for item in speeds)
+        return self._braking.take(now, measured, expected, far)
 
     def _is_unpowered(self, frame: ResidualFrame, speeds: list[Residual]) -> bool:
         """Whether no motor is driven, and wheels therefore turn otherwise than they should."""

@@ -4,6 +4,7 @@ from typing import Self
 
 from attrs import evolve, field, frozen
 
+from tomr_fault_diag.classifier.braking import BrakingWatch
 from tomr_fault_diag.classifier.contacts import NOTHING
 from tomr_fault_diag.classifier.evidence import Beside
 from tomr_fault_diag.classifier.judges import Judge, Opinion, make_judge
@@ -113,7 +114,7 @@ class FaultClassifier:
             outside=OutsideWatch(robot),
             slope=SlopeFilter(robot),
             lasting=LastingWatch(robot) if judge.settings.small_faults else None,
-            misfits=MisfitWatch(Motors(robot).idle.tolist()),
+            misfits=MisfitWatch(Motors(robot).idle.tolist(), BrakingWatch(robot)),
         )
 
     @property
