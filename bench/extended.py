@@ -285,8 +285,9 @@ def faulty(fleet: Fleet, seed: int, name: str) -> Scenario | None:
     if not observable:
         return None
     label = _label(drive, name, size)
-    # The onset is when it first shows: what comes before, nobody could detect.
-    label = evolve(label, onset=observable[0][0] - 4 * _PERIOD, observable=observable)
+    # The onset is when it first shows: what comes before, nobody need detect.
+    onset = observable[0][0] - 4 * _PERIOD
+    label = evolve(label, begun=label.onset, onset=onset, observable=observable)
     return Scenario(labelled, (label,))
 
 

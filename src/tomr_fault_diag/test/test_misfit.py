@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from tomr_fault_diag.classifier.braking import BrakingWatch
 from tomr_fault_diag.classifier.evidence import ALONE, Beside
 from tomr_fault_diag.classifier.judges import Opinion
 from tomr_fault_diag.classifier.misfit import MisfitWatch
@@ -89,6 +90,13 @@ def test_a_robot_that_brakes_unasked_does_not_follow_before_it_stands() -> None:
         if diagnosis is not None and diagnosis.state is DISOBEYS and not named_at:
             named_at = at_ms
     assert 1300 <= named_at <= 1350
+
+
+def test_a_robot_that_stands_after_a_silence_may_have_been_asked_to() -> None:
+    watch = MisfitWatch(braking=BrakingWatch(shipped_robot("reference")))
+    for at_ms in range(50, 1000, 50):
+        watch.take(frame(at_ms, TURNING, TURNING), 0.0)
+    assert not watch.take(frame(3000, TURNING, (0.0, 0.0, 0.0)), 0.0).disobeys
 
 
 @pytest.mark.parametrize("period", [10, 50, 200])

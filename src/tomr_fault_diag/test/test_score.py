@@ -61,6 +61,22 @@ def test_naming_counts_for_half_a_second_after_the_end() -> None:
     assert math.isinf(one(too_late).delay)
 
 
+def test_naming_a_fault_before_it_shows_is_no_false_alarm_but_another_is() -> None:
+    label = evolve(FAULT, begun=1.0)
+    early = track((2.0, "motor system fault 2", 2))
+    assert seen(early, START, [label], (0, 1)).alarms == ()
+    # From 2.0 to 3.9 s it is neither right nor wrong.
+    assert seen(early, START, [label], (0, 1)).healthy_seconds == pytest.approx(1.9)
+    assert seen(early, START, [FAULT], (0, 1)).alarms == ("motor system fault 2",)
+    assert seen(early, START, [evolve(FAULT, begun=2.5)], (0, 1)).alarms == (
+        "motor system fault 2",
+    )
+    other = track((2.0, "motor system fault 3", 3))
+    assert seen(other, START, [label], (0, 1)).alarms == ("motor system fault 3",)
+    stamped = evolve(label, begun=START / 1e9 + 1.0, onset=START / 1e9 + 4.0)
+    assert stamped.times(START).begun == pytest.approx(1.0, abs=1e-6)
+
+
 def test_another_wheel_is_another_fault() -> None:
     case = one(seen(track((4.3, "motor system fault 3", 3)), START, [FAULT], (0, 1)))
     assert math.isinf(case.delay)

@@ -41,7 +41,8 @@ class Misfit:
     """What a frame shows beside the classifier's states."""
 
     ignores_commands: bool = False  # for a moment already: wheels stand that should turn
-    disobeys: bool = False  # and for long enough to be named, or no motor has been driven for long
+    # And for long enough to be named; or it brakes unasked, or no motor has been driven for long.
+    disobeys: bool = False
     unexplained: bool = False  # some residual has been far out of its band for long
     low_supply: bool = False  # its voltage has been too low for long
 
@@ -91,7 +92,7 @@ class MisfitWatch:
         stands = ignores and _lasts(self._halting_since, now, _IGNORED_FOR)
         brakes = self._brakes(now, speeds)
         return Misfit(
-            ignores or brakes,
+            ignores,
             stands or brakes or _lasts(self._unpowered_since, now, _IGNORED_FOR),
             any(now - since >= _FAR_FOR for since in self._far_since.values()),
             _lasts(self._low_since, now, _LOW_FOR),

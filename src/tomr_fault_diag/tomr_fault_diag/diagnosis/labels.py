@@ -71,6 +71,7 @@ class Label:
     severity: float | None = None
     accept: tuple[str, ...] = ()
     observable: tuple[tuple[float, float], ...] = ()
+    begun: float | None = None  # before it shows: from then on naming it is no false alarm
     kind: str = field(default="")  # what scores are given for, the state unless a fault has an id
 
     @property
@@ -99,6 +100,7 @@ class Label:
             self,
             onset=after(self.onset),
             end=None if self.end is None else after(self.end),
+            begun=None if self.begun is None else after(self.begun),
             observable=tuple((after(low), after(high)) for low, high in self.observable),
         )
 

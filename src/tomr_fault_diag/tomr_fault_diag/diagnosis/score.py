@@ -73,6 +73,9 @@ def seen(track: Track, start_ns: int, labels: Sequence[Label], phase: tuple[int,
     for label in faults:
         end = math.inf if label.end is None else label.end + RECOVERY
         healthy &= ~((time >= label.onset) & (time < end))
+        if label.begun is not None:
+            named = np.array([label.is_right(*said) for said in track.said], dtype=bool)
+            healthy &= ~(named & (time >= label.begun) & (time < label.onset))
     alarm = np.array([said.state not in FAULTLESS for said in track.said], dtype=bool)
     starts = _runs(alarm & healthy, time)
     return Seen(
