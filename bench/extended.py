@@ -3,7 +3,8 @@
     .venv/bin/python bench/extended.py [--drives 20] [--healthy-hours 0.5] [--json report.json]
         [--commissioned DIR [--without-imu]]
 
-So many drives of each kind of fault in docs/faults.md: robots, deviations of 5 % from their
+So many drives of each kind of fault in docs/faults.md, and of slippery floors on which the robot
+tows something: robots, deviations of 5 % from their
 description, payloads, floors, bumps, missions and sensor noise as in bench/diagnosis.py, wheels,
 sizes and onsets at random, from seeds that nothing else uses. Healthy drives are shoved (up to
 3 N/kg for 0.2 s) and leaned on (up to 1 N/kg for seconds) as well. With --commissioned the robots
@@ -56,7 +57,7 @@ from tomr_power_model.robot import Robot, shipped_robot
 from tomr_sim_bridge.faults import check_settings
 from tomr_sim_bridge.missions.schema import PlannedFault
 from tomr_training.drives import Drive, random_drive
-from tomr_training.labels import Flags, GroundTruth, Noise, deviates, lasting
+from tomr_training.labels import SLIPPING, Flags, GroundTruth, Noise, deviates, lasting
 from tomr_training.simulated_drive import (
     PERIOD_NS,
     START_NS,
@@ -75,14 +76,20 @@ Random = np.random.Generator
 Sized = tuple[dict[str, object], float]  # settings at severity 1, and the size to be scored by
 
 
+EXTENDED = "extended states"
+NOT_TRAINED = "unknown kinds"
+LOADED_SLIP = "slip under a load"  # one of the paper's six, and no other state is right
+
+
 @frozen
 class Kind:
     """A fault to draw: its settings and the size by which it is scored."""
 
     fault_id: str
     draw: Callable[[Random, Robot], Sized]
-    is_known: bool = True  # False: nobody has trained on it
+    group: str = EXTENDED
     also: str = ""  # a second fault, of another kind, at once
+    draw_also: Callable[[Random, Robot], Sized] = lambda random, robot: ({"severity": 0.8}, 0.8)
 
 
 def _plain(random: Random, robot: Robot) -> Sized:
@@ -119,6 +126,16 @@ def _towed(random: Random, robot: Robot) -> Sized:
     return {"drag": share * robot.mass}, share
 
 
+def _slippery(random: Random, robot: Robot) -> Sized:
+    severity = float(random.uniform(0.5, 0.85))  # of traction 0.02 to 0.14 is left
+    return {"severity": severity}, severity
+
+
+def _hindered(random: Random, robot: Robot) -> Sized:
+    share = float(random.uniform(0.15, 0.6))  # N/kg
+    return {"drag": share * robot.mass}, share
+
+
 def _wind(random: Random, robot: Robot) -> Sized:
     speed = float(random.uniform(8.0, 16.0))
     return {"speed": speed, "azimuth": float(random.uniform(-math.pi, math.pi))}, speed
@@ -139,9 +156,10 @@ KINDS: Mapping[str, Kind] = {
         Kind("power_sensor_biased", _bias),
         Kind("supply_low", _uniform("undervoltage", 2.0, 8.0)),
         Kind("control_signal_lost", _plain, also="floor_slippery"),
-        Kind("load_towed", _towed, is_known=False),
-        Kind("tethered", _uniform("stiffness", 10.0, 40.0), is_known=False),
-        Kind("windy", _wind, is_known=False),
+        Kind("load_towed", _towed, NOT_TRAINED),
+        Kind("tethered", _uniform("stiffness", 10.0, 40.0), NOT_TRAINED),
+        Kind("windy", _wind, NOT_TRAINED),
+        Kind("floor_slippery", _slippery, LOADED_SLIP, "load_towed", _hindered),
     )
 }
 
@@ -195,7 +213,9 @@ def faulty_drive(drive: Drive, name: str) -> tuple[Drive, float]:
     wheel = int(random.integers(1, 4))
     faults = [_planned(kind.fault_id, start, end, wheel, settings)]
     if kind.also:
-        faults.append(_planned(kind.also, start, end, wheel, {"severity": 0.8}))
+        faults.append(
+            _planned(kind.also, start, end, wheel, kind.draw_also(random, drive.plant)[0])
+        )
     return evolve(drive, mission=evolve(drive.mission, faults=tuple(faults))), size
 
 
@@ -261,6 +281,8 @@ def shows(drive: Drive, labelled: LabelledDrive, twin: GroundTruth) -> Flags:
         seen_now = np.abs(twin.speed[:, wheel]) > _TURNING
     else:
         seen_now = deviates(labelled.truth, twin, Noise.of(drive.plant))
+        if fault.fault_id == "floor_slippery":
+            seen_now &= labelled.truth.slip.max(axis=1) > SLIPPING
     return lasting(np.asarray(seen_now & labelled.faulty))
 
 
@@ -297,6 +319,8 @@ def _label(drive: Drive, name: str, size: float) -> Label:
     if "wheel" in first.settings:
         values["wheel"] = float(str(first.settings["wheel"]))
     label = evolve(simulated(name, first.fault_id, values), kind=name)
+    if KINDS[name].group == LOADED_SLIP:
+        return label
     others = [simulated(name, fault.fault_id, {}).state for fault in more]
     return evolve(label, accept=(*label.accept, *others, *(["unknown"] if more else [])))
 
@@ -333,10 +357,13 @@ def scored(task: tuple[Fleet, int, str]) -> Seen | None:
 
 def targets(found: Sequence[Seen]) -> dict[str, object]:
     """What each group of faults was called for most of the time, with exact intervals."""
-    groups: dict[str, Counter[str]] = {"extended states": Counter(), "unknown kinds": Counter()}
+    groups: dict[str, Counter[str]] = {
+        name: Counter() for name in (EXTENDED, NOT_TRAINED, LOADED_SLIP)
+    }
     for case in (case for item in found for case in item.cases):
-        name = "extended states" if KINDS[case.kind].is_known else "unknown kinds"
-        groups[name][case.verdicts.most_common(1)[0][0] if case.verdicts else MISSED] += 1
+        groups[KINDS[case.kind].group][
+            case.verdicts.most_common(1)[0][0] if case.verdicts else MISSED
+        ] += 1
     report: dict[str, object] = {}
     for name, counts in groups.items():
         total = counts.total()

@@ -12,7 +12,18 @@ sys.path.append(str(Path(__file__).resolve().parent.parent / "bench"))
 
 from commissioned import made
 from diagnosis import Kind as Diagnosed
-from extended import KINDS, Fleet, Scenario, faulty_drive, pushed_drive, scored, spans, targets
+from extended import (
+    EXTENDED,
+    KINDS,
+    Fleet,
+    Scenario,
+    faulty,
+    faulty_drive,
+    pushed_drive,
+    scored,
+    spans,
+    targets,
+)
 
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.diagnosis.score import Case, Seen
@@ -21,11 +32,12 @@ from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import load_robot
 from tomr_sim_bridge.faults import natures
+from tomr_training.labels import SLIPPING
 from tomr_training.simulated_drive import START_NS
 
 
 def test_every_fault_beyond_the_papers_is_drawn() -> None:
-    drawn = {kind.fault_id: kind.is_known for kind in KINDS.values()}
+    drawn = {kind.fault_id: kind.group == EXTENDED for kind in KINDS.values()}
     for fault_id, nature in natures().items():
         if nature == "disturbance" or fault_id in ("encoder_lost", "floor_slippery"):
             continue
@@ -40,7 +52,9 @@ def test_a_seed_makes_a_drive(name: str) -> None:
     assert again.mission == drive.mission
     assert size > 0.0
     assert 0.0 < fault.start < (fault.end or 0.0) <= drive.length
-    assert fault.settings["severity"] == 1.0
+    assert (fault.settings["severity"] == 1.0) == (fault.fault_id != "floor_slippery")
+    seconds = [second.fault_id for second in drive.mission.faults[1:]]
+    assert seconds == [KINDS[name].also] * bool(KINDS[name].also)
 
 
 def test_a_fleet_is_the_robots_of_a_folder(tmp_path: Path) -> None:
@@ -84,6 +98,24 @@ def test_residuals_are_judged_in_the_bands_of_the_robot() -> None:
         scored((fleet, 1, ""))
     ((judged,),) = (call.args for call in seen.call_args_list)
     assert [item.band for item in judged.residuals[:4]] == [9.0] * 4
+
+
+def test_slip_under_a_load_counts_where_a_wheel_slides_and_no_other_name_is_right() -> None:
+    found = faulty(Fleet(), 4_000_001, "floor_slippery and load_towed")
+    assert found is not None
+    (label,) = found.labels
+    assert label.is_right("slip", 0)
+    assert not label.is_right("external load", 0)
+    assert not label.is_right("unknown", 0)
+    slides = found.labelled.truth.slip.max(axis=1) > SLIPPING
+    first = START_NS / 1e9
+    first = found.labelled.first
+    begins = [round(begin / 0.05) - first for begin, _ in label.observable]
+    assert begins
+    assert slides[begins].all()
+    drive, _ = faulty_drive(Fleet().drive(4_000_001), "floor_slippery and load_towed")
+    towed = drive.mission.faults[1]
+    assert 0.15 <= float(str(towed.settings["drag"])) / drive.plant.mass <= 0.6
 
 
 def test_pushes_follow_one_another_within_what_is_no_fault() -> None:
