@@ -9,7 +9,14 @@ from attrs import evolve
 from tomr_power_model.robot import shipped_robot
 from tomr_sim_bridge.missions.schema import PlannedFault, TwistPhase
 from tomr_training.drives import Drive
-from tomr_training.planar.faults import TOTAL_METER, dry_friction
+from tomr_training.planar.faults import (
+    DOWNHILL,
+    LOAD,
+    TOTAL_METER,
+    dry_friction,
+    friction_left,
+    loaded,
+)
 from tomr_training.planar.plant import Motion, run_plant
 from tomr_training.planar.sensors import Signals
 
@@ -17,6 +24,7 @@ Straight = Callable[..., Drive]
 REFERENCE = shipped_robot("reference")
 WHEEL = 1  # 0..2: driving ahead, wheels 2 and 3 turn and wheel 1 need not
 STANDBY = 1.2  # W
+STOP = TwistPhase((0.0, 0.0, 0.0), 3.0)
 SMOOTH = evolve(REFERENCE, sensors=evolve(REFERENCE.sensors, encoder_resolution=0.0))
 
 
@@ -66,6 +74,56 @@ def test_a_load_pulls_against_the_motion(straight: Straight) -> None:
     assert reverse.steps.torque[-1, WHEEL] == pytest.approx(
         -motion.steps.torque[-1, WHEEL], rel=0.05
     )
+
+
+def test_a_floor_that_slopes_or_drags_is_a_load(straight: Straight) -> None:
+    """Not slippery at all it pulls as a load does."""
+    towed, _ = faulty(straight, "load_towed", drag=10.0)
+    for settings in ({LOAD: 10.0}, {LOAD: 10.0, DOWNHILL: np.pi}):
+        motion, _ = faulty(straight, "floor_slippery", **{"severity": 0.0, **settings})
+        assert motion.steps.torque[-1] == pytest.approx(towed.steps.torque[-1], abs=0.01)
+        assert motion.truth.power[:59] == pytest.approx(towed.truth.power[:59])
+    left, _ = faulty(straight, "floor_slippery", **{"severity": 0.0, LOAD: 10.0, DOWNHILL: 1.571})
+    right, _ = faulty(straight, "floor_slippery", **{"severity": 0.0, LOAD: 10.0, DOWNHILL: -1.571})
+    healthy = run_plant(straight(robot=SMOOTH)).steps.torque[-1]
+    pulls = [motion.steps.torque[-1] - healthy for motion in (left, right)]
+    assert pulls[0] == pytest.approx(-pulls[1], abs=0.01)
+    assert np.abs(pulls[0]).max() > 0.1
+
+
+def test_a_floor_drags_against_what_the_body_does_not_against_its_wheels(
+    straight: Straight,
+) -> None:
+    """On ice the body goes on while the wheels have stopped: it is braked by both."""
+    phases = (TwistPhase((0.0, 0.0, 0.0), 1.0), TwistPhase((0.5, 0.0, 0.0), 3.0), STOP)
+    left = []
+    for load in (0.0, 1.5):
+        settings = {"severity": 1.0, LOAD: load}
+        ice = PlannedFault("floor_slippery", 3.0, None, settings)
+        motion = run_plant(straight(faults=(ice,), phases=phases, robot=SMOOTH))
+        rolling = 0.05 * motion.steps.speed - motion.steps.gap
+        ahead = rolling[round(4.0 / motion.step) :, WHEEL] / np.sin(2.0 * np.pi / 3.0)
+        assert ahead.min() > -0.02  # it is not pulled back
+        left.append(int((ahead > 0.05).sum()))
+    assert left[1] < 0.85 * left[0]
+
+
+def test_half_of_the_slippery_floors_load_and_nothing_else_does() -> None:
+    random, count = np.random.default_rng(1), 400
+    slippery = PlannedFault("floor_slippery", 3.0, None, {"severity": 0.5})
+    found = [loaded((slippery,), REFERENCE, 0.8, random)[0].settings for _ in range(count)]
+    loads = [float(str(settings[LOAD])) for settings in found if LOAD in settings]
+    assert 0.4 * count < len(loads) < 0.6 * count
+    sloping = sum(DOWNHILL in settings for settings in found)
+    assert 0.4 * len(loads) < sloping < 0.6 * len(loads)
+    # Of 0.8 half of the way to 0.02 is left, by factors.
+    assert friction_left(slippery, 0.8) == pytest.approx(np.sqrt(0.8 * 0.02))
+    traction = REFERENCE.mass * 9.81 * np.sqrt(0.8 * 0.02)
+    assert 0.2 * traction < min(loads) < 0.25 * traction
+    assert 0.7 * traction < max(loads) < 0.75 * traction
+    lost = PlannedFault("encoder_lost", 3.0, None, {"severity": 0.5, "wheel": 1})
+    for others in ((), (lost,), (slippery, lost)):
+        assert all(loaded(others, REFERENCE, 0.8, random) == others for _ in range(20))
 
 
 def test_a_flat_battery_leaves_less_voltage(straight: Straight) -> None:

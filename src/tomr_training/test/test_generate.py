@@ -6,9 +6,9 @@ import numpy as np
 from attrs import evolve
 
 from tomr_fault_diag.classifier.belief import CONTROLS, DRAGS, ENCODERS, EXTERNAL, METERS, OTHER
-from tomr_fault_diag.classifier.states import NORMAL
+from tomr_fault_diag.classifier.states import NORMAL, SLIP
 from tomr_power_model.robot import shipped_robot
-from tomr_sim_bridge.missions.schema import PlannedFault
+from tomr_sim_bridge.missions.schema import PlannedFault, TwistPhase
 from tomr_training.drives import Bump, Drive
 from tomr_training.labels import SLIPPING, Noise, deviates
 from tomr_training.planar.generate import BEYOND, IGNORED, PAPER_OF, simulate
@@ -71,6 +71,19 @@ def test_two_faults_at_once_are_none_that_is_known(straight: Callable[..., Drive
         (slice(81, 99), METERS.start + 2),
     ):
         assert set(labels[ticks].tolist()) == {hypothesis}
+
+
+def test_a_floor_that_drags_is_slippery_where_wheels_slide_on_it(
+    straight: Callable[..., Drive],
+) -> None:
+    phases = (*straight().mission.phases, TwistPhase((0.0, 0.0, 0.0), 1.0))
+    ice = PlannedFault("floor_slippery", 3.5, None, {"severity": 1.0, "load": 0.5})
+    drive = straight(faults=(ice,), phases=phases)
+    sliding = np.flatnonzero(run_plant(drive).truth.slip.max(axis=1) > SLIPPING)
+    labels = simulate(drive).labels
+    assert 100 <= sliding[0] < 105  # it brakes
+    assert set(labels[71:100].tolist()) == {EXTERNAL}
+    assert set(labels[sliding].tolist()) == {SLIP}
 
 
 def test_what_the_paper_would_call_them() -> None:

@@ -12,7 +12,8 @@ gives no more than its supply, and then does not sum up.
 Real drivers take up a command when their period begins, up to half a period before or after the
 simulated ones do. A wheel that turns faster by omega is ahead by omega times that, all three alike:
 the middle one of the three delays that the last half minute shows is no difference of voltages.
-Faster than in the motion in which the offset faded, for that is part of the offset.
+Faster than in the motion in which the offset faded, for that is part of the offset. A load puts
+wheels ahead as well, by more than any such delay: what may be no delay says nothing of it.
 """
 
 import math
@@ -27,6 +28,7 @@ _FADES_FIRST, _FIRST = 2.1, 2.0  # ... and until, so many seconds on end, ...
 _ALIKE = 0.2  # ... the wheel has turned as simulated [rad/s]
 _LIKE = 0.5  # rad/s, by which a wheel turns as simulated
 _MEMORY = 30.0  # s, over which the delay of the drivers is estimated
+_LONGEST = 0.7  # of a driver's period, of a delay: half of it, and clocks that are a little off
 _LITTLE = 90.0  # (rad/s)^2: half a second at 3 rad/s, before which there is taken to be none
 
 
@@ -43,7 +45,7 @@ class DriverLaw:
         )
         self._lasts = round(_FIRST / period_s)
         self._forgets = math.exp(-period_s / _MEMORY)
-        self._longest = 1.0 / robot.controller.rate
+        self._longest = _LONGEST / robot.controller.rate
         self.clear()
 
     def clear(self) -> None:
@@ -90,7 +92,8 @@ class DriverLaw:
         delay, sums = self._delay(), between(self._before, now, share)
         faster = [turns - usual for turns, usual in zip(simulated, self._usual, strict=True)]
         for wheel, apart in enumerate(now):
-            if abs(slower[wheel]) < _LIKE and apart == apart:
+            may_be_late = abs(apart) < self._longest * abs(faster[wheel])  # not where not known
+            if may_be_late and abs(slower[wheel]) < _LIKE:
                 self._learn(wheel, faster[wheel], apart)
         self._before = now
         return [
@@ -134,8 +137,7 @@ class DriverLaw:
     def _delay(self) -> float:
         """Of the drivers after the simulated ones [s]."""
         pairs = zip(self._products, self._squares, strict=True)
-        middle = sorted(product / (square + _LITTLE) for product, square in pairs)[WHEELS // 2]
-        return min(max(middle, -self._longest), self._longest)
+        return sorted(product / (square + _LITTLE) for product, square in pairs)[WHEELS // 2]
 
     def taken_over(self, angles: Sequence[float]) -> None:
         """The simulated drivers have added so much to their sums [rad]."""

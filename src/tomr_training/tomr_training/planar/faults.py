@@ -22,8 +22,9 @@ from tomr_fault_diag.classifier.belief import (
 from tomr_fault_diag.classifier.states import SLIP
 from tomr_power_model.robot import WHEELS, Motor, Robot
 from tomr_power_model.robot.description import PerWheel
+from tomr_sim_bridge.faults.floor_slippery import SLIPPERIEST
 from tomr_sim_bridge.missions.schema import PlannedFault
-from tomr_training.drives import wheel_of
+from tomr_training.drives import severity_of, wheel_of
 
 Array = NDArray[np.float64]
 Settings = dict[str, float | int]
@@ -105,6 +106,12 @@ _PAIRED = (
     "motor_resistance_high",
     "power_sensor_scaled",
 )
+# A wheel slides where it has to push: of the slippery floors alone so many drag as well, as water
+# and mud do, or slope; that takes a share of the weight times the friction that is left.
+_LOADED = 0.5
+_TAKEN = (0.2, 0.75)
+LOAD, DOWNHILL = "load", "downhill"
+_GRAVITY = 9.81  # m/s^2
 _BRAKED = 1e-6  # share of the voltage at which the terminals are shorted, not open
 
 
@@ -129,6 +136,27 @@ def random_faults(
         _fault(first, (start, end), wheel, robot, random),
         _fault(second, (later, end), other, robot, random),
     )
+
+
+def loaded(
+    faults: tuple[PlannedFault, ...], robot: Robot, floor: float, random: np.random.Generator
+) -> tuple[PlannedFault, ...]:
+    """The same, a slippery floor maybe with a load [N] and, if it slopes, where to [rad]; `floor`:
+    its friction before."""
+    if [fault.fault_id for fault in faults] != ["floor_slippery"] or random.random() >= _LOADED:
+        return faults
+    (fault,) = faults
+    weight = robot.mass * _GRAVITY
+    load = weight * friction_left(fault, floor) * float(random.uniform(*_TAKEN))
+    settings = {**fault.settings, LOAD: load}
+    if random.random() < 0.5:
+        settings[DOWNHILL] = float(random.uniform(-math.pi, math.pi))
+    return (evolve(fault, settings=settings),)
+
+
+def friction_left(fault: PlannedFault, floor: float) -> float:
+    """Friction of a floor while it is slippery, of what it was before."""
+    return float(floor * min(SLIPPERIEST / floor, 1.0) ** severity_of(fault))
 
 
 def _fault(

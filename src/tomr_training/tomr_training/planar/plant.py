@@ -16,7 +16,7 @@ from tomr_power_model.robot import WHEELS, Robot
 from tomr_sim_bridge.missions.schema import PlannedFault
 from tomr_training.drives import Drive
 from tomr_training.labels import GroundTruth
-from tomr_training.planar.faults import CHANGES, number
+from tomr_training.planar.faults import CHANGES, DOWNHILL, LOAD, number
 from tomr_training.planar.schedule import (
     TICK,
     counted_shares,
@@ -86,7 +86,11 @@ def run_plant(chosen: Drive) -> Motion:
     inputs = disturbed(chosen, chosen.plant)
     for fault in chosen.mission.faults:
         if fault.fault_id == "load_towed":
-            inputs[:, at.PUSH : at.PUSH + 2] += _towed(chosen, fault)
+            free = run_plant(evolve(chosen, mission=evolve(chosen.mission, faults=())))
+            inputs[:, at.PUSH : at.PUSH + 2] += _drag(chosen, fault, number(fault, "drag"), free)
+        elif LOAD in fault.settings and DOWNHILL not in fault.settings:
+            free = _run(_on_its_floor(chosen), inputs, chosen.plant, chosen)
+            inputs[:, at.PUSH : at.PUSH + 2] += _drag(chosen, fault, number(fault, LOAD), free)
     return _run(_on_its_floor(chosen), inputs, chosen.plant, chosen, _changes(chosen))
 
 
@@ -106,18 +110,17 @@ def _changes(chosen: Drive) -> list[tuple[int, Array]]:
     return found
 
 
-def _towed(chosen: Drive, fault: PlannedFault) -> Array:
-    """Dry drag of a cart against the motion that there would be without it [N], (periods, 2)."""
-    mission = evolve(chosen.mission, faults=())
-    free = run_plant(evolve(chosen, mission=mission))
-    twist = free.steps.speed @ wheels_to_twist(chosen.plant).T
+def _drag(chosen: Drive, fault: PlannedFault, load: float, free: Motion) -> Array:
+    """Dry drag of a size [N] against the motion that there would be without it, (periods, 2)."""
+    rolling = free.steps.speed - free.steps.gap / chosen.plant.wheel_radius
+    twist = rolling @ wheels_to_twist(chosen.plant).T
     heading = integral(free.steps.yaw_rate[:, None], free.step)[:-1, 0]
     cos, sin = np.cos(heading), np.sin(heading)
     velocity = np.stack(
         [cos * twist[:, 0] - sin * twist[:, 1], sin * twist[:, 0] + cos * twist[:, 1]], axis=1
     )
     speed = np.hypot(np.hypot(*velocity.T), _CREEP)
-    force = -number(fault, "drag") * velocity / speed[:, None]
+    force = -load * velocity / speed[:, None]
     start, end = fault.start, end_of(fault, chosen)
     time = free.step * np.arange(len(force))
     force[(time < start) | (time >= end)] = 0.0

@@ -19,7 +19,7 @@ from tomr_power_model.robot.description import PerWheel
 from tomr_sim_bridge.missions.schema import Phase, TwistPhase
 from tomr_training.drives import DEVIATION, Bump, Drive, another_drive, bumps, random_drive
 from tomr_training.labels import spread
-from tomr_training.planar.faults import DRY, random_faults
+from tomr_training.planar.faults import DRY, loaded, random_faults
 from tomr_training.planar.hidden import tuned, with_hidden_physics
 from tomr_training.planar.plant import run_plant
 from tomr_training.planar.residuals import compare
@@ -68,6 +68,8 @@ def training_drive(reference: Robot, seed: int) -> Drive:
     if robot.is_of_another_kind:
         phases = tuple(_skewed(phase, random) for phase in phases)
     faults = random_faults(drive.believed, drive.length, random)
+    own = np.random.default_rng([seed, 6])
+    faults = loaded(faults, drive.believed, drive.mission.floor_friction, own)
     drive = evolve(
         drive,
         mission=evolve(drive.mission, phases=phases, faults=faults),

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.numbers import no_input, timing_of
 from tomr_power_model.robot import WHEELS, Robot
-from tomr_sim_bridge.faults.floor_slippery import SLIPPERIEST
 from tomr_sim_bridge.missions.schema import PlannedFault
 from tomr_training.drives import Drive, severity_of, wheel_of
-from tomr_training.planar.faults import number
+from tomr_training.planar.faults import DOWNHILL, LOAD, friction_left, number
 
 Array = NDArray[np.float64]
 
@@ -55,12 +54,16 @@ def disturbed(drive: Drive, robot: Robot) -> Array:
             wheel = wheel_of(fault)
             columns = _column(field) if wheel is None else [_column(field)[wheel]]
             inputs[when, columns] *= share
+        if DOWNHILL in fault.settings:
+            load, azimuth = number(fault, LOAD), number(fault, DOWNHILL)
+            inputs[when, at.PUSH] += load * math.cos(azimuth)
+            inputs[when, at.PUSH + 1] += load * math.sin(azimuth)
     return inputs
 
 
 def _floor_left(fault: PlannedFault, drive: Drive) -> tuple[int, float]:
-    fall = min(SLIPPERIEST / drive.mission.floor_friction, 1.0)
-    return at.FLOOR, float(fall ** severity_of(fault))
+    floor = drive.mission.floor_friction
+    return at.FLOOR, friction_left(fault, floor) / floor
 
 
 def _voltage_left(fault: PlannedFault, drive: Drive) -> tuple[int, float]:
