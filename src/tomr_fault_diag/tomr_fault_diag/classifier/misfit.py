@@ -53,8 +53,7 @@ class MisfitWatch:
 
     def __init__(self, idle: Sequence[float] = (), braking: BrakingWatch | None = None) -> None:
         """`idle`: what each motor draws that is not driven, in the unit of its residual; without
-        `braking` a robot that is to brake and does not stand yet is not known to ignore commands.
-        """
+        `braking` a robot that ignores its commands is known once it stands."""
         self._idle = tuple(idle)
         self._braking = braking
         self.clear()
