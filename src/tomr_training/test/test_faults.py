@@ -11,7 +11,8 @@ from tomr_sim_bridge.missions.schema import PlannedFault, TwistPhase
 from tomr_training.drives import Drive
 from tomr_training.planar.faults import (
     DOWNHILL,
-    LOAD,
+    DRAG,
+    SLOPE,
     TOTAL_METER,
     dry_friction,
     friction_left,
@@ -79,12 +80,14 @@ def test_a_load_pulls_against_the_motion(straight: Straight) -> None:
 def test_a_floor_that_slopes_or_drags_is_a_load(straight: Straight) -> None:
     """Not slippery at all it pulls as a load does."""
     towed, _ = faulty(straight, "load_towed", drag=10.0)
-    for settings in ({LOAD: 10.0}, {LOAD: 10.0, DOWNHILL: np.pi}):
+    for settings in ({DRAG: 10.0}, {SLOPE: 10.0, DOWNHILL: np.pi}):
         motion, _ = faulty(straight, "floor_slippery", **{"severity": 0.0, **settings})
         assert motion.steps.torque[-1] == pytest.approx(towed.steps.torque[-1], abs=0.01)
         assert motion.truth.power[:59] == pytest.approx(towed.truth.power[:59])
-    left, _ = faulty(straight, "floor_slippery", **{"severity": 0.0, LOAD: 10.0, DOWNHILL: 1.571})
-    right, _ = faulty(straight, "floor_slippery", **{"severity": 0.0, LOAD: 10.0, DOWNHILL: -1.571})
+    left, _ = faulty(straight, "floor_slippery", **{"severity": 0.0, SLOPE: 10.0, DOWNHILL: 1.571})
+    right, _ = faulty(
+        straight, "floor_slippery", **{"severity": 0.0, SLOPE: 10.0, DOWNHILL: -1.571}
+    )
     healthy = run_plant(straight(robot=SMOOTH)).steps.torque[-1]
     pulls = [motion.steps.torque[-1] - healthy for motion in (left, right)]
     assert pulls[0] == pytest.approx(-pulls[1], abs=0.01)
@@ -98,7 +101,7 @@ def test_a_floor_drags_against_what_the_body_does_not_against_its_wheels(
     phases = (TwistPhase((0.0, 0.0, 0.0), 1.0), TwistPhase((0.5, 0.0, 0.0), 3.0), STOP)
     left = []
     for load in (0.0, 1.5):
-        settings = {"severity": 1.0, LOAD: load}
+        settings = {"severity": 1.0, DRAG: load}
         ice = PlannedFault("floor_slippery", 3.0, None, settings)
         motion = run_plant(straight(faults=(ice,), phases=phases, robot=SMOOTH))
         rolling = 0.05 * motion.steps.speed - motion.steps.gap
@@ -112,9 +115,14 @@ def test_half_of_the_slippery_floors_load_and_nothing_else_does() -> None:
     random, count = np.random.default_rng(1), 400
     slippery = PlannedFault("floor_slippery", 3.0, None, {"severity": 0.5})
     found = [loaded((slippery,), REFERENCE, 0.8, random)[0].settings for _ in range(count)]
-    loads = [float(str(settings[LOAD])) for settings in found if LOAD in settings]
+    loads = [
+        float(str(settings[name]))
+        for settings in found
+        for name in (DRAG, SLOPE)
+        if name in settings
+    ]
     assert 0.4 * count < len(loads) < 0.6 * count
-    sloping = sum(DOWNHILL in settings for settings in found)
+    sloping = sum({SLOPE, DOWNHILL} <= set(settings) for settings in found)
     assert 0.4 * len(loads) < sloping < 0.6 * len(loads)
     # Of 0.8 half of the way to 0.02 is left, by factors.
     assert friction_left(slippery, 0.8) == pytest.approx(np.sqrt(0.8 * 0.02))

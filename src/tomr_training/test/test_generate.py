@@ -77,7 +77,7 @@ def test_a_floor_that_drags_is_slippery_where_wheels_slide_on_it(
     straight: Callable[..., Drive],
 ) -> None:
     phases = (*straight().mission.phases, TwistPhase((0.0, 0.0, 0.0), 1.0))
-    ice = PlannedFault("floor_slippery", 3.5, None, {"severity": 1.0, "load": 0.5})
+    ice = PlannedFault("floor_slippery", 3.5, None, {"severity": 1.0, "drag": 0.5})
     drive = straight(faults=(ice,), phases=phases)
     sliding = np.flatnonzero(run_plant(drive).truth.slip.max(axis=1) > SLIPPING)
     labels = simulate(drive).labels

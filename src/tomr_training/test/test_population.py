@@ -10,7 +10,7 @@ from tomr_power_model.robot import Robot, shipped_robot
 from tomr_sim_bridge.missions.schema import TwistPhase
 from tomr_training.drives import random_drive
 from tomr_training.labels import spread
-from tomr_training.planar.faults import LOAD
+from tomr_training.planar.faults import is_load
 from tomr_training.planar.generate import simulate
 from tomr_training.planar.hidden import LEFT_OUT, MOST_EFFECTS
 from tomr_training.planar.population import (
@@ -105,7 +105,7 @@ def test_some_slippery_floors_are_a_load_as_well() -> None:
         fault for seed in range(200) for fault in training_drive(REFERENCE, seed).mission.faults
     ]
     slippery = [fault for fault in faults if fault.fault_id == "floor_slippery"]
-    assert 0 < sum(LOAD in fault.settings for fault in slippery) < len(slippery)
+    assert 0 < sum(is_load(fault) for fault in slippery) < len(slippery)
 
 
 def test_pushes_are_of_all_sizes_up_to_a_shove() -> None:

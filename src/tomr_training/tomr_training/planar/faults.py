@@ -32,6 +32,7 @@ Draw = Callable[[Robot, np.random.Generator], Settings]
 
 TOTAL_METER = "total_meter_scaled"  # of the battery's monitor: no fault of the simulator
 DRY = "friction.coulomb"
+DRAG, SLOPE, DOWNHILL = "drag", "slope", "downhill"  # settings of what loads the body
 
 
 def number(fault: PlannedFault, name: str) -> float:
@@ -64,7 +65,7 @@ _DRAWS: Mapping[str, Draw] = {
     "power_sensor_biased": lambda robot, random: {
         "bias": _log(random, 0.4, 8.0) * (1.0 if random.random() < 0.5 else -1.0)
     },
-    "load_towed": lambda robot, random: {"drag": robot.mass * _log(random, 0.4, 2.0)},
+    "load_towed": lambda robot, random: {DRAG: robot.mass * _log(random, 0.4, 2.0)},
     "supply_low": lambda robot, random: {
         "undervoltage": robot.supply.nominal_voltage * float(random.uniform(0.12, 0.45))
     },
@@ -110,8 +111,8 @@ _PAIRED = (
 # and mud do, or slope; that takes a share of the weight times the friction that is left.
 _LOADED = 0.5
 _TAKEN = (0.2, 0.75)
-LOAD, DOWNHILL = "load", "downhill"
-_GRAVITY = 9.81  # m/s^2
+# N/kg. `GRAVITY` is 0.03 % less: with it the shipped networks would not come out again bit by bit.
+_WEIGHT = 9.81
 _BRAKED = 1e-6  # share of the voltage at which the terminals are shorted, not open
 
 
@@ -141,17 +142,24 @@ def random_faults(
 def loaded(
     faults: tuple[PlannedFault, ...], robot: Robot, floor: float, random: np.random.Generator
 ) -> tuple[PlannedFault, ...]:
-    """The same, a slippery floor maybe with a load [N] and, if it slopes, where to [rad]; `floor`:
-    its friction before."""
+    """The same, a slippery floor maybe with what it drags [N], or pulls downhill [N, rad].
+
+    `floor`: its friction before.
+    """
     if [fault.fault_id for fault in faults] != ["floor_slippery"] or random.random() >= _LOADED:
         return faults
     (fault,) = faults
-    weight = robot.mass * _GRAVITY
+    weight = robot.mass * _WEIGHT
     load = weight * friction_left(fault, floor) * float(random.uniform(*_TAKEN))
-    settings = {**fault.settings, LOAD: load}
+    given: Settings = {DRAG: load}
     if random.random() < 0.5:
-        settings[DOWNHILL] = float(random.uniform(-math.pi, math.pi))
-    return (evolve(fault, settings=settings),)
+        given = {SLOPE: load, DOWNHILL: float(random.uniform(-math.pi, math.pi))}
+    return (evolve(fault, settings={**fault.settings, **given}),)
+
+
+def is_load(fault: PlannedFault) -> bool:
+    """Whether a force on the body comes with it."""
+    return DRAG in fault.settings or SLOPE in fault.settings
 
 
 def friction_left(fault: PlannedFault, floor: float) -> float:

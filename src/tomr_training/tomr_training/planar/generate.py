@@ -17,7 +17,7 @@ from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_training.drives import Drive
 from tomr_training.labels import SLIPPING, Flags, GroundTruth, Noise, deviates
-from tomr_training.planar.faults import LOAD, class_of
+from tomr_training.planar.faults import class_of, is_load
 from tomr_training.planar.plant import run_plant
 from tomr_training.planar.population import PER_ROBOT, bands_of, training_drive
 from tomr_training.planar.residuals import Compared, compare
@@ -93,7 +93,7 @@ def _labels(drive: Drive, truth: GroundTruth) -> Labels:
     for fault in drive.mission.faults:
         now = faulty_ticks(drive, fault)
         labels[now] = class_of(fault)
-        if LOAD in fault.settings:  # which is all there is while no wheel slides
+        if is_load(fault):  # which is all there is while no wheel slides
             slides = _recently(truth.slip.max(axis=1) > SLIPPING, _SETTLED)
             labels[now & ~slides] = EXTERNAL
         ever += now

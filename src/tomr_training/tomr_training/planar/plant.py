@@ -16,7 +16,7 @@ from tomr_power_model.robot import WHEELS, Robot
 from tomr_sim_bridge.missions.schema import PlannedFault
 from tomr_training.drives import Drive
 from tomr_training.labels import GroundTruth
-from tomr_training.planar.faults import CHANGES, DOWNHILL, LOAD, number
+from tomr_training.planar.faults import CHANGES, DRAG, number
 from tomr_training.planar.schedule import (
     TICK,
     counted_shares,
@@ -84,14 +84,12 @@ class Motion:
 def run_plant(chosen: Drive) -> Motion:
     """Drive the robot as it really is, with all that befalls it."""
     inputs = disturbed(chosen, chosen.plant)
+    vehicle = _on_its_floor(chosen)
     for fault in chosen.mission.faults:
-        if fault.fault_id == "load_towed":
-            free = run_plant(evolve(chosen, mission=evolve(chosen.mission, faults=())))
-            inputs[:, at.PUSH : at.PUSH + 2] += _drag(chosen, fault, number(fault, "drag"), free)
-        elif LOAD in fault.settings and DOWNHILL not in fault.settings:
-            free = _run(_on_its_floor(chosen), inputs, chosen.plant, chosen)
-            inputs[:, at.PUSH : at.PUSH + 2] += _drag(chosen, fault, number(fault, LOAD), free)
-    return _run(_on_its_floor(chosen), inputs, chosen.plant, chosen, _changes(chosen))
+        if DRAG in fault.settings:
+            free = _run(vehicle, inputs, chosen.plant, chosen)
+            inputs[:, at.PUSH : at.PUSH + 2] += _drag(chosen, fault, free)
+    return _run(vehicle, inputs, chosen.plant, chosen, _changes(chosen))
 
 
 def _changes(chosen: Drive) -> list[tuple[int, Array]]:
@@ -110,8 +108,8 @@ def _changes(chosen: Drive) -> list[tuple[int, Array]]:
     return found
 
 
-def _drag(chosen: Drive, fault: PlannedFault, load: float, free: Motion) -> Array:
-    """Dry drag of a size [N] against the motion that there would be without it, (periods, 2)."""
+def _drag(chosen: Drive, fault: PlannedFault, free: Motion) -> Array:
+    """Dry drag against the motion that there would be without it [N], (periods, 2)."""
     rolling = free.steps.speed - free.steps.gap / chosen.plant.wheel_radius
     twist = rolling @ wheels_to_twist(chosen.plant).T
     heading = integral(free.steps.yaw_rate[:, None], free.step)[:-1, 0]
@@ -120,7 +118,7 @@ def _drag(chosen: Drive, fault: PlannedFault, load: float, free: Motion) -> Arra
         [cos * twist[:, 0] - sin * twist[:, 1], sin * twist[:, 0] + cos * twist[:, 1]], axis=1
     )
     speed = np.hypot(np.hypot(*velocity.T), _CREEP)
-    force = -load * velocity / speed[:, None]
+    force = -number(fault, DRAG) * velocity / speed[:, None]
     start, end = fault.start, end_of(fault, chosen)
     time = free.step * np.arange(len(force))
     force[(time < start) | (time >= end)] = 0.0

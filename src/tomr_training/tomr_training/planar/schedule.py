@@ -11,7 +11,7 @@ from tomr_power_model.dynamics.numbers import no_input, timing_of
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_sim_bridge.missions.schema import PlannedFault
 from tomr_training.drives import Drive, severity_of, wheel_of
-from tomr_training.planar.faults import DOWNHILL, LOAD, friction_left, number
+from tomr_training.planar.faults import DOWNHILL, SLOPE, friction_left, number
 
 Array = NDArray[np.float64]
 
@@ -54,10 +54,10 @@ def disturbed(drive: Drive, robot: Robot) -> Array:
             wheel = wheel_of(fault)
             columns = _column(field) if wheel is None else [_column(field)[wheel]]
             inputs[when, columns] *= share
-        if DOWNHILL in fault.settings:
-            load, azimuth = number(fault, LOAD), number(fault, DOWNHILL)
-            inputs[when, at.PUSH] += load * math.cos(azimuth)
-            inputs[when, at.PUSH + 1] += load * math.sin(azimuth)
+        if SLOPE in fault.settings:
+            pull, azimuth = number(fault, SLOPE), number(fault, DOWNHILL)
+            inputs[when, at.PUSH] += pull * math.cos(azimuth)
+            inputs[when, at.PUSH + 1] += pull * math.sin(azimuth)
     return inputs
 
 
