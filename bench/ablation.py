@@ -28,7 +28,8 @@ from attrs import frozen
 from commissioned import FAULTY, HEALTHY, IMU_TOPIC, commissioned_kind, file_of, seed_of, tour
 from diagnosis import codes_of, rebanded, score_faulty, score_healthy, twin_of
 from diagnosis_report import Outcome, report
-from extended import KINDS, Fleet, scenario_of, seeds_of, targets, tracked
+from extended import Fleet, scenario_of, seeds_of, targets, tracked
+from faults.drawn import KINDS
 from faults.play import changes_of
 from faults.recordings import Recordings
 from ramps import over_ramps

@@ -4,12 +4,11 @@
         [--commissioned DIR [--without-imu]]
 
 So many drives of each kind of fault in docs/faults.md, and of slippery floors on which the robot
-tows something: robots, deviations of 5 % from their
-description, payloads, floors, bumps, missions and sensor noise as in bench/diagnosis.py, wheels,
-sizes and onsets at random, from seeds that nothing else uses. Healthy drives are shoved (up to
-3 N/kg for 0.2 s) and leaned on (up to 1 N/kg for seconds) as well. With --commissioned the robots
-are those that bench/commissioned.py --out DIR has commissioned, with their commissioned.yaml; and
-their drives without an IMU with --without-imu.
+tows something: robots, deviations of 5 % from their description, payloads, floors, bumps, missions
+and sensor noise as in bench/diagnosis.py, wheels, sizes and onsets at random, from seeds that
+nothing else uses. Healthy drives are shoved (up to 3 N/kg for 0.2 s) and leaned on (up to 1 N/kg
+for seconds) as well. With --commissioned the robots are those that bench/commissioned.py --out DIR
+has commissioned, with their commissioned.yaml; and their drives without an IMU with --without-imu.
 
 A fault counts while it shows: power or speeds differ measurably from those of a twin of the same
 robot in the same drive without the fault (`tomr_training/labels.py`); one of a power sensor, while
@@ -22,9 +21,8 @@ import math
 import os
 import sys
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from itertools import pairwise
 from pathlib import Path
 from typing import Self
 
@@ -34,6 +32,7 @@ from commissioned import IMU_TOPIC, commissioned_kind, tour
 from diagnosis import Kind as Diagnosed
 from diagnosis import rebanded, twin_of
 from diagnosis_report import publish
+from faults.drawn import EXTENDED, KINDS, LOADED_SLIP, NOT_TRAINED, faulty_drive, pushed_drive
 from tqdm import tqdm
 
 from tomr_fault_diag.classifier.settings import ClassifierSettings
@@ -53,9 +52,7 @@ from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.cli import run_main
 from tomr_power_model.errors import InputError
-from tomr_power_model.robot import Robot, shipped_robot
-from tomr_sim_bridge.faults import check_settings
-from tomr_sim_bridge.missions.schema import PlannedFault
+from tomr_power_model.robot import shipped_robot
 from tomr_training.drives import Drive, random_drive
 from tomr_training.labels import SLIPPING, Flags, GroundTruth, Noise, deviates, lasting
 from tomr_training.simulated_drive import (
@@ -71,97 +68,6 @@ _PERIOD = PERIOD_NS * 1e-9  # s
 _DRIVE_SECONDS = 18.0  # mean length of a drive, at least
 _TURNING = 0.5  # rad/s: a slower wheel may hide what its power sensor does
 _JOINED = 1.0  # s between two shows that make one
-
-Random = np.random.Generator
-Sized = tuple[dict[str, object], float]  # settings at severity 1, and the size to be scored by
-
-
-EXTENDED = "extended states"
-NOT_TRAINED = "unknown kinds"
-LOADED_SLIP = "slip under a load"  # one of the paper's six, and no other state is right
-
-
-@frozen
-class Kind:
-    """A fault to draw: its settings and the size by which it is scored."""
-
-    fault_id: str
-    draw: Callable[[Random, Robot], Sized]
-    group: str = EXTENDED
-    also: str = ""  # a second fault, of another kind, at once
-    draw_also: Callable[[Random, Robot], Sized] = lambda random, robot: ({"severity": 0.8}, 0.8)
-
-
-def _plain(random: Random, robot: Robot) -> Sized:
-    return {}, 1.0
-
-
-def _uniform(setting: str, low: float, high: float) -> Callable[[Random, Robot], Sized]:
-    def draw(random: Random, robot: Robot) -> Sized:
-        value = float(random.uniform(low, high))
-        return {setting: value}, value
-
-    return draw
-
-
-def _drag(random: Random, robot: Robot) -> Sized:
-    """In parts of the wheel's own dry friction."""
-    own = robot.everywhere("friction.coulomb", "torque", 0.0)[0]
-    share = float(random.uniform(0.3, 6.0))
-    return {"torque": share * own}, share
-
-
-def _scale(random: Random, robot: Robot) -> Sized:
-    off = float(random.uniform(0.15, 0.7))
-    return {"factor": 1.0 + off * float(random.choice([-1.0, 1.0]))}, off
-
-
-def _bias(random: Random, robot: Robot) -> Sized:
-    off = float(random.uniform(0.5, 6.0))
-    return {"bias": off * float(random.choice([-1.0, 1.0]))}, off
-
-
-def _towed(random: Random, robot: Robot) -> Sized:
-    share = float(random.uniform(0.4, 1.5))  # N/kg
-    return {"drag": share * robot.mass}, share
-
-
-def _slippery(random: Random, robot: Robot) -> Sized:
-    severity = float(random.uniform(0.5, 0.85))  # of traction 0.02 to 0.14 is left
-    return {"severity": severity}, severity
-
-
-def _hindered(random: Random, robot: Robot) -> Sized:
-    share = float(random.uniform(0.15, 0.6))  # N/kg
-    return {"drag": share * robot.mass}, share
-
-
-def _wind(random: Random, robot: Robot) -> Sized:
-    speed = float(random.uniform(8.0, 16.0))
-    return {"speed": speed, "azimuth": float(random.uniform(-math.pi, math.pi))}, speed
-
-
-KINDS: Mapping[str, Kind] = {
-    kind.fault_id + ("" if not kind.also else f" and {kind.also}"): kind
-    for kind in (
-        Kind("drivers_off", _plain),
-        Kind("commands_ignored", _plain),
-        Kind("wheel_stuck", _plain),
-        Kind("bearing_dragging", _drag),
-        Kind("motor_resistance_high", _uniform("rise", 0.1, 2.0)),
-        Kind("motor_torque_weak", _uniform("loss", 0.1, 0.6)),
-        Kind("power_sensor_dead", _plain),
-        Kind("power_sensor_frozen", _plain),
-        Kind("power_sensor_scaled", _scale),
-        Kind("power_sensor_biased", _bias),
-        Kind("supply_low", _uniform("undervoltage", 2.0, 8.0)),
-        Kind("control_signal_lost", _plain, also="floor_slippery"),
-        Kind("load_towed", _towed, NOT_TRAINED),
-        Kind("tethered", _uniform("stiffness", 10.0, 40.0), NOT_TRAINED),
-        Kind("windy", _wind, NOT_TRAINED),
-        Kind("floor_slippery", _slippery, LOADED_SLIP, "load_towed", _hindered),
-    )
-}
 
 
 @frozen
@@ -201,51 +107,6 @@ class Fleet:
 
 def _number(folder: Path) -> int:
     return int(folder.name.removeprefix("robot_"))
-
-
-def faulty_drive(drive: Drive, name: str) -> tuple[Drive, float]:
-    """A drive with a fault of a kind in it, and the size of the fault."""
-    kind, seed = KINDS[name], drive.seed
-    random = np.random.default_rng([seed, 1])
-    settings, size = kind.draw(random, drive.plant)
-    start = float(random.uniform(0.2, 0.5) * drive.length)
-    end = float(random.uniform(0.7, 1.0) * drive.length)
-    wheel = int(random.integers(1, 4))
-    faults = [_planned(kind.fault_id, start, end, wheel, settings)]
-    if kind.also:
-        faults.append(
-            _planned(kind.also, start, end, wheel, kind.draw_also(random, drive.plant)[0])
-        )
-    return evolve(drive, mission=evolve(drive.mission, faults=tuple(faults))), size
-
-
-def _planned(
-    fault_id: str, start: float, end: float, wheel: int, given: Mapping[str, object]
-) -> PlannedFault:
-    settings = {"severity": 1.0, **given}
-    if "wheel" in check_settings(fault_id, {}, fault_id):
-        settings["wheel"] = wheel
-    return PlannedFault(fault_id, start, end, check_settings(fault_id, settings, fault_id))
-
-
-def pushed_drive(drive: Drive) -> Drive:
-    """A healthy drive with two shoves and a lean, beside the bumps that all drives have."""
-    random = np.random.default_rng([drive.seed, 2])
-    begins = np.sort(random.uniform(1.0, drive.length - 1.0, 3))
-    pushes = []
-    for begin, until in pairwise([*begins, drive.length]):
-        is_lean = random.random() < 0.3
-        length = min(random.uniform(2.0, 6.0) if is_lean else 0.2, until - begin)
-        if length <= 0.0:
-            continue
-        settings = {
-            "force": float(random.uniform(0.3, 1.0) if is_lean else random.uniform(0.5, 3.0)),
-            "azimuth": float(random.uniform(-math.pi, math.pi)),
-            "lever": float(random.uniform(-0.5, 0.5) * drive.plant.robot_radius),
-            "rise": length / 2.0 if is_lean else 0.0,
-        }
-        pushes.append(_planned("pushed", float(begin), float(begin + length), 1, settings))
-    return evolve(drive, mission=evolve(drive.mission, faults=tuple(pushes)))
 
 
 @frozen
@@ -357,13 +218,11 @@ def scored(task: tuple[Fleet, int, str]) -> Seen | None:
 
 def targets(found: Sequence[Seen]) -> dict[str, object]:
     """What each group of faults was called for most of the time, with exact intervals."""
-    groups: dict[str, Counter[str]] = {
-        name: Counter() for name in (EXTENDED, NOT_TRAINED, LOADED_SLIP)
-    }
+    names = EXTENDED, NOT_TRAINED, LOADED_SLIP
+    groups: dict[str, Counter[str]] = {name: Counter() for name in names}
     for case in (case for item in found for case in item.cases):
-        groups[KINDS[case.kind].group][
-            case.verdicts.most_common(1)[0][0] if case.verdicts else MISSED
-        ] += 1
+        most = case.verdicts.most_common(1)[0][0] if case.verdicts else MISSED
+        groups[KINDS[case.kind].group][most] += 1
     report: dict[str, object] = {}
     for name, counts in groups.items():
         total = counts.total()

@@ -19,7 +19,8 @@ from pathlib import Path
 
 import numpy as np
 from attrs import frozen
-from extended import Fleet, faulty_drive
+from extended import Fleet
+from faults.drawn import faulty_drive
 from faults.recordings import Recordings
 from stages import pipeline_of, steps_of
 from tqdm import tqdm

@@ -12,18 +12,8 @@ sys.path.append(str(Path(__file__).resolve().parent.parent / "bench"))
 
 from commissioned import made
 from diagnosis import Kind as Diagnosed
-from extended import (
-    EXTENDED,
-    KINDS,
-    Fleet,
-    Scenario,
-    faulty,
-    faulty_drive,
-    pushed_drive,
-    scored,
-    spans,
-    targets,
-)
+from extended import Fleet, Scenario, faulty, scored, spans, targets
+from faults.drawn import EXTENDED, KINDS, faulty_drive, pushed_drive
 
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.diagnosis.score import Case, Seen
@@ -108,7 +98,6 @@ def test_slip_under_a_load_counts_where_a_wheel_slides_and_no_other_name_is_righ
     assert not label.is_right("external load", 0)
     assert not label.is_right("unknown", 0)
     slides = found.labelled.truth.slip.max(axis=1) > SLIPPING
-    first = START_NS / 1e9
     first = found.labelled.first
     begins = [round(begin / 0.05) - first for begin, _ in label.observable]
     assert begins
