@@ -1,1 +1,2 @@
-"""Recordings with and without faults: explained, diagnosed, and power residuals by regime."""
+"""Recordings with and without faults: explained, diagnosed, power residuals by regime; and
+faults to draw for drives in MuJoCo."""
