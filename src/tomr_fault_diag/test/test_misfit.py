@@ -5,6 +5,7 @@ import pytest
 from attrs import evolve
 
 from tomr_fault_diag.classifier.braking import BrakingWatch
+from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.evidence import ALONE, Beside
 from tomr_fault_diag.classifier.judges import Opinion
 from tomr_fault_diag.classifier.misfit import MisfitWatch
@@ -12,6 +13,7 @@ from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.outside import Outside, OutsideWatch
 from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.classifier.slides import SlideWatch
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.classifier.states import (
     CONTROL,
@@ -279,14 +281,34 @@ class Looks(Sure):
         return evolve(said, state=PUSHED if self.state == NORMAL else None, sure=False)
 
 
-def judged(judge: Sure, outside: Outside) -> list[str]:
-    """States of a robot that is far off."""
-    leans = Leans(shipped_robot("reference"))
+class Grips(SlideWatch):
+    """Whatever it shows; and whether an accelerometer is heard."""
+
+    contacts = Contacts(0.0)
+
+    def take(self, frame: ResidualFrame) -> Contacts:
+        return self.contacts
+
+
+def changes(judge: Sure, outside: Outside, contacts: Contacts = NOTHING) -> list[tuple[int, str]]:
+    """When [ms] states of a robot that is far off change, and to what."""
+    robot = shipped_robot("reference")
+    leans = Leans(robot)
     leans.outside = outside
-    classifier = FaultClassifier(judge, outside=leans)
+    slides = Grips(robot)
+    slides.contacts = contacts
+    classifier = FaultClassifier(judge, outside=leans, slides=slides)
     far = (frame(t, TURNING, TURNING, power=9.0) for t in range(50, 3000, 50))
     said = [classifier.classify(item) for item in far]
-    return [item.state.name for item in said if item is not None and item.changed]
+    return [
+        ((item.stamp_ns - BASE) // MS, item.state.name)
+        for item in said
+        if item is not None and item.changed
+    ]
+
+
+def judged(judge: Sure, outside: Outside, contacts: Contacts = NOTHING) -> list[str]:
+    return [name for _, name in changes(judge, outside, contacts)]
 
 
 def test_what_somebody_who_leans_explains_is_not_unknown() -> None:
@@ -296,8 +318,27 @@ def test_what_somebody_who_leans_explains_is_not_unknown() -> None:
 def test_what_looks_like_a_push_and_may_be_a_slope_is_not_unknown() -> None:
     assert judged(Looks(NORMAL), Outside(fits_slope=True)) == ["normal", "pushed"]
     assert judged(Looks(NORMAL), Outside()) == ["normal", "unknown"]
-    assert judged(Sure(NORMAL), Outside(fits_slope=True)) == ["normal", "unknown"]
     assert judged(Looks(CONTROL), Outside(fits_slope=True))[-1] == "unknown"
+
+
+GRIPS, FEELS = Contacts(0.0), Contacts(0.0, felt=True)
+
+
+def test_what_fits_a_slope_is_unknown_only_where_an_accelerometer_would_feel_one() -> None:
+    """Whatever it looks like, if not like a fault."""
+    fits = Outside(fits_slope=True)
+    assert judged(Sure(NORMAL), fits, GRIPS) == ["normal", "pushed"]
+    assert judged(Sure(NORMAL), fits, FEELS) == ["normal", "unknown"]
+    assert judged(Looks(NORMAL), fits, FEELS) == ["normal", "pushed"]
+    assert judged(Sure(NORMAL), fits) == ["normal", "unknown"]  # nothing is known of the contacts
+
+
+def test_what_looks_like_a_push_may_be_a_slope_that_begins() -> None:
+    """Where nothing feels one, its laws need longer to show."""
+    assert changes(Looks(NORMAL), Outside(), GRIPS) == [(50, "normal"), (2550, "unknown")]
+    for contacts in (FEELS, NOTHING):
+        assert changes(Looks(NORMAL), Outside(), contacts)[1] == (1050, "unknown")
+    assert changes(Sure(NORMAL), Outside(), GRIPS)[1] == (1050, "unknown")
 
 
 def test_what_an_accelerometer_feels_is_not_unknown() -> None:

@@ -224,6 +224,9 @@ def test_what_a_slope_explains_accuses_no_wheel_that_was_well() -> None:
     wheels = range(CONTROLS.start, WEAKS.stop)  # a power sensor feels no slope
     assert changed("a slope", moment) == dict.fromkeys(wheels, pytest.approx(-10.0))
     assert changed("a slope", evolve(moment, may_be_slope=False)) == {}
+    some = Contacts(0.0, slopes=True)  # an accelerometer would know which
+    assert changed("a slope", beside(some)) == changed("a slope", moment)
+    assert changed("a slope", beside(evolve(some, felt=True))) == {}
 
 
 def test_without_rules_the_network_alone_is_heard() -> None:

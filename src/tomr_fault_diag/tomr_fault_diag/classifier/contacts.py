@@ -47,6 +47,11 @@ class Contacts:
     felt: bool = False
 
     @property
+    def hides_slopes(self) -> bool:
+        """Whether something is known of them, and no accelerometer would feel a slope."""
+        return not (math.isnan(self.slides) or self.felt)
+
+    @property
     def grips(self) -> bool:
         """Whether no wheel slides, as far as is known."""
         return self.slides < _GRIPS  # nor where it is NaN

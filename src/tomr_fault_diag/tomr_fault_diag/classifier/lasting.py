@@ -19,7 +19,8 @@ nothing it predicts the next tick is evidence, which the belief gathers. No more
 
 - by a force on the body, which is shared out among the wheels, sudden, or of a slope,
 - by the total power, which tells a motor that draws more from a sensor that shows more,
-- of what the other wheels show as well, as on a carpet, and of what came within minutes, as heat.
+- of what the other wheels show as well, as on a carpet, and of what came within minutes, as heat,
+- by what a load has left in the drivers' sums.
 """
 
 import numpy as np
@@ -27,6 +28,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.belief import DRAGS, HYPOTHESES, METERS, WEAKS
+from tomr_fault_diag.classifier.driver_sums import DriverSums
 from tomr_fault_diag.classifier.forces import SteadyForce, by_sudden_force
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.severity.tick import MOVES
@@ -117,6 +119,7 @@ class LastingWatch:
         self._shares = motors.mass * motors.from_force * np.array([1.0, 1.0, lever])
         s = self.settings
         self._steady = SteadyForce(s.memory, s.steady, s.scatter)
+        self._sums = DriverSums()
         self.clear()
 
     def clear(self) -> None:
@@ -126,6 +129,7 @@ class LastingWatch:
         self._doubted = np.zeros(WHEELS, dtype=np.int64)  # ns, until when voltages are
         self._said = np.zeros(HYPOTHESES)
         self._steady.clear()
+        self._sums.clear()
         # Sums of phi^2 and phi r, (4, 3): faults and wheels; and of all faults at each wheel.
         self._squares = np.zeros((_COUNT, WHEELS))
         self._products = np.zeros((_COUNT, WHEELS))
@@ -161,6 +165,8 @@ class LastingWatch:
         steady = self._steady.take(sudden.T.ravel(), shared, elapsed, turning)
         found = self._predicted(sudden, effects, shared, steady, frame)
         self._learn(sudden, effects, elapsed)
+        volts, shows = sudden[:, 1], np.asarray(effects[:, :, 1].any(axis=0))
+        self._sums.take(volts * _voltage_bands(frame), np.abs(volts) > 1.0, shows, elapsed)
         said = np.full(HYPOTHESES, -np.inf)
         for fault, row in zip(FAULTS, self.settings.worth * found, strict=True):
             said[fault.hypotheses] = np.maximum(said[fault.hypotheses], row)
@@ -224,9 +230,10 @@ class LastingWatch:
         size = _beyond_others(np.where(_SIGNED, size, np.maximum(size, 0.0)))
         mean = size[:, :, None] * effects
         little = np.maximum(_NEGLIGIBLE / _TYPICAL * np.abs(effects), s.little)
-        little = np.clip(
-            np.stack(np.broadcast_arrays(mean[:, :, 0], sudden[:, 1]), 2), -little, little
-        )
+        stays = self._sums.stays / _voltage_bands(frame)
+        around = np.stack(np.broadcast_arrays(np.zeros((_COUNT, 1)), stays), 2)
+        explained = np.stack(np.broadcast_arrays(mean[:, :, 0], sudden[:, 1]), 2)
+        little = np.clip(explained, around - little, around + little)
         none = _better(sudden, np.zeros(1), little, s.scatter)
         none += by_sudden_force(_left(sudden, little), shared, s.forces, s.scatter)
         # Nor does a description know the winding and the magnet of a motor, which voltages show.
@@ -276,6 +283,11 @@ class LastingWatch:
 
 def _of(frame: ResidualFrame, channels: range) -> list[Residual]:
     return [frame.residuals[index] for index in channels]
+
+
+def _voltage_bands(frame: ResidualFrame) -> Array:
+    """In V, (3,); 1 where a voltage is not known, which shows nothing."""
+    return np.nan_to_num([item.band for item in frame.voltages], nan=1.0)
 
 
 def _beyond_others(size: Array) -> Array:

@@ -31,6 +31,7 @@ _IDLE = 0.5  # bands by which the power of a motor that is not driven may be off
 _IGNORED_FOR = to_ns(0.3)
 _FAR = 3.0  # bands
 _FAR_FOR = to_ns(1.0)
+_FAR_LONG = to_ns(2.5)  # by then the laws of what acts from outside have seen a slope's beginning
 _LOW_FOR = to_ns(1.0)
 _MORE = 0.02  # of the nominal voltage, by which it must rise to be no longer low
 _GAP = to_ns(1.0)  # a longer silence says nothing of what lay in it
@@ -44,6 +45,7 @@ class Misfit:
     # And for long enough to be named; or it brakes unasked, or no motor has been driven for long.
     disobeys: bool = False
     unexplained: bool = False  # some residual has been far out of its band for long
+    stays_so: bool = False  # for so long that even a push or a slope is known by then
     low_supply: bool = False  # its voltage has been too low for long
 
 
@@ -88,12 +90,14 @@ class MisfitWatch:
         # Drivers that lack voltage do not drive, either.
         unpowered = not is_low and self._is_unpowered(frame, speeds)
         self._unpowered_since = _since(self._unpowered_since, now, holds=unpowered)
+        far_since = min(self._far_since.values(), default=now)
         stands = ignores and _lasts(self._halting_since, now, _IGNORED_FOR)
         brakes = self._brakes(now, speeds)
         return Misfit(
             ignores,
             stands or brakes or _lasts(self._unpowered_since, now, _IGNORED_FOR),
-            any(now - since >= _FAR_FOR for since in self._far_since.values()),
+            now - far_since >= _FAR_FOR,
+            now - far_since >= _FAR_LONG,
             _lasts(self._low_since, now, _LOW_FOR),
         )
 

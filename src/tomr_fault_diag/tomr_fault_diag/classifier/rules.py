@@ -198,7 +198,9 @@ def _pushed_grip(likelihoods: Array, moment: Moment) -> Array:
 
 def _slope(likelihoods: Array, moment: Moment) -> Array:
     """What a slope explains accuses no wheel; one that is accused already stays so."""
-    if moment.beside.contacts.force and moment.may_be_slope:
+    contacts = moment.beside.contacts
+    is_slope = contacts.force or (contacts.slopes and contacts.hides_slopes)
+    if is_slope and moment.may_be_slope:
         return _less(likelihoods, slice(CONTROLS.start, WEAKS.stop), _SHARED)
     return likelihoods
 

@@ -245,10 +245,7 @@ class FaultClassifier:
 
     def _weigh(self, opinion: Opinion, misfit: Misfit, stamp: int, outside: Outside) -> None:
         """Name what the judge is sure of, or what it does not know."""
-        leading = _called(opinion, misfit)
-        is_unnamed = self._state in _QUIET or self._state is UNKNOWN
-        if leading is UNKNOWN and is_unnamed and self._may_be_pushed(opinion, outside):
-            leading = PUSHED
+        leading = self._leading(opinion, misfit, outside)
         candidate = STATES[NORMAL] if leading in _WELL else leading
         if not _is_one_fault(candidate, self._candidate):
             self._candidate_since, self._sure_since = stamp, None
@@ -268,12 +265,24 @@ class FaultClassifier:
         elif self._state is None:
             self._enter(STALE, stamp, None)
 
+    def _leading(self, opinion: Opinion, misfit: Misfit, outside: Outside) -> State:
+        """What leads; what a push or a slope may explain is not unknown."""
+        if self._state not in _QUIET and self._state is not UNKNOWN:
+            return _called(opinion, misfit)
+        if opinion.leading is PUSHED and self._contacts.hides_slopes:
+            misfit = evolve(misfit, unexplained=misfit.stays_so)  # a slope may have begun
+        leading = _called(opinion, misfit)
+        is_pushed = leading is UNKNOWN and self._may_be_pushed(opinion, outside)
+        return PUSHED if is_pushed else leading
+
     def _may_be_pushed(self, opinion: Opinion, outside: Outside) -> bool:
         """Whether somebody who leans on the robot, or a slope, explains what is far off."""
-        looks_so = opinion.leading is PUSHED and outside.fits_slope
-        is_felt = opinion.leading in _WELL and outside.fits_felt
+        is_well, hidden = opinion.leading in _WELL, self._contacts.hides_slopes
+        may_be_slope = opinion.leading is PUSHED or (is_well and hidden)
+        looks_so = may_be_slope and outside.fits_slope
+        is_felt = is_well and outside.fits_felt
         # Where nothing feels a slope, it need not be known which explains it.
-        slopes = self._contacts.slopes and not self._contacts.felt
+        slopes = self._contacts.slopes and hidden
         return outside.may_be_push or looks_so or is_felt or slopes
 
     def _may_name(self, leading: State, wheel: int | None) -> bool:
