@@ -24,12 +24,14 @@ def beyond(
     simulated: list[float] | None = None,
     *,
     expected: list[float] | None = None,
+    holds: float = 2.0,
     share: float = 1.0,
 ) -> list[float]:
     """Of a tick, by default at its end and of wheels that stand."""
     given = STILL if speed is None else speed
     same = given if simulated is None else simulated
-    return law.beyond(ahead, given, same, expected=expected or STILL, share=share)
+    held = [holds] * 3
+    return law.beyond(ahead, given, same, expected=expected or STILL, holds=held, share=share)
 
 
 @pytest.fixture
@@ -61,6 +63,22 @@ def test_what_a_push_left_before_the_first_command_is_soon_forgotten() -> None:
     for _ in range(20):
         found = beyond(law, [0.09, 0.0, 0.0], [5.0, 0.0, 0.0])
     assert found[0] == pytest.approx(0.03 * INTEGRAL * math.exp(-2.1), rel=0.01)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_more_than_friction_could_hold_is_a_load_that_stays(way: float) -> None:
+    """1.3 times as much is forgotten, and then only slowly."""
+    law, load = DriverLaw(ROBOT, TICK), [0.0, way * 0.1, 0.0]
+    beyond(law, STILL)
+    for _ in range(40):
+        found = beyond(law, load, TURNING, holds=0.2)
+    stays = way * (0.1 * INTEGRAL - 1.3 * 0.2)
+    assert found[1] == pytest.approx(stays, rel=0.07)
+    law.forget()  # what it is asked for is not known: so then may be anything
+    beyond(law, STILL)
+    for _ in range(40):
+        found = beyond(law, load, TURNING, holds=0.5)
+    assert found[1] == pytest.approx(way * (0.1 * INTEGRAL - 1.3 * 0.5), rel=0.07)
 
 
 def test_what_a_wheel_falls_behind_is_summed_up(law: DriverLaw) -> None:

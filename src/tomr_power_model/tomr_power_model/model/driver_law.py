@@ -5,9 +5,10 @@
 for both are asked for the same, and sum up their errors. The motion alone shows it, whatever
 friction there is. The offset is what the two sums differed by at the beginning, which a push may
 have left: it fades until the wheel has turned as simulated for two seconds on end, but not while
-it turns otherwise, for then the sums do differ. Jitter of the commands adds to it later, so it goes
-on to fade while the wheel turns, slowly: what stays in the voltage shows for minutes. A driver
-gives no more than its supply, and then does not sum up.
+it turns otherwise, for then the sums do differ. More than friction held the wheel against no push
+has left: what differs beyond that is a load, as of a slope, and stays. Jitter of the commands adds
+to it later, so it goes on to fade while the wheel turns, slowly: what stays in the voltage shows
+for minutes. A driver gives no more than its supply, and then does not sum up.
 
 Real drivers take up a command when their period begins, up to half a period before or after the
 simulated ones do. A wheel that turns faster by omega is ahead by omega times that, all three alike:
@@ -25,6 +26,7 @@ from tomr_power_model.robot import WHEELS, Robot
 _MOVING = 1.0  # rad/s
 _FADES = 0.03  # 1/s, of the difference in motion, ...
 _FADES_FIRST, _FIRST = 2.1, 2.0  # ... and until, so many seconds on end, ...
+_MORE = 1.3  # times what friction could hold, for no description has it right
 _ALIKE = 0.2  # ... the wheel has turned as simulated [rad/s]
 _LIKE = 0.5  # rad/s, by which a wheel turns as simulated
 _MEMORY = 30.0  # s, over which the delay of the drivers is estimated
@@ -59,7 +61,8 @@ class DriverLaw:
         self._offsets = Offsets()
         self._before = [UNKNOWN] * WHEELS  # what the sums differed by at the end of the last tick
         self._usual = [UNKNOWN] * WHEELS  # speeds that the offsets stand for [rad/s]
-        self._begins = [self._lasts] * WHEELS  # ticks of motion in which an offset fades soon
+        self._begins = [self._lasts] * WHEELS  # ticks of motion in which an offset fades soon ...
+        self._may_fade = [math.inf] * WHEELS  # ... and so much of it may [rad]
 
     def beyond(
         self,
@@ -68,6 +71,7 @@ class DriverLaw:
         simulated: Sequence[float],
         *,
         expected: Sequence[float],
+        holds: Sequence[float],
         share: float,
     ) -> list[float]:
         """Of each driver [V], NaN where not known.
@@ -77,6 +81,7 @@ class DriverLaw:
             speed: of the wheels, mean of the tick [rad/s].
             simulated: the same as simulated.
             expected: voltages of the simulated drivers then [V].
+            holds: what friction holds the wheels against while the robot stands [V].
             share: of the tick at the time that is asked about.
         """
         slower = [there - here for there, here in zip(simulated, speed, strict=True)]
@@ -84,8 +89,10 @@ class DriverLaw:
         for wheel in range(WHEELS):
             apart = UNKNOWN  # an angle that is lost for a moment leaves the offset as it is
             if ahead[wheel] == ahead[wheel]:
-                fades = self._fades(wheel, speed[wheel], slower[wheel])
-                apart = self._offsets.beyond(wheel, ahead[wheel], fades)
+                apart = self._offsets.beyond(wheel, ahead[wheel], 0.0)
+                fades = self._fades(wheel, speed[wheel], slower[wheel], abs(apart), holds[wheel])
+                self._offsets.lower(wheel, fades * apart)
+                apart -= fades * apart
                 self._follow_usual(wheel, simulated[wheel], fades)
             volts = expected[wheel] + self._proportional * slower[wheel]
             now.append(self._limited(wheel, apart, volts))
@@ -101,9 +108,10 @@ class DriverLaw:
             for less, apart, more in zip(slower, sums, faster, strict=True)
         ]
 
-    def _fades(self, wheel: int, speed: float, slower: float) -> float:
+    def _fades(self, wheel: int, speed: float, slower: float, apart: float, holds: float) -> float:
         """Share of an offset that a tick takes off, of a wheel that turns so, and so much slower
-        than simulated [rad/s]."""
+        than simulated [rad/s], whose sums are so far apart [rad], and that friction has held
+        against so much [V]."""
         if not abs(speed) > _MOVING:
             return 0.0
         if not self._begins[wheel]:
@@ -112,7 +120,16 @@ class DriverLaw:
             self._begins[wheel] = self._lasts
             return self._later
         self._begins[wheel] -= 1
-        return self._first
+        return max(self._later, self._of_a_push(wheel, apart, holds))
+
+    def _of_a_push(self, wheel: int, apart: float, holds: float) -> float:
+        """The same of what a push may have left."""
+        if not (apart and self._integral):
+            return self._first
+        most = min(self._may_fade[wheel], _MORE * holds / self._integral)
+        fades = min(self._first * apart, most)
+        self._may_fade[wheel] = most - fades
+        return fades / apart
 
     def _follow_usual(self, wheel: int, simulated: float, fades: float) -> None:
         """Let the speed that an offset stands for fade as the offset does."""

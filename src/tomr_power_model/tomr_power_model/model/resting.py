@@ -132,7 +132,10 @@ class RestingDrivers:
             expected.append(self._proportional * there + self._integral * sums[wheel])
             found.append(self._proportional * here + self._integral * (sums[wheel] + known))
         held, simulates = map(between, self._before, (found, expected), (share, share))
-        beyond = self._law.beyond(ahead, speed, simulated, expected=expected, share=share)
+        holds = self._holding.voltages(*map(path.wheel, (at.DRY, at.SIDE_LIMIT, at.HOT)))
+        beyond = self._law.beyond(
+            ahead, speed, simulated, expected=expected, holds=holds, share=share
+        )
         taken = self._follow(path, apart, ahead, speed)
         self._law.taken_over(taken)
         after = [volts + self._integral * more for volts, more in zip(expected, taken, strict=True)]
