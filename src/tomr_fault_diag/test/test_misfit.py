@@ -341,6 +341,29 @@ def test_what_looks_like_a_push_may_be_a_slope_that_begins() -> None:
     assert changes(Sure(NORMAL), Outside(), GRIPS)[1] == (1050, "unknown")
 
 
+class Wavers(Looks):
+    """Sure of a fault for two seconds; then it looks like a push."""
+
+    def judge(
+        self, frame: ResidualFrame, elapsed_ns: int, unseen: Unseen, beside: Beside = ALONE
+    ) -> Opinion:
+        is_over = frame.stamp_ns > BASE + 2000 * MS
+        self.state, self.sure = (NORMAL, False) if is_over else (CONTROL, True)
+        if is_over:
+            return super().judge(frame, elapsed_ns, unseen, beside)
+        return Opinion(np.eye(6)[CONTROL], sure=True)
+
+
+def test_a_named_fault_stays_while_what_is_far_off_looks_like_a_push() -> None:
+    """No slope has just begun there, so it is not over after a second and a half."""
+    slides = Grips(shipped_robot("reference"))
+    slides.contacts = GRIPS
+    classifier = FaultClassifier(Wavers(CONTROL), slides=slides)
+    far = (frame(t, TURNING, TURNING, power=9.0 * (t > 1500)) for t in range(50, 3900, 50))
+    said = [classifier.classify(item) for item in far]
+    assert {item.state.name for item in said if item} == {"control system fault"}
+
+
 def test_what_an_accelerometer_feels_is_not_unknown() -> None:
     assert judged(Looks(NORMAL), Outside(fits_felt=True)) == ["normal", "pushed"]
     assert judged(Sure(NORMAL), Outside(fits_felt=True)) == ["normal", "pushed"]

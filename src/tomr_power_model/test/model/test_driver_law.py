@@ -81,6 +81,14 @@ def test_more_than_friction_could_hold_is_a_load_that_stays(way: float) -> None:
     assert found[1] == pytest.approx(way * (0.1 * INTEGRAL - 1.3 * 0.5), rel=0.07)
 
 
+def test_where_friction_holds_nothing_a_difference_fades_slowly_from_the_first() -> None:
+    law = DriverLaw(ROBOT, TICK)
+    beyond(law, STILL)
+    for _ in range(20):
+        found = beyond(law, [0.1, 0.0, 0.0], TURNING, holds=0.0)
+    assert found[0] == pytest.approx(0.1 * INTEGRAL * math.exp(-0.03), rel=1e-3)
+
+
 def test_what_a_wheel_falls_behind_is_summed_up(law: DriverLaw) -> None:
     found = beyond(law, [0.01, 0.0, -0.02])
     assert found == pytest.approx([0.01 * INTEGRAL, 0.0, -0.02 * INTEGRAL])

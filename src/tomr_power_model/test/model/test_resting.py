@@ -141,6 +141,16 @@ def test_by_its_law_a_driver_holds_the_same_whoever_has_summed_it_up(path: Comma
     assert found.simulated[0] == pytest.approx(-12.0 * PUSHED, abs=1e-4)
 
 
+def test_by_its_law_a_driver_forgets_no_more_than_friction_held(path: CommandPath) -> None:
+    """Half of a volt as it begins to turn: 5.7 mrad, 1.3 times, are no load."""
+    drivers, far = RestingDrivers(ROBOT, TICK), (0.5 / 12.0, 0.0, 0.0)
+    _volts(drivers, path, REST)
+    for _ in range(40):
+        found = drivers.voltages(path, far, TURNS, simulated=TURNS, share=1.0)
+    beyond = found.by_law[0] - found.simulated[0]
+    assert beyond == pytest.approx(-0.5 + 1.3 * 12.0 * 0.0057, rel=0.06)
+
+
 @pytest.mark.parametrize("restart", [RestingDrivers.clear, RestingDrivers.forget])
 def test_by_its_law_a_driver_begins_as_simulated(
     path: CommandPath, restart: Callable[[RestingDrivers], None]
