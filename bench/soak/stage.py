@@ -249,13 +249,10 @@ class Soak:
         self._crew.start(FLOODER)
         self._until(lambda: self._crew.is_up(FLOODER), "the flood")
         self._relay.flooded = suite
-        # A computer that cannot keep up loses samples: "unknown" is what there is to say then, of a
-        # moment more as well; to accuse something is not.
-        self._allowed.add(UNKNOWN.name)
         self._drive(length)
         self._crew.stop(FLOODER)
         self._relay.flooded = None
-        self._await_verdict(self._doing, (suite,), (UNKNOWN.name,))
+        self._await_verdict(self._doing, (suite,))
 
     def _kill(self) -> None:
         """Kill a node and start it again; each has a half of the soak without."""
