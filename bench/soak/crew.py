@@ -76,11 +76,17 @@ class Crew:
         popen.kill()
         popen.wait()
 
-    def stop(self, name: str) -> None:
-        """End a node that is needed no more, as its user would."""
-        member = self.members.pop(name)
-        member.popen.terminate()
-        self._await(name, member)
+    def ask_to_end(self, name: str) -> None:
+        """Of a node that is needed no more, as its user would."""
+        self.members[name].popen.terminate()
+
+    def has_ended(self, name: str) -> bool:
+        """Whether a node that was asked to has."""
+        return self.members[name].popen.poll() is not None
+
+    def dismiss(self, name: str) -> None:
+        """Note how a node ended that was asked to; it is awaited where it has not yet."""
+        self._await(name, self.members.pop(name))
 
     def is_up(self, name: str) -> bool:
         """Whether a node has said what it listens to and publishes."""

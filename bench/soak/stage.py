@@ -250,8 +250,11 @@ class Soak:
         self._until(lambda: self._crew.is_up(FLOODER), "the flood")
         self._relay.flooded = suite
         self._drive(length)
-        self._crew.stop(FLOODER)
+        self._crew.ask_to_end(FLOODER)
         self._relay.flooded = None
+        # A node takes half a second to leave: who only waits for it sends no commands meanwhile.
+        self._until(lambda: self._crew.has_ended(FLOODER), "the flood's end")
+        self._crew.dismiss(FLOODER)
         self._await_verdict(self._doing, (suite,))
 
     def _kill(self) -> None:
