@@ -60,7 +60,7 @@ def test_a_stray_tick_does_not_count() -> None:
 
 def test_it_fades_as_in_the_driver_s_law() -> None:
     sums = after(20 * 33, LOAD, loaded())
-    np.testing.assert_allclose(sums.stays, LOAD * np.exp(-1.0), rtol=1e-6)
+    np.testing.assert_allclose(sums.stays, LOAD * np.exp(-0.03 * 33.0), rtol=1e-6)
 
 
 def test_a_wheel_that_stands_keeps_what_was_seen() -> None:

@@ -12,6 +12,7 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_power_model.model.driver_law import FADES
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.robot import WHEELS
 
@@ -19,7 +20,6 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _TICKS = 20  # of a wheel, whose median is what stays
-_FADES = 33.0  # s, in which what a load may have left does, as in the driver's law
 _LOADED = 2  # wheels whose voltages leave their bands: no fault of one wheel
 
 
@@ -42,7 +42,7 @@ class DriverSums:
             is_outside: whether that leaves its band.
             shows: whether its wheel turns and the voltage is known.
         """
-        self._most *= np.exp(-elapsed / NANOSECONDS / _FADES)
+        self._most *= np.exp(-FADES * elapsed / NANOSECONDS)
         if (is_outside & shows).sum() >= _LOADED:
             self._most = np.where(shows, np.maximum(self._most, np.abs(volts)), self._most)
         for wheel in np.flatnonzero(shows):

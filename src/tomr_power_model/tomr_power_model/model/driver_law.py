@@ -24,7 +24,7 @@ from tomr_power_model.model.offsets import UNKNOWN, Offsets, between
 from tomr_power_model.robot import WHEELS, Robot
 
 _MOVING = 1.0  # rad/s
-_FADES = 0.03  # 1/s, of the difference in motion, ...
+FADES = 0.03  # 1/s, of the difference in motion, ...
 _FADES_FIRST, _FIRST = 2.1, 2.0  # ... and until, so many seconds on end, ...
 _MORE = 1.3  # times what friction could hold, for no description has it right
 _ALIKE = 0.2  # ... the wheel has turned as simulated [rad/s]
@@ -42,9 +42,7 @@ class DriverLaw:
         self._proportional = robot.controller.proportional
         self._integral = robot.controller.integral
         self._most = robot.supply.nominal_voltage
-        self._later, self._first = (
-            -math.expm1(-rate * period_s) for rate in (_FADES, _FADES_FIRST)
-        )
+        self._later, self._first = (-math.expm1(-rate * period_s) for rate in (FADES, _FADES_FIRST))
         self._lasts = round(_FIRST / period_s)
         self._forgets = math.exp(-period_s / _MEMORY)
         self._longest = _LONGEST / robot.controller.rate
