@@ -10,7 +10,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.states import STATES
-from tomr_fault_diag.diagnosis.score import poisson_interval
+from tomr_fault_diag.diagnosis.score import per_hour, poisson_interval
 
 Codes = NDArray[np.int64]
 
@@ -153,8 +153,8 @@ def _alarms(outcomes: Sequence[Outcome]) -> dict[str, object]:
         "count": count,
         "kinds": dict(kinds),
         "hours": round(hours, 3),
-        "per_hour": round(count / max(hours, 1e-9), 4),
-        "ci95_per_hour": [round(low / max(hours, 1e-9), 4), round(high / max(hours, 1e-9), 4)],
+        "per_hour": per_hour(count, hours),
+        "ci95_per_hour": [per_hour(low, hours), per_hour(high, hours)],
         "slip_named_where_a_wheel_slipped": sum(outcome.excused for outcome in outcomes),
     }
 

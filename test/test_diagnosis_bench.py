@@ -72,6 +72,9 @@ def test_a_name_counts_until_half_a_second_after_the_fault_showed(tick: int, del
     assert found.onsets[0].delay == pytest.approx(delay)
     figures = report([found], [])
     assert figures["delay_s"]["all"]["never_named"] == int(np.isinf(delay))  # type: ignore[index]
+    alarms = figures["false_alarms"]  # in no healthy drive at all
+    assert isinstance(alarms, dict)
+    assert (alarms["per_hour"], alarms["ci95_per_hour"]) == (None, [None, None])
 
 
 def test_slip_is_excused_where_a_wheel_slipped_just_before() -> None:

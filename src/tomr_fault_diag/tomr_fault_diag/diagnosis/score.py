@@ -182,8 +182,8 @@ class Scores:
             "count_by_phase": counts,
             "states": dict(states.most_common()),
             "hours": round(hours, 4),
-            "per_hour": _rate(mean, hours),
-            "ci95_per_hour": [_rate(low, hours), _rate(high, hours)],
+            "per_hour": per_hour(mean, hours),
+            "ci95_per_hour": [per_hour(low, hours), per_hour(high, hours)],
         }
 
     def _figures(self, cases: Sequence[Case]) -> dict[str, Any]:
@@ -215,7 +215,8 @@ def _part(part: int, whole: int) -> float | None:
     return round(part / whole, 4) if whole else None
 
 
-def _rate(count: float, hours: float) -> float | None:
+def per_hour(count: float, hours: float) -> float | None:
+    """A rate; None of no time at all."""
     return round(count / hours, 3) if hours else None
 
 
