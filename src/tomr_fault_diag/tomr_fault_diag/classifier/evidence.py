@@ -1,4 +1,5 @@
-"""What a gyro and the forces of the contacts say of a tick, beside what the network makes of it.
+"""What a gyro, the forces of the contacts and the parity of the motors say of a tick, beside what
+the network makes of it.
 
 Log-likelihoods (19,) of its hypotheses over those if all wheels roll as they show, and nobody
 pushes.
@@ -10,10 +11,18 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import NDArray
 
-from tomr_fault_diag.classifier.belief import DRAGS, ENCODERS, EXTERNAL, HYPOTHESES, OTHER
+from tomr_fault_diag.classifier.belief import (
+    CONTROLS,
+    DRAGS,
+    ENCODERS,
+    EXTERNAL,
+    HYPOTHESES,
+    OTHER,
+)
 from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.misfit import is_far
 from tomr_fault_diag.classifier.outside import NOTHING_ACTS, Outside
+from tomr_fault_diag.classifier.parity import NOT_KNOWN, Parity
 from tomr_fault_diag.classifier.states import SLIP
 from tomr_fault_diag.residuals.frame import SPEEDS, ResidualFrame
 
@@ -34,6 +43,7 @@ class Beside:
     contacts: Contacts = NOTHING
     outside: Outside = NOTHING_ACTS
     lasting: Array = field(factory=lambda: np.zeros(HYPOTHESES))  # by small faults that last
+    parity: Parity = NOT_KNOWN
 
 
 ALONE = Beside()  # a tick is judged
@@ -65,18 +75,35 @@ def said_by_gyro(frame: ResidualFrame) -> Array:
     return said
 
 
-def said_by_forces(frame: ResidualFrame, contacts: Contacts) -> Array:
+def said_by_parity(parity: Parity) -> Array:
+    """Of what motors draw at their voltages and speeds.
+
+    Where that agrees neither the signal of the motor nor its encoder is lost; where it does not it
+    is no slip.
+    """
+    said = np.zeros(HYPOTHESES)
+    for kind in (CONTROLS, ENCODERS):
+        said[kind] = np.where(parity.holds, -_MOST, 0.0)
+    if parity.broken.any():
+        said[SLIP] = -_MOST
+    return said
+
+
+def said_by_forces(frame: ResidualFrame, contacts: Contacts, parity: Parity = NOT_KNOWN) -> Array:
     """Of what the contacts hand on: 0 up to even odds of a slide.
 
     An encoder that shows too little looks much like one. What one wheel bears alone is no force on
     the body, and what also shows no motion has lost its encoder, or is stuck. Of a slide nothing
-    where an encoder shows what it should not: then the motion is in doubt.
+    where an encoder shows what it should not: then the motion is in doubt. Where a motor's parity
+    is broken only an encoder explains what looks like a slide.
     """
     said, slides = np.zeros(HYPOTHESES), contacts.slides
     if slides > 0.5 and not astray(frame):  # nor where it is NaN
         odds = slides / max(1.0 - slides, _LEAST_DOUBT)
         said[SLIP] = min(_PER_ODDS * math.log(odds), _MOST)
         said[ENCODERS] = _MISCOUNTS * said[SLIP]
+        if parity.broken.any():
+            said[SLIP] = 0.0
     if contacts.lone is not None:
         said[EXTERNAL] = -_MOST
     if contacts.unmoved is not None:

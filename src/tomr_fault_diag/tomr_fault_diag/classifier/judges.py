@@ -29,7 +29,13 @@ from tomr_fault_diag.classifier.belief import (
     Belief,
     named_of,
 )
-from tomr_fault_diag.classifier.evidence import ALONE, Beside, said_by_forces, said_by_gyro
+from tomr_fault_diag.classifier.evidence import (
+    ALONE,
+    Beside,
+    said_by_forces,
+    said_by_gyro,
+    said_by_parity,
+)
 from tomr_fault_diag.classifier.features import CHANNELS, WINDOW, channels_of, turning
 from tomr_fault_diag.classifier.network import Network
 from tomr_fault_diag.classifier.observability import Unseen
@@ -171,7 +177,8 @@ class WindowJudge:
             commissioned=bool(self.settings.commissioned),
             striking=self.settings.striking,
             by_gyro=said_by_gyro(frame),
-            by_forces=said_by_forces(frame, beside.contacts),
+            by_forces=said_by_forces(frame, beside.contacts, beside.parity),
+            by_parity=said_by_parity(beside.parity),
         )
         for _ in range(count):
             self._opinion = self._step(self._so_far(moment))

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_fault_diag.residuals.frame import Unit
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.binding import plain
 from tomr_power_model.dynamics.body import Body
@@ -53,6 +54,11 @@ class Motors:
         self._laws.drive_power(self._numbers, _motion(still, still), out, WHEELS)
         return np.array(out[at.POWER_DRAWN :: at.POWER_WHEEL])
 
+    def scale_of(self, unit: Unit) -> float:
+        """What is measured in a unit times this is in W, or in A of the motor where that is
+        measured: a supply's current comes without its voltage."""
+        return self.voltage if unit == "A" and not self.reports_currents else 1.0
+
     def currents(self, power: Array, speed: Array, way: Array) -> Array:
         """That drive the wheels forwards or backwards [A], of powers [W] at speeds [rad/s]."""
         both = self.both_currents(power, speed)
@@ -71,9 +77,13 @@ class Motors:
     def per_torque(self, speed: Array, current: Array) -> Array:
         """How what is measured grows with the torque, at wheel speeds and currents [W/(N m)], or
         [A/(N m)]."""
+        return self.per_current(speed, current) / self.constant
+
+    def per_current(self, speed: Array, current: Array) -> Array:
+        """The same with the current [W/A]; 1 where currents are measured."""
         if self.reports_currents:
-            return 1.0 / self.constant
-        return speed + 2.0 * self.resistance * current / self.constant
+            return np.ones(WHEELS)
+        return self.constant * speed + 2.0 * self.resistance * current
 
     def noise(self, robot: Robot) -> float:
         """Standard deviation of one measurement, its resolution included [W], or [A]."""

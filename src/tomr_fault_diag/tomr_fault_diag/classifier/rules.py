@@ -1,9 +1,10 @@
 """What a window's log-likelihoods count for: named rules, one after the other.
 
 The network sees 0.4 s of residuals and nothing else. Each rule corrects what it says by what the
-motion can show, by a gyro and the forces of the contacts, by what acts on the body, or by what a
-description that is off looks like. A rule is a function of log-likelihoods and of what is known at
-that moment; a new one is a function and its name in `WINDOW_RULES` or `STATE_RULES`.
+motion can show, by a gyro, the forces of the contacts and the parity of the motors, by what acts on
+the body, or by what a description that is off looks like. A rule is a function of log-likelihoods
+and of what is known at that moment; a new one is a function and its name in `WINDOW_RULES` or
+`STATE_RULES`.
 """
 
 from collections.abc import Callable, Mapping
@@ -60,6 +61,7 @@ class Moment:
     striking: float = 0.0  # log-likelihood ratio that a striking window reaches
     by_gyro: Array = field(factory=lambda: np.zeros(HYPOTHESES))  # what it says, (19,)
     by_forces: Array = field(factory=lambda: np.zeros(HYPOTHESES))
+    by_parity: Array = field(factory=lambda: np.zeros(HYPOTHESES))
 
 
 Rule = Callable[[Array, Moment], Array]
@@ -171,6 +173,11 @@ def _forces(likelihoods: Array, moment: Moment) -> Array:
     return likelihoods + moment.by_forces
 
 
+def _parity(likelihoods: Array, moment: Moment) -> Array:
+    """What motors draw at their voltages and speeds."""
+    return likelihoods + moment.by_parity
+
+
 def _load(likelihoods: Array, moment: Moment) -> Array:
     """What stays and drags is a load, and soon over is none."""
     outside, found = moment.beside.outside, likelihoods.copy()
@@ -219,6 +226,7 @@ WINDOW_RULES: Mapping[str, Rule] = {
     "small faults that last": _lasting,
     "gyro": _gyro,
     "forces": _forces,
+    "parity of the motors": _parity,
 }
 # Of the states of the belief, (36,), in this order.
 STATE_RULES: Mapping[str, Rule] = {

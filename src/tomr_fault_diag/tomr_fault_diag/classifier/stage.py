@@ -13,6 +13,7 @@ from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import MotionWatch, Unseen
 from tomr_fault_diag.classifier.outside import NOTHING_ACTS, Outside, OutsideWatch
+from tomr_fault_diag.classifier.parity import NOT_KNOWN, ParityWatch
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.severity import Severity, SeverityWatch
 from tomr_fault_diag.classifier.slides import SlideWatch
@@ -82,12 +83,13 @@ class FaultClassifier:
         slope: SlopeFilter | None = None,
         lasting: LastingWatch | None = None,
         misfits: MisfitWatch | None = None,
+        parity: ParityWatch | None = None,
     ) -> None:
         """Without `severity` it is not stated how bad a fault is, nor what has changed slowly;
         without `slides` residuals alone show a slip, without `outside` a load; without `slope` what
         an accelerometer feels of one stays in the residuals; without `lasting`
         small faults are not looked for; without `misfits` it is not known what a motor draws that
-        is not driven."""
+        is not driven, without `parity` whether it draws what goes with its voltage and speed."""
         self._judge = judge
         self._lasting = lasting
         self._severity = severity
@@ -96,6 +98,7 @@ class FaultClassifier:
         self._slope = slope
         self._motion = MotionWatch()
         self._misfits = misfits or MisfitWatch()
+        self._parity = parity
         self._data = SufficiencyWatch()
         self.clear()
 
@@ -115,6 +118,7 @@ class FaultClassifier:
             slope=SlopeFilter(robot),
             lasting=LastingWatch(robot) if judge.settings.small_faults else None,
             misfits=MisfitWatch(Motors(robot).idle.tolist(), BrakingWatch(robot)),
+            parity=ParityWatch(robot),
         )
 
     @property
@@ -140,6 +144,8 @@ class FaultClassifier:
             self._outside.clear()
         if self._lasting is not None:
             self._lasting.clear()
+        if self._parity is not None:
+            self._parity.clear()
         self._stamp = 0
         self._opinion: Opinion | None = None
         self._unseen = Unseen()
@@ -234,7 +240,8 @@ class FaultClassifier:
             self._enter(DISOBEYS, frame.stamp_ns, None)
             return
         is_well = self._state is STATES[NORMAL]
-        beside = Beside(contacts, outside)
+        parity = NOT_KNOWN if self._parity is None else self._parity.take(frame)
+        beside = Beside(contacts, outside, parity=parity)
         if self._lasting is not None:
             beside = evolve(beside, lasting=self._lasting.take(raw, is_well))
         self._opinion = self._judge.judge(frame, elapsed, self._unseen, beside)

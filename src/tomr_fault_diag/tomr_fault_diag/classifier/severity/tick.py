@@ -54,8 +54,7 @@ class Tick:
         if last is not None and 0 < frame.stamp_ns - last.stamp_ns <= NEXT:
             change = (speed - last.speed) * (NANOSECONDS / (frame.stamp_ns - last.stamp_ns))
         expected = _modelled(speeds)
-        is_supplied = powers[0].unit == "A" and not motors.reports_currents
-        scale = motors.voltage if is_supplied else 1.0  # a supply's current without its voltage
+        scale = motors.scale_of(powers[0].unit)
         measured = scale * np.array([item.modelled + item.residual for item in powers])
         from_encoders, commanded = scale * _modelled(derived), scale * _modelled(powers)
         # A wheel that stands is driven the way that it should turn.

@@ -1,0 +1,200 @@
+"""Parity of voltage, power and speed, from ticks whose numbers are worked by hand."""
+
+import math
+
+import numpy as np
+from attrs import evolve
+from numpy.typing import NDArray
+
+from tomr_fault_diag.classifier.belief import CONTROLS, ENCODERS, HYPOTHESES
+from tomr_fault_diag.classifier.contacts import Contacts
+from tomr_fault_diag.classifier.evidence import Beside, said_by_forces, said_by_parity
+from tomr_fault_diag.classifier.motors import Motors
+from tomr_fault_diag.classifier.parity import NOT_KNOWN, Parity, ParityWatch
+from tomr_fault_diag.classifier.rules import WINDOW_RULES, Moment
+from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.classifier.stage import FaultClassifier
+from tomr_fault_diag.classifier.states import SLIP
+from tomr_fault_diag.residuals.frame import Residual, ResidualFrame, Unit
+from tomr_power_model.robot import Robot, shipped_robot
+
+Array = NDArray[np.float64]
+
+ROBOT = shipped_robot("reference")
+MOTORS = Motors(ROBOT)
+BASE = 1_700_000_000_000_000_000
+TICK = 50_000_000
+SPEED = np.array([8.0, -8.0, 8.0])  # rad/s
+CURRENT = np.array([1.0, -1.0, 0.8])  # A
+BAND = 0.1  # V, and W
+NONE = [False, False, False]
+ALL = [True, True, True]
+FIRST = [True, False, False]
+
+
+def volts(speed: Array, current: Array) -> Array:
+    """That a motor takes."""
+    return MOTORS.resistance * current + MOTORS.constant * speed
+
+
+def power(speed: Array, current: Array) -> Array:
+    """That it draws then."""
+    return MOTORS.idle + volts(speed, current) * current
+
+
+def frame(
+    held: Array, drawn: Array, shown: Array = SPEED, *, band: float = BAND, unit: Unit = "W"
+) -> ResidualFrame:
+    """A tick with such voltages [V], powers and speeds as encoders show [rad/s]."""
+    motors = [Residual(0.0, band, value, unit) for value in drawn.tolist()]
+    speeds = [Residual(0.0, 0.3, value, "rad/s") for value in shown.tolist()]
+    first, second, third = (Residual(value, band, 0.0, "V") for value in held.tolist())
+    residuals = (Residual(0.0, 1.0, 20.0), *motors, *speeds, *motors)
+    return ResidualFrame(BASE, residuals, voltages=(first, second, third))
+
+
+WELL = frame(volts(SPEED, CURRENT), power(SPEED, CURRENT))
+# Wheel 1 turns twice as fast as it shows.
+TWICE = SPEED * [2.0, 1.0, 1.0]
+MISCOUNTED = frame(volts(TWICE, CURRENT), power(TWICE, CURRENT))
+
+
+class Watched:
+    """Ticks of 50 ms, one after the other."""
+
+    def __init__(self, robot: Robot = ROBOT) -> None:
+        self.watch = ParityWatch(robot)
+        self._stamp = BASE
+
+    def after(self, item: ResidualFrame, ticks: int = 4) -> tuple[list[bool], list[bool]]:
+        """Where it holds and where it is broken after so many alike."""
+        parity = NOT_KNOWN
+        for _ in range(ticks):
+            self._stamp += TICK
+            parity = self.watch.take(evolve(item, stamp_ns=self._stamp))
+        return parity.holds.tolist(), parity.broken.tolist()
+
+
+def seen(
+    item: ResidualFrame, ticks: int = 4, robot: Robot = ROBOT
+) -> tuple[list[bool], list[bool]]:
+    """The same of a watch that has seen nothing else."""
+    return Watched(robot).after(item, ticks)
+
+
+def test_a_healthy_motor_s_holds_after_150_ms() -> None:
+    assert seen(WELL, 3) == (NONE, NONE)
+    assert seen(WELL) == (ALL, NONE)
+
+
+def test_nor_do_loads_and_brakes_break_it() -> None:
+    for current in (3.0 * CURRENT, -CURRENT, np.zeros(3)):
+        assert seen(frame(volts(SPEED, current), power(SPEED, current))) == (ALL, NONE)
+
+
+def test_a_slow_wheel_says_nothing_for_its_encoder() -> None:
+    """A band of 0.1 V, and what 0.1 W leave open, are more than a twelfth of what it takes."""
+    slow = SPEED / 8.0
+    item = frame(volts(slow, CURRENT), power(slow, CURRENT), slow)
+    assert seen(item) == (NONE, NONE)
+
+
+def test_an_encoder_that_shows_half_of_the_speed_breaks_it() -> None:
+    assert seen(MISCOUNTED, 3) == (NONE, NONE)
+    assert seen(MISCOUNTED) == ([False, True, True], FIRST)
+
+
+def test_so_do_a_lost_signal_and_a_winding_that_loses_more() -> None:
+    lost = np.where(FIRST, MOTORS.idle, power(SPEED, CURRENT))
+    driven = volts(SPEED, CURRENT) * [2.0, 1.0, 1.0]  # more and more, for nothing comes of it
+    assert seen(frame(driven, lost))[1] == FIRST
+    more = np.where(FIRST, 2.0, 0.0)
+    weak = frame(volts(SPEED, CURRENT) + more, power(SPEED, CURRENT) + more * CURRENT)
+    assert seen(weak)[1] == FIRST
+
+
+def test_what_a_description_may_be_off_by_is_no_break() -> None:
+    off = 0.14 * MOTORS.constant * SPEED
+    assert (np.abs(off) > 4.0 * BAND).all()
+    assert seen(frame(volts(SPEED, CURRENT) + off, power(SPEED, CURRENT))) == (NONE, NONE)
+
+
+def test_a_break_is_remembered_for_ten_seconds_or_until_it_holds() -> None:
+    unknown = evolve(WELL, voltages=(evolve(WELL.voltages[0], residual=math.nan),) * 3)
+    watched = Watched()
+    assert watched.after(MISCOUNTED, 4)[1] == FIRST
+    assert watched.after(unknown, 199) == (NONE, FIRST)
+    assert watched.after(unknown, 1) == (NONE, NONE)
+    watched.after(MISCOUNTED, 4)
+    assert watched.after(WELL, 3)[1] == FIRST
+    assert watched.after(WELL, 1) == (ALL, NONE)
+    watched.after(MISCOUNTED, 4)
+    watched.watch.clear()
+    assert watched.after(unknown, 1) == (NONE, NONE)
+
+
+def test_a_stray_tick_is_none() -> None:
+    watched = Watched()
+    for _ in range(5):
+        assert watched.after(MISCOUNTED, 3)[1] == NONE
+        watched.after(WELL, 1)
+
+
+def test_a_driver_at_its_limit_says_nothing() -> None:
+    most = np.full(3, 0.95 * ROBOT.supply.nominal_voltage)
+    assert seen(frame(most, power(SPEED, CURRENT))) == (NONE, NONE)
+
+
+def test_currents_do_as_well_as_powers() -> None:
+    signed, unsigned = (
+        evolve(
+            ROBOT, measurement=evolve(ROBOT.measurement, quantity="motor_current", signed=signed)
+        )
+        for signed in (True, False)
+    )
+    item = frame(volts(SPEED, CURRENT), CURRENT, unit="A")
+    assert seen(item, robot=signed) == (ALL, NONE)
+    assert seen(frame(volts(SPEED, CURRENT), np.abs(CURRENT), unit="A"), robot=unsigned)[0] == ALL
+    supply = evolve(ROBOT, measurement=evolve(ROBOT.measurement, quantity="supply_current"))
+    drawn = power(SPEED, CURRENT) / ROBOT.supply.nominal_voltage
+    item = frame(volts(SPEED, CURRENT), drawn, unit="A", band=BAND / 24.0)
+    assert seen(item, robot=supply) == (ALL, NONE)
+
+
+def test_what_it_says_by_hand() -> None:
+    said = said_by_parity(Parity(np.array(FIRST), np.array(NONE)))
+    lowered = [CONTROLS.start, ENCODERS.start]
+    assert said[lowered].tolist() == [-10.0, -10.0]
+    assert not np.delete(said, lowered).any()
+    said = said_by_parity(Parity(np.array(NONE), np.array(FIRST)))
+    assert said[SLIP] == -10.0
+    assert not np.delete(said, SLIP).any()
+    assert not said_by_parity(NOT_KNOWN).any()
+    moment = Moment(WELL, by_parity=np.arange(HYPOTHESES, dtype=float))
+    added = WINDOW_RULES["parity of the motors"](np.ones(HYPOTHESES), moment)
+    assert added.tolist() == list(range(1, HYPOTHESES + 1))
+
+
+def test_what_looks_like_a_slide_is_the_encoder_s_where_it_is_broken() -> None:
+    plain = said_by_forces(WELL, Contacts(0.9))
+    broken = said_by_forces(WELL, Contacts(0.9), Parity(np.array(NONE), np.array(FIRST)))
+    assert plain[SLIP] > 0.0
+    assert broken[SLIP] == 0.0
+    assert broken[ENCODERS].tolist() == plain[ENCODERS].tolist()
+
+
+def test_the_classifier_looks_at_it() -> None:
+    classifier, found = FaultClassifier.of(ClassifierSettings(), ROBOT), []
+    judge = classifier._judge.judge
+
+    def noted(item: ResidualFrame, elapsed: int, unseen: object, beside: Beside) -> object:
+        found.append(beside.parity)
+        return judge(item, elapsed, unseen, beside)  # type: ignore[arg-type]
+
+    classifier._judge.judge = noted  # type: ignore[assignment,method-assign]
+    for tick in range(60):
+        classifier.classify(evolve(WELL, stamp_ns=BASE + tick * TICK))
+    assert found[-1].holds.all()
+    classifier.clear()
+    classifier.classify(evolve(WELL, stamp_ns=BASE + 61 * TICK))
+    assert not found[-1].holds.any()

@@ -1,0 +1,121 @@
+"""Parity of a motor's voltage, power and speed.
+
+    v = R i + k omega
+
+The law of its driver says the voltage v, its power the current i at the speed omega that its
+encoder shows. Where the three agree the motor has what its driver gives, and turns as its encoder
+shows. Where they do not, a signal is lost or counts are, or a winding or the power sensor is off:
+slip, slopes, loads and bearings change the current, but not the voltage that goes with it.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from attrs import field, frozen
+from numpy.typing import NDArray
+
+from tomr_fault_diag.classifier.motors import Motors
+from tomr_fault_diag.residuals.frame import (
+    ENCODERS,
+    SPEEDS,
+    Residual,
+    ResidualFrame,
+    measured_speed,
+)
+from tomr_power_model.model.ticks import to_ns
+from tomr_power_model.robot import WHEELS, Robot
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Stamps = NDArray[np.int64]
+
+_LEAST_SLOPE = 1e-3  # W/A
+_NEVER = np.iinfo(np.int64).max
+
+
+@frozen
+class ParitySettings:
+    """When it is said to hold, and to be broken. A band is what the voltage and the power of a
+    healthy motor leave open of it [V]."""
+
+    lasts: int = to_ns(0.15)  # for which it has to be so
+    holds: float = 1.0  # bands, by which it may be off, ...
+    shows: float = 12.0  # ... where the speed takes so many: a fifth of its counts is a quarter
+    broken: float = 3.0  # bands, by which it is off, ...
+    share: float = 0.15  # ... and of the voltage that the speed takes
+    remembered: int = to_ns(10.0)  # since it was broken, unless it holds again
+    saturated: float = 0.9  # of the supply: a driver gives no more, whatever its law says
+
+
+def _nowhere() -> Flags:
+    return np.zeros(WHEELS, dtype=np.bool_)
+
+
+@frozen
+class Parity:
+    """Of each motor, (3,); neither where it is not known."""
+
+    holds: Flags = field(factory=_nowhere)
+    broken: Flags = field(factory=_nowhere)  # or was of late
+
+
+NOT_KNOWN = Parity()
+
+
+class ParityWatch:
+    """Looks at one tick after the other."""
+
+    def __init__(self, robot: Robot, settings: ParitySettings | None = None) -> None:
+        self.settings = settings or ParitySettings()
+        self._motors = Motors(robot)
+        self.clear()
+
+    def clear(self) -> None:
+        """Nothing was seen."""
+        self._holds_since, self._broken_since = np.full((2, WHEELS), _NEVER)  # ns
+        self._until = np.zeros(WHEELS, dtype=np.int64)  # ns, for which a break is remembered
+
+    def take(self, frame: ResidualFrame) -> Parity:
+        """What the newest tick says with those before."""
+        now, s = frame.stamp_ns, self.settings
+        holds, broken = self._of(frame)
+        self._holds_since = _since(self._holds_since, holds, now)
+        self._broken_since = _since(self._broken_since, broken, now)
+        holds = self._holds_since <= now - s.lasts
+        self._until[self._broken_since <= now - s.lasts] = now + s.remembered
+        self._until[holds] = 0
+        return Parity(holds, self._until > now)
+
+    def _of(self, frame: ResidualFrame) -> tuple[Flags, Flags]:
+        """Whether it holds, and whether it is broken, in one tick."""
+        motors, s = self._motors, self.settings
+        powers = [frame.residuals[index] for index in ENCODERS]
+        speed = np.array([measured_speed(frame.residuals[index]) for index in SPEEDS])
+        volts = _of_all(frame.voltages)
+        drawn = motors.scale_of(powers[0].unit) * _of_all(powers)
+        takes = motors.constant * speed
+        if not np.isfinite(takes + volts + drawn).all():
+            return _nowhere(), _nowhere()
+        currents = motors.both_currents(drawn, speed)
+        if motors.reports_currents and not motors.reports_signs:
+            currents = currents * [-1.0, 1.0]
+        both = volts[:, None] - takes[:, None] - motors.resistance[:, None] * currents
+        nearer = np.argmin(np.abs(both), axis=1)
+        off, current = np.abs(both[range(WHEELS), nearer]), currents[range(WHEELS), nearer]
+        slope = np.maximum(np.abs(motors.per_current(speed, current)), _LEAST_SLOPE)
+        band = np.array([item.band for item in frame.voltages])
+        widths = motors.scale_of(powers[0].unit) * np.array([item.band for item in powers])
+        band += motors.resistance * widths / slope
+        takes, obeys = np.abs(takes), np.abs(volts) < s.saturated * motors.voltage
+        holds = obeys & (off < s.holds * band) & (takes > s.shows * band)
+        return holds, obeys & (off > s.broken * band) & (off > s.share * takes)
+
+
+def _of_all(items: Sequence[Residual]) -> Array:
+    """What was measured."""
+    return np.array([item.modelled + item.residual for item in items])
+
+
+def _since(before: Stamps, flags: Flags, now: int) -> Stamps:
+    """Since when each is so [ns]."""
+    return np.where(flags, np.minimum(before, now), _NEVER)
