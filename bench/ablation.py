@@ -38,12 +38,14 @@ from rich.table import Table
 from stages import frames_of, pipeline_of
 from tqdm import tqdm
 
+from tomr_fault_diag.classifier.braking import BrakingWatch
 from tomr_fault_diag.classifier.contacts import Contacts
 from tomr_fault_diag.classifier.judges import WindowJudge
 from tomr_fault_diag.classifier.lasting import LastingWatch
 from tomr_fault_diag.classifier.misfit import MisfitWatch
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.outside import Outside, OutsideWatch
+from tomr_fault_diag.classifier.parity import ParityWatch
 from tomr_fault_diag.classifier.rules import ALL_RULES, STATE_RULES, WINDOW_RULES
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.slides import SlideWatch
@@ -59,8 +61,8 @@ from tomr_training.simulated_drive import simulated_drive
 _FIRST_OTHER = 5_400_000  # seed
 ALL = "all rules"
 SLIDES, OUTSIDE, SLOPE = "particles", "what acts on the body", "slopes taken out"
-LASTING = "the watch for small faults"
-PARTS = (SLIDES, OUTSIDE, SLOPE, LASTING)
+LASTING, PARITY = "the watch for small faults", "all that parity says"
+PARTS = (SLIDES, OUTSIDE, SLOPE, LASTING, PARITY)
 _SUMMARY = re.compile(
     r"SUMMARY drives right (\S+) \(extended (\S+)\), accuracy over time (\S+), "
     r"delay (\S+) s median (\S+) s p95, missed (\S+), false alarms (\S+)/h"
@@ -115,7 +117,8 @@ def diagnosed(seen: Seen, names: Sequence[str]) -> dict[str, Said]:
             outside=None if name == OUTSIDE else outside,
             slope=None if name == SLOPE else SlopeFilter(robot),
             lasting=LastingWatch(robot) if small else None,
-            misfits=MisfitWatch(Motors(robot).idle.tolist()),
+            misfits=MisfitWatch(Motors(robot).idle.tolist(), BrakingWatch(robot)),
+            parity=None if name == PARITY else ParityWatch(robot),
         )
         said = (classifier.classify(frame) for frame in seen.frames)
         found[name] = {one.stamp_ns: one for one in said if one is not None}

@@ -10,14 +10,28 @@ from attrs import evolve
 sys.path.append(str(Path(__file__).resolve().parent.parent / "bench"))
 
 import ablation
-from ablation import ALL, LASTING, OUTSIDE, PARTS, SLIDES, SLOPE, Seen, Tour, diagnosed, kept
+from ablation import (
+    ALL,
+    LASTING,
+    OUTSIDE,
+    PARITY,
+    PARTS,
+    SLIDES,
+    SLOPE,
+    Seen,
+    Tour,
+    diagnosed,
+    kept,
+)
 from commissioned import FAULTY, HEALTHY, file_of, seed_of
 
+from tomr_fault_diag.classifier.braking import BrakingWatch
 from tomr_fault_diag.classifier.judges import make_judge
 from tomr_fault_diag.classifier.lasting import LastingWatch
 from tomr_fault_diag.classifier.misfit import MisfitWatch
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.outside import OutsideWatch
+from tomr_fault_diag.classifier.parity import ParityWatch
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.slides import SlideWatch
 from tomr_fault_diag.classifier.slope import SlopeFilter
@@ -59,7 +73,13 @@ def test_every_name_can_be_left_out(frames: tuple[ResidualFrame, ...]) -> None:
 
 @pytest.mark.parametrize(
     ("part", "without"),
-    [(SLIDES, "slides"), (OUTSIDE, "outside"), (SLOPE, "slope"), (LASTING, "lasting")],
+    [
+        (SLIDES, "slides"),
+        (OUTSIDE, "outside"),
+        (SLOPE, "slope"),
+        (LASTING, "lasting"),
+        (PARITY, "parity"),
+    ],
 )
 def test_a_part_that_is_left_out_is_not_there(
     frames: tuple[ResidualFrame, ...], part: str, without: str
@@ -69,9 +89,10 @@ def test_a_part_that_is_left_out_is_not_there(
         "outside": OutsideWatch(ROBOT),
         "slope": SlopeFilter(ROBOT),
         "lasting": LastingWatch(ROBOT),
+        "parity": ParityWatch(ROBOT),
         without: None,
     }
-    misfits = MisfitWatch(Motors(ROBOT).idle.tolist())
+    misfits = MisfitWatch(Motors(ROBOT).idle.tolist(), BrakingWatch(ROBOT))
     classifier = FaultClassifier(make_judge(SETTINGS), misfits=misfits, **given)  # type: ignore[arg-type]
     said = {one.stamp_ns: one for frame in frames if (one := classifier.classify(frame))}
     found = diagnosed(Seen(frames, SETTINGS, ROBOT), [part])[part]
