@@ -1,9 +1,11 @@
 """Random drives: what a seed decides, and what it leaves."""
 
 import pytest
+from attrs import evolve
 
+from tomr_power_model.effects import EFFECTS
 from tomr_power_model.robot import shipped_robot
-from tomr_training.drives import another_drive, random_drive
+from tomr_training.drives import another_drive, every_value, random_drive
 
 FIRST = random_drive(shipped_robot("reference"), 7, "encoder_lost")
 
@@ -27,3 +29,34 @@ def test_another_drive_has_the_fault_that_is_asked_for(kind: str) -> None:
     assert drive.mission.phases == another_drive(FIRST, 8).mission.phases
     assert {len(another_drive(FIRST, seed, "fault").mission.faults) for seed in range(20)} == {1}
     assert {len(another_drive(FIRST, seed, "any").mission.faults) for seed in range(20)} == {0, 1}
+
+
+def test_every_value_is_passed_through_but_of_a_ratio_what_it_differs_from_one_by() -> None:
+    given = shipped_robot("reference")
+    one = {"scale": 1.002}
+    drag = {"coefficient": 0.5, "slip": 0.2}
+    physics = {"sensor.encoder_scale": (one, None, one), "contact.roller_drag": (drag, drag, drag)}
+    off = every_value(evolve(given, physics=physics), lambda value: 1.02 * value)
+    assert off.mass == pytest.approx(1.02 * given.mass)
+    assert off.motors[1].resistance == pytest.approx(1.02 * given.motors[1].resistance)
+    first, second, third = off.physics["sensor.encoder_scale"]
+    assert first == pytest.approx({"scale": 1.00204}, abs=1e-9)
+    assert (second, third) == (None, first)
+    assert off.physics["contact.roller_drag"][2] == pytest.approx(
+        {"coefficient": 0.51, "slip": 0.204}
+    )
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameter", "ratio"),
+    [
+        ("kinematic.wheel_radius", "scale", True),
+        ("sensor.power_scale", "scale", True),
+        ("contact.roller_drag", "coefficient", False),
+        ("friction.coulomb", "torque", False),
+    ],
+)
+def test_a_ratio_may_be_more_or_less_than_its_neutral_value(
+    effect: str, parameter: str, ratio: bool
+) -> None:
+    assert EFFECTS[effect].parameters[parameter].is_ratio is ratio

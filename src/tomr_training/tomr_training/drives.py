@@ -5,13 +5,14 @@ befalls it.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.effects import EFFECTS
 from tomr_power_model.robot import Motor, Robot
 from tomr_sim_bridge.missions.mission import Mission, Plan
 from tomr_sim_bridge.missions.schema import CirclePhase, PlannedFault, TwistPhase
@@ -179,7 +180,11 @@ def _another_robot(reference: Robot, random: np.random.Generator) -> Robot:
 
 
 def every_value(robot: Robot, off: Callable[[float], float]) -> Robot:
-    """A robot with every value of its body, motors and effects passed through `off`."""
+    """A robot with every value of its body, motors and effects passed through `off`.
+
+    Of a ratio only what it differs from its neutral value by: an encoder that shows 1.002 of the
+    angle is not off by a share of all its counts.
+    """
 
     def motor(nominal: Motor) -> Motor:
         return evolve(
@@ -189,14 +194,16 @@ def every_value(robot: Robot, off: Callable[[float], float]) -> Robot:
             rotor_inertia=off(nominal.rotor_inertia),
         )
 
+    def effect(name: str, values: Mapping[str, float]) -> dict[str, float]:
+        parameters = EFFECTS[name].parameters
+        about = {key: parameters[key].neutral * parameters[key].is_ratio for key in values}
+        return {key: about[key] + off(value - about[key]) for key, value in values.items()}
+
     first, second, third = (motor(nominal) for nominal in robot.motors)
     physics = {}
-    for effect, wheels in robot.physics.items():
-        one, two, three = (
-            None if wheel is None else {key: off(value) for key, value in wheel.items()}
-            for wheel in wheels
-        )
-        physics[effect] = (one, two, three)
+    for name, wheels in robot.physics.items():
+        one, two, three = (None if wheel is None else effect(name, wheel) for wheel in wheels)
+        physics[name] = (one, two, three)
     return evolve(
         robot,
         mass=off(robot.mass),

@@ -47,6 +47,11 @@ class EffectParameter:
     start: float = 0.0  # of a fit to a description without the effect
     prior_std: float = 1.0  # of such a fit, in the unit
 
+    @property
+    def is_ratio(self) -> bool:
+        """Whether it is a share of what would be without it, which may be more as well as less."""
+        return not self.unit and self.minimum < self.neutral < self.maximum
+
 
 def _no_shape(scales: Scales) -> Sequence[Mapping[str, float]]:
     return ({},)
