@@ -143,6 +143,38 @@ def test_a_stray_tick_is_none() -> None:
 def test_a_driver_at_its_limit_says_nothing() -> None:
     most = np.full(3, 0.95 * ROBOT.supply.nominal_voltage)
     assert seen(frame(most, power(SPEED, CURRENT))) == (NONE, NONE)
+    fast = (most - MOTORS.resistance * CURRENT) / MOTORS.constant
+    assert seen(frame(most, power(fast, CURRENT), fast)) == (NONE, NONE)
+
+
+def test_what_is_within_three_bands_is_no_break() -> None:
+    off = float(MOTORS.constant[0] * SPEED[0])  # V
+    voltages = frame(volts(TWICE, CURRENT), power(TWICE, CURRENT), band=off / 2.5).voltages
+    assert seen(evolve(MISCOUNTED, voltages=voltages))[1] == NONE
+    voltages = frame(volts(TWICE, CURRENT), power(TWICE, CURRENT), band=off / 4.0).voltages
+    assert seen(evolve(MISCOUNTED, voltages=voltages))[1] == FIRST
+
+
+def test_a_power_that_is_hardly_known_breaks_nothing() -> None:
+    """20 W, or as much of a supply's current, leave 2.2 V open: a third is more than is off."""
+    held, drawn = volts(TWICE, CURRENT), power(TWICE, CURRENT)
+    supply = evolve(ROBOT, measurement=evolve(ROBOT.measurement, quantity="supply_current"))
+    of_supply = frame(held, drawn / 24.0, unit="A", band=20.0 / 24.0)
+    for item, robot in ((frame(held, drawn, band=20.0), ROBOT), (of_supply, supply)):
+        vague = evolve(item, voltages=MISCOUNTED.voltages)
+        assert seen(vague, robot=robot) == (NONE, NONE)
+
+
+def test_a_robot_at_rest_says_nothing_whatever_it_draws() -> None:
+    with np.errstate(all="raise"):
+        assert seen(frame(np.zeros(3), MOTORS.idle, np.zeros(3))) == (NONE, NONE)
+        assert seen(frame(np.zeros(3), MOTORS.idle - 50.0, np.zeros(3))) == (NONE, NONE)
+
+
+def test_of_a_motor_that_is_not_measured_nothing_is_known() -> None:
+    drawn = power(SPEED, CURRENT)
+    blind = frame(volts(SPEED, CURRENT), np.where(FIRST, math.nan, drawn))
+    assert seen(blind) == ([False, True, True], NONE)
 
 
 def test_currents_do_as_well_as_powers() -> None:

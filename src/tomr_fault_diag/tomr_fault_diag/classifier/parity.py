@@ -92,10 +92,9 @@ class ParityWatch:
         powers = [frame.residuals[index] for index in ENCODERS]
         speed = np.array([measured_speed(frame.residuals[index]) for index in SPEEDS])
         volts = _of_all(frame.voltages)
-        drawn = motors.scale_of(powers[0].unit) * _of_all(powers)
+        scale = motors.scale_of(powers[0].unit)
+        drawn = scale * _of_all(powers)
         takes = motors.constant * speed
-        if not np.isfinite(takes + volts + drawn).all():
-            return _nowhere(), _nowhere()
         currents = motors.both_currents(drawn, speed)
         if motors.reports_currents and not motors.reports_signs:
             currents = currents * [-1.0, 1.0]
@@ -104,7 +103,7 @@ class ParityWatch:
         off, current = np.abs(both[range(WHEELS), nearer]), currents[range(WHEELS), nearer]
         slope = np.maximum(np.abs(motors.per_current(speed, current)), _LEAST_SLOPE)
         band = np.array([item.band for item in frame.voltages])
-        widths = motors.scale_of(powers[0].unit) * np.array([item.band for item in powers])
+        widths = scale * np.array([item.band for item in powers])
         band += motors.resistance * widths / slope
         takes, obeys = np.abs(takes), np.abs(volts) < s.saturated * motors.voltage
         holds = obeys & (off < s.holds * band) & (takes > s.shows * band)
