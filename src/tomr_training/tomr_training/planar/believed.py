@@ -14,7 +14,7 @@ from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.binding import compiled
 from tomr_power_model.dynamics.simulation import Simulation, Steps, Variant
 from tomr_power_model.dynamics.vehicle import vehicle_of
-from tomr_power_model.model.encoders import LONG_S
+from tomr_power_model.model.encoders import LONG_S, WheelEstimate
 from tomr_power_model.model.resting import RestingDrivers
 from tomr_power_model.robot import WHEELS
 from tomr_training.drives import Drive
@@ -31,13 +31,11 @@ class Expected:
     """What is expected of a drive."""
 
     motion: Motion
-    # Of each tick, (ticks, 3): speeds and accelerations in its middle as `EncoderWindow.beside`
-    # gives them, measured and simulated [rad/s, rad/s^2], voltages of the drivers as the power
-    # sensors see them, of the simulated ones, and by their law alone [V].
-    speed: Array = field(repr=False)
-    acceleration: Array = field(repr=False)
-    simulated_speed: Array = field(repr=False)
-    simulated_acceleration: Array = field(repr=False)
+    # Of each tick, (ticks, 3): how encoders show wheels in its middle as `EncoderWindow.beside`
+    # gives it, measured and simulated, voltages of the drivers as the power sensors see them, of
+    # the simulated ones, and by their law alone [V].
+    measured: WheelEstimate = field(repr=False)
+    simulated: WheelEstimate = field(repr=False)
     held: Array = field(repr=False)
     simulated_held: Array = field(repr=False)
     by_law: Array = field(repr=False)
@@ -79,49 +77,48 @@ def run_believed(drive: Drive, signals: Signals, share: Array) -> Expected:
     step = simulation.period_s / steps
     out = np.empty((len(inputs), steps * simulation.row))
     ends = np.zeros((len(inputs) * steps + 1, WHEELS))
-    shown = np.empty((7, ticks, WHEELS))  # as in `Expected`
+    measured, simulated, volts = (np.empty((3, ticks, WHEELS)) for _ in range(3))
     fits = Fits.over(signals.encoder_time, ticks, LONG_S)
     borders = np.round(TICK * np.arange(ticks + 1) / simulation.period_s).astype(np.int64)
     borders[-1] = len(inputs)
-    before = np.array(path.wheel(at.SPEED))
+    before = np.array(path.wheel(at.SHOWN))
     for k, (first, last) in enumerate(pairwise(borders)):
         path.run(inputs[first:last], out[first:last])
-        means = Steps.of(out[first:last], WHEELS).speed
+        means = Steps.of(out[first:last], WHEELS).shown
         ends[first * steps + 1 : last * steps + 1] = ends[first * steps] + step * np.cumsum(
             means, axis=0
         )
-        after = np.array(path.wheel(at.SPEED))
+        after = np.array(path.wheel(at.SHOWN))
         until = ends[: last * steps + 1]
-        edges = at_times(until, step, TICK * np.array([k, k + 1.0]))
-        mean, change = (edges[1] - edges[0]) / TICK, (after - before) / TICK
-        angle, speed, acceleration = _seen(fits, k, until, step, (mean, change), signals)
-        seen = angle.tolist(), speed.tolist()
-        volts = drivers.voltages(path, *seen, simulated=mean.tolist(), share=float(share[k]))
-        drives = volts.held, volts.simulated, volts.by_law
-        shown[:, k] = speed, acceleration, mean, change, *drives
+        begin, middle, end = at_times(until, step, TICK * np.array([k, k + 0.5, k + 1.0]))
+        simulated[:, k] = (end - begin) / TICK, (after - before) / TICK, middle
+        measured[:, k] = _seen(fits, k, until, step, simulated[:, k], signals)
+        speed, acceleration, angle = measured[:, k]
+        half = 0.5 * TICK
+        at_end = angle + half * (speed + 0.5 * half * acceleration)
+        known = drivers.voltages(
+            path,
+            at_end.tolist(),
+            speed.tolist(),
+            simulated=simulated[0, k].tolist(),
+            share=float(share[k]),
+        )
+        volts[:, k] = known.held, known.simulated, known.by_law
         before = after
     variant = Variant(np.asarray(simulation.numbers))
     motion = Motion(variant, from_rest(inputs), Steps.of(out, WHEELS), step, ticks)
-    return Expected(motion, *shown)
+    return Expected(motion, WheelEstimate(*measured), WheelEstimate(*simulated), *volts)
 
 
 def _seen(
-    fits: Fits,
-    tick: int,
-    ends: Array,
-    step: float,
-    simulated: tuple[Array, Array],
-    signals: Signals,
+    fits: Fits, tick: int, ends: Array, step: float, simulated: Array, signals: Signals
 ) -> tuple[Array, Array, Array]:
-    """Angle at the end of a tick, and speed and acceleration in its middle, (3,) each.
+    """Speed, acceleration and angle in the middle of a tick, (3,) each.
 
-    As `EncoderWindow.beside` gives them beside a simulated motion of some mean speed and
-    acceleration.
+    As `EncoderWindow.beside` gives them beside those of a simulated motion, (3, 3).
     """
-    middle = at_times(ends, step, TICK * np.array([tick + 0.5]))[0]
     index = fits.index[tick]
     ahead = signals.position[index] - at_times(ends, step, signals.encoder_time[index])
     offset, slope, curve = fits.of(tick, ahead)
-    speed, acceleration = simulated[0] + slope, simulated[1] + curve
-    half = 0.5 * TICK
-    return middle + offset + half * (speed + 0.5 * half * acceleration), speed, acceleration
+    speed, acceleration, angle = simulated
+    return speed + slope, acceleration + curve, angle + offset

@@ -43,10 +43,10 @@ class Motion:
 
     @property
     def reported(self) -> Array:
-        """Angles that ideal encoders report at the ends of the steps [rad], (m + 1, 3)."""
+        """Angles that encoders without quanta report at the ends of the steps [rad], (m + 1, 3)."""
         shares = counted_shares(self.excitation.inputs)
-        shares = np.repeat(shares, len(self.steps.speed) // len(shares), axis=0)
-        return integral(self.steps.speed * shares, self.step)
+        shares = np.repeat(shares, len(self.steps.shown) // len(shares), axis=0)
+        return integral(self.steps.shown * shares, self.step)
 
     @property
     def truth(self) -> GroundTruth:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.binding import compiled
+from tomr_power_model.model.encoder_flaws import EncoderFlaws
 from tomr_power_model.model.encoder_path import Rests, alike, at_rest, beside
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.robot import WHEELS
@@ -70,20 +71,21 @@ def compare(drive: Drive, signals: Signals) -> Compared:
     total = commanded.sum(axis=1, keepdims=True) + auxiliary
     _, speed, _ = Fits.over(signals.encoder_time, ticks, _WINDOW).all(signals.position)
     drawn = _tick_means(signals.power_time, signals.voltage * signals.drawn, ticks)
-    derived = _derived(believed, commanded, offset)
+    derived = _derived(believed, EncoderFlaws.of(drive.believed), commanded, offset)
     return Compared(
-        np.hstack([total, commanded, expected.tick_means(expected.steps.speed), derived]),
+        np.hstack([total, commanded, expected.tick_means(expected.steps.shown), derived]),
         np.hstack([drawn[:, 3:], drawn[:, :3], speed, drawn[:, :3]]),
         believed.simulated_held,
         believed.by_law,
     )
 
 
-def _derived(believed: Expected, commanded: Array, offset: Array) -> Array:
+def _derived(believed: Expected, flaws: EncoderFlaws, commanded: Array, offset: Array) -> Array:
     """Power of each driver by the encoders [W], (ticks, 3): `PowerPredictor`'s encoder path."""
-    speed, simulated = believed.speed, believed.simulated_speed
-    measured, resting = believed.acceleration, (at_rest(speed), at_rest(simulated))
-    expected = alike(measured, believed.simulated_acceleration, resting)
+    wheels, of_path = flaws.turned(believed.measured), flaws.turned(believed.simulated)
+    speed, measured, simulated = wheels.speed, wheels.acceleration, of_path.speed
+    resting = at_rest(speed), at_rest(simulated)
+    expected = alike(measured, of_path.acceleration, resting)
     inverse, held = _inverse(believed, (speed, measured, believed.held), offset)
     of_simulated, also = _inverse(
         believed, (alike(speed, simulated, resting), expected, believed.simulated_held), offset
