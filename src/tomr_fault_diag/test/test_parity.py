@@ -6,7 +6,7 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
-from tomr_fault_diag.classifier.belief import CONTROLS, ENCODERS, HYPOTHESES
+from tomr_fault_diag.classifier.belief import CONTROLS, DRAGS, ENCODERS, EXTERNAL, HYPOTHESES
 from tomr_fault_diag.classifier.contacts import Contacts
 from tomr_fault_diag.classifier.evidence import Beside, said_by_forces, said_by_parity
 from tomr_fault_diag.classifier.motors import Motors
@@ -14,7 +14,7 @@ from tomr_fault_diag.classifier.parity import NOT_KNOWN, Parity, ParityWatch
 from tomr_fault_diag.classifier.rules import WINDOW_RULES, Moment
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
-from tomr_fault_diag.classifier.states import SLIP
+from tomr_fault_diag.classifier.states import NORMAL, SLIP
 from tomr_fault_diag.residuals.frame import Residual, ResidualFrame, Unit
 from tomr_power_model.robot import Robot, shipped_robot
 
@@ -43,14 +43,20 @@ def power(speed: Array, current: Array) -> Array:
 
 
 def frame(
-    held: Array, drawn: Array, shown: Array = SPEED, *, band: float = BAND, unit: Unit = "W"
+    held: Array,
+    drawn: Array,
+    shown: Array = SPEED,
+    *,
+    band: float = BAND,
+    unit: Unit = "W",
+    supply: float = math.nan,
 ) -> ResidualFrame:
     """A tick with such voltages [V], powers and speeds as encoders show [rad/s]."""
     motors = [Residual(0.0, band, value, unit) for value in drawn.tolist()]
     speeds = [Residual(0.0, 0.3, value, "rad/s") for value in shown.tolist()]
     first, second, third = (Residual(value, band, 0.0, "V") for value in held.tolist())
     residuals = (Residual(0.0, 1.0, 20.0), *motors, *speeds, *motors)
-    return ResidualFrame(BASE, residuals, voltages=(first, second, third))
+    return ResidualFrame(BASE, residuals, voltages=(first, second, third), supply=supply)
 
 
 WELL = frame(volts(SPEED, CURRENT), power(SPEED, CURRENT))
@@ -68,11 +74,19 @@ class Watched:
 
     def after(self, item: ResidualFrame, ticks: int = 4) -> tuple[list[bool], list[bool]]:
         """Where it holds and where it is broken after so many alike."""
+        parity = self._after(item, ticks)
+        return parity.holds.tolist(), parity.broken.tolist()
+
+    def breaks(self, item: ResidualFrame, ticks: int) -> list[bool]:
+        """The same: where it breaks."""
+        return self._after(item, ticks).breaks.tolist()
+
+    def _after(self, item: ResidualFrame, ticks: int) -> Parity:
         parity = NOT_KNOWN
         for _ in range(ticks):
             self._stamp += TICK
             parity = self.watch.take(evolve(item, stamp_ns=self._stamp))
-        return parity.holds.tolist(), parity.broken.tolist()
+        return parity
 
 
 def seen(
@@ -131,6 +145,41 @@ def test_a_break_is_remembered_for_ten_seconds_or_until_it_holds() -> None:
     watched.after(MISCOUNTED, 4)
     watched.watch.clear()
     assert watched.after(unknown, 1) == (NONE, NONE)
+
+
+def test_it_breaks_where_it_agreed_before() -> None:
+    unknown = evolve(WELL, voltages=(evolve(WELL.voltages[0], residual=math.nan),) * 3)
+    most = np.full(3, 0.95 * ROBOT.supply.nominal_voltage)
+    at_its_limit = frame(most, power(SPEED, CURRENT))
+    low = frame(volts(TWICE, CURRENT), power(TWICE, CURRENT), supply=0.5)  # 12 V of 12.8
+    slow = frame(volts(0.3 * SPEED, CURRENT), power(0.3 * SPEED, CURRENT), 0.3 * SPEED)
+    still = frame(volts(0.01 * SPEED, CURRENT), power(0.01 * SPEED, CURRENT), 0.01 * SPEED)
+    for before, breaks in (
+        ([WELL], FIRST),
+        ([slow], FIRST),  # which does not say that its encoder is well
+        ([still], NONE),
+        ([], NONE),
+        ([WELL, at_its_limit], NONE),
+        ([WELL, at_its_limit, WELL], FIRST),
+        ([WELL, low], NONE),
+        ([WELL, unknown], NONE),
+    ):
+        watched = Watched()
+        for item in before:
+            watched.after(item)
+        assert watched.breaks(MISCOUNTED, 3) == NONE
+        assert watched.breaks(MISCOUNTED, 1) == breaks
+        assert watched.breaks(WELL, 1) == NONE
+
+
+def test_what_a_supply_lacks_is_no_break() -> None:
+    """Its driver gives a fifth less than its law says: of 10 V and more 2 V are no break."""
+    fast = 1.8 * SPEED
+    held, drawn = volts(fast, CURRENT), power(fast, CURRENT)
+    for more, breaks in ((0.2, NONE), (0.3, NONE), (0.5, ALL)):
+        watched = Watched()
+        watched.after(frame(held, drawn, fast, supply=0.8))
+        assert watched.breaks(frame((1.0 + more) * held, drawn, fast, supply=0.8), 4) == breaks
 
 
 def test_a_stray_tick_is_none() -> None:
@@ -201,6 +250,10 @@ def test_what_it_says_by_hand() -> None:
     said = said_by_parity(Parity(np.array(NONE), np.array(FIRST)))
     assert said[SLIP] == -10.0
     assert not np.delete(said, SLIP).any()
+    said = said_by_parity(Parity(breaks=np.array(FIRST)))
+    lowered = [NORMAL, SLIP, EXTERNAL, DRAGS.start]
+    assert said[lowered].tolist() == [-10.0] * 4
+    assert not np.delete(said, lowered).any()
     assert not said_by_parity(NOT_KNOWN).any()
     moment = Moment(WELL, by_parity=np.arange(HYPOTHESES, dtype=float))
     added = WINDOW_RULES["parity of the motors"](np.ones(HYPOTHESES), moment)

@@ -23,7 +23,7 @@ from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.misfit import is_far
 from tomr_fault_diag.classifier.outside import NOTHING_ACTS, Outside
 from tomr_fault_diag.classifier.parity import NOT_KNOWN, Parity
-from tomr_fault_diag.classifier.states import SLIP
+from tomr_fault_diag.classifier.states import NORMAL, SLIP
 from tomr_fault_diag.residuals.frame import SPEEDS, ResidualFrame
 
 Array = NDArray[np.float64]
@@ -78,14 +78,17 @@ def said_by_gyro(frame: ResidualFrame) -> Array:
 def said_by_parity(parity: Parity) -> Array:
     """Of what motors draw at their voltages and speeds.
 
-    Where that agrees neither the signal of the motor nor its encoder is lost; where it does not it
-    is no slip.
+    Where that agrees neither the signal of the motor nor its encoder is lost. Where it does not it
+    is no slip; where it did until then something is wrong, and it is not that axle's friction.
     """
     said = np.zeros(HYPOTHESES)
     for kind in (CONTROLS, ENCODERS):
         said[kind] = np.where(parity.holds, -_MOST, 0.0)
     if parity.broken.any():
         said[SLIP] = -_MOST
+    if parity.breaks.any():
+        said[[NORMAL, SLIP, EXTERNAL]] = -_MOST
+        said[DRAGS][parity.breaks] = -_MOST
     return said
 
 

@@ -6,8 +6,12 @@ The law of its driver says the voltage v, its power the current i at the speed o
 encoder shows. Where the three agree the motor has what its driver gives, and turns as its encoder
 shows. Where they do not, a signal is lost or counts are, or a winding or the power sensor is off:
 slip, slopes, loads and bearings change the current, but not the voltage that goes with it.
+
+A driver that was at its limit has summed up what nobody knows: until the three agree again its law
+does not say its voltage. One that does not know its supply gives as much less as that is low.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -27,7 +31,6 @@ from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-Stamps = NDArray[np.int64]
 
 _LEAST_SLOPE = 1e-3  # W/A
 _NEVER = np.iinfo(np.int64).max
@@ -57,6 +60,7 @@ class Parity:
 
     holds: Flags = field(factory=_nowhere)
     broken: Flags = field(factory=_nowhere)  # or was of late
+    breaks: Flags = field(factory=_nowhere)  # and did hold before
 
 
 NOT_KNOWN = Parity()
@@ -72,23 +76,31 @@ class ParityWatch:
 
     def clear(self) -> None:
         """Nothing was seen."""
-        self._holds_since, self._broken_since = np.full((2, WHEELS), _NEVER)  # ns
+        # Since when each holds, agrees while the wheel turns, and is broken [ns].
+        self._since = np.full((3, WHEELS), _NEVER)
         self._until = np.zeros(WHEELS, dtype=np.int64)  # ns, for which a break is remembered
+        self._is_known = _nowhere()  # whether its driver's law says a motor's voltage
 
     def take(self, frame: ResidualFrame) -> Parity:
         """What the newest tick says with those before."""
         now, s = frame.stamp_ns, self.settings
-        holds, broken = self._of(frame)
-        self._holds_since = _since(self._holds_since, holds, now)
-        self._broken_since = _since(self._broken_since, broken, now)
-        holds = self._holds_since <= now - s.lasts
-        self._until[self._broken_since <= now - s.lasts] = now + s.remembered
+        off, band, takes, volts = self._of(frame)
+        obeys = volts < s.saturated * self._motors.voltage * np.fmin(frame.supply, 1.0)
+        lack = volts * abs(1.0 - frame.supply) if math.isfinite(frame.supply) else 0.0
+        agrees = obeys & (off < s.holds * band)
+        differs = obeys & (off - lack > s.broken * band) & (off - lack > s.share * takes)
+        flags = [agrees & (takes > s.shows * band), agrees & (takes > band), differs]
+        self._since = np.where(flags, np.minimum(self._since, now), _NEVER)
+        holds, agreed, broken = self._since <= now - s.lasts
+        self._until[broken] = now + s.remembered
         self._until[holds] = 0
-        return Parity(holds, self._until > now)
+        self._is_known = (self._is_known | agreed) & obeys
+        return Parity(holds, self._until > now, self._is_known & broken)
 
-    def _of(self, frame: ResidualFrame) -> tuple[Flags, Flags]:
-        """Whether it holds, and whether it is broken, in one tick."""
-        motors, s = self._motors, self.settings
+    def _of(self, frame: ResidualFrame) -> tuple[Array, Array, Array, Array]:
+        """By how much it is off in one tick, its band, what the speed takes, and what the driver
+        gives [V]."""
+        motors = self._motors
         powers = [frame.residuals[index] for index in ENCODERS]
         speed = np.array([measured_speed(frame.residuals[index]) for index in SPEEDS])
         volts = _of_all(frame.voltages)
@@ -105,16 +117,9 @@ class ParityWatch:
         band = np.array([item.band for item in frame.voltages])
         widths = scale * np.array([item.band for item in powers])
         band += motors.resistance * widths / slope
-        takes, obeys = np.abs(takes), np.abs(volts) < s.saturated * motors.voltage
-        holds = obeys & (off < s.holds * band) & (takes > s.shows * band)
-        return holds, obeys & (off > s.broken * band) & (off > s.share * takes)
+        return off, band, np.abs(takes), np.abs(volts)
 
 
 def _of_all(items: Sequence[Residual]) -> Array:
     """What was measured."""
     return np.array([item.modelled + item.residual for item in items])
-
-
-def _since(before: Stamps, flags: Flags, now: int) -> Stamps:
-    """Since when each is so [ns]."""
-    return np.where(flags, np.minimum(before, now), _NEVER)
