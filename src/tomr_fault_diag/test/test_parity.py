@@ -152,7 +152,7 @@ def test_it_breaks_where_it_agreed_before() -> None:
     most = np.full(3, 0.95 * ROBOT.supply.nominal_voltage)
     at_its_limit = frame(most, power(SPEED, CURRENT))
     low = frame(volts(TWICE, CURRENT), power(TWICE, CURRENT), supply=0.5)  # 12 V of 12.8
-    slow = frame(volts(0.3 * SPEED, CURRENT), power(0.3 * SPEED, CURRENT), 0.3 * SPEED)
+    slow = frame(volts(0.2 * SPEED, CURRENT), power(0.2 * SPEED, CURRENT), 0.2 * SPEED)
     still = frame(volts(0.01 * SPEED, CURRENT), power(0.01 * SPEED, CURRENT), 0.01 * SPEED)
     for before, breaks in (
         ([WELL], FIRST),

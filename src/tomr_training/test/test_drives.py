@@ -54,6 +54,7 @@ def test_every_value_is_passed_through_but_of_a_ratio_what_it_differs_from_one_b
         ("sensor.power_scale", "scale", True),
         ("contact.roller_drag", "coefficient", False),
         ("friction.coulomb", "torque", False),
+        ("body.mass_center_offset", "x", False),
     ],
 )
 def test_a_ratio_may_be_more_or_less_than_its_neutral_value(

@@ -122,3 +122,13 @@ def test_noise_of_power_is_of_rollers_and_of_monitors(straight: Straight) -> Non
     noise = np.std(Signals.of(drive, run_plant(drive)).drawn, axis=0)
     np.testing.assert_allclose(noise[:3], REFERENCE.sensors.current_noise, rtol=0.15)
     assert noise[3] == pytest.approx(2.0 * REFERENCE.sensors.current_noise, rel=0.15)
+
+
+def test_encoders_report_their_scale(straight: Straight) -> None:
+    """The driver turns the wheel by less, so that its encoder shows what is asked for."""
+    scale = {"sensor.encoder_scale": (None, {"scale": 1.02}, None)}
+    scaled = evolve(REFERENCE, physics={**REFERENCE.physics, **scale})
+    motion, plain = run_plant(straight(robot=scaled)), run_plant(straight())
+    turned = motion.step * motion.steps.speed.sum(axis=0)
+    np.testing.assert_allclose(motion.reported[-1, 1:], [1.02, 1.0] * turned[1:], rtol=1e-9)
+    np.testing.assert_allclose(motion.reported[-1, 1:], plain.reported[-1, 1:], rtol=2e-3)

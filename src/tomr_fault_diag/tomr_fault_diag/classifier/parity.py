@@ -88,7 +88,7 @@ class ParityWatch:
         obeys = volts < s.saturated * self._motors.voltage * np.fmin(frame.supply, 1.0)
         lack = volts * abs(1.0 - frame.supply) if math.isfinite(frame.supply) else 0.0
         agrees = obeys & (off < s.holds * band)
-        differs = obeys & (off - lack > s.broken * band) & (off - lack > s.share * takes)
+        differs = obeys & (off - lack > np.maximum(s.broken * band, s.share * takes))
         flags = [agrees & (takes > s.shows * band), agrees & (takes > band), differs]
         self._since = np.where(flags, np.minimum(self._since, now), _NEVER)
         holds, agreed, broken = self._since <= now - s.lasts
