@@ -138,8 +138,8 @@ def _selected(
 @pytest.mark.parametrize(
     ("away", "left"),
     [
-        ({"a": 5.0, "b": 1.01}, ["a", "b"]),
-        ({"a": 5.0, "b": 0.99, "c": 0.2}, ["a"]),
+        ({"a": 5.0, "b": 1.54}, ["a", "b"]),  # three standard deviations
+        ({"a": 5.0, "b": 1.52, "c": 0.2}, ["a"]),
         ({"a": 0.5, "b": 0.2}, ["a"]),  # something is there
         ({"a": 0.1}, ["a"]),
         ({}, []),

@@ -25,10 +25,14 @@ from tomr_reality_gap.rules import HALF_WIDTH
 
 Array = NDArray[np.float64]
 
+# Half-widths of its 95 % interval from nothing, three standard deviations: of the hundreds of
+# hypotheses that are tried some are beyond theirs by chance.
+_CLEAR = 3.0 / HALF_WIDTH
+
 
 def significant(dataset: Dataset, found: Selection, tick: Tick = lambda done: None) -> Selection:
-    """Findings but for those that explain nothing, and those beside others whose 95 % interval
-    includes nothing; of the latter the last one stays: what made it necessary is there.
+    """Findings but for those that explain nothing, and those beside others that are not clearly
+    beyond nothing; of the latter the last one stays: what made it necessary is there.
     """
     while found.best.model.hypotheses:
         model = found.best.model
@@ -39,7 +43,7 @@ def significant(dataset: Dataset, found: Selection, tick: Tick = lambda done: No
                 break
             away = distances(model, own_sigma(dataset, found, linearise(dataset, model, ())))
             worst = int(np.argmin(away))
-            if away[worst] > 1.0:
+            if away[worst] > _CLEAR:
                 break
         found = dropped(dataset, found, worst, tick)
     return found
