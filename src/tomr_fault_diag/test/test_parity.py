@@ -77,6 +77,10 @@ class Watched:
         parity = self._after(item, ticks)
         return parity.holds.tolist(), parity.broken.tolist()
 
+    def skip(self, ticks: int) -> None:
+        """So many are missing."""
+        self._stamp += ticks * TICK
+
     def breaks(self, item: ResidualFrame, ticks: int) -> list[bool]:
         """The same: where it breaks."""
         return self._after(item, ticks).breaks.tolist()
@@ -170,6 +174,19 @@ def test_it_breaks_where_it_agreed_before() -> None:
         assert watched.breaks(MISCOUNTED, 3) == NONE
         assert watched.breaks(MISCOUNTED, 1) == breaks
         assert watched.breaks(WELL, 1) == NONE
+
+
+def test_what_was_before_a_gap_says_nothing() -> None:
+    for gap, breaks in ((2, FIRST), (5, FIRST), (6, NONE)):  # ticks; 0.3 s are none too many
+        watched = Watched()
+        watched.after(WELL)
+        watched.skip(gap)
+        assert watched.breaks(MISCOUNTED, 4) == breaks
+    watched = Watched()
+    watched.after(WELL)
+    watched.after(MISCOUNTED, 3)
+    watched.skip(6)
+    assert watched.after(MISCOUNTED, 1)[1] == NONE
 
 
 def test_what_a_supply_lacks_is_no_break() -> None:

@@ -42,6 +42,7 @@ class ParitySettings:
     healthy motor leave open of it [V]."""
 
     lasts: int = to_ns(0.15)  # for which it has to be so
+    gap: int = to_ns(0.3)  # between ticks, after which nothing is known of those before
     holds: float = 1.0  # bands, by which it may be off, ...
     shows: float = 12.0  # ... where the speed takes so many: a fifth of its counts is a quarter
     broken: float = 3.0  # bands, by which it is off, ...
@@ -80,10 +81,14 @@ class ParityWatch:
         self._since = np.full((3, WHEELS), _NEVER)
         self._until = np.zeros(WHEELS, dtype=np.int64)  # ns, for which a break is remembered
         self._is_known = _nowhere()  # whether its driver's law says a motor's voltage
+        self._newest = 0  # ns
 
     def take(self, frame: ResidualFrame) -> Parity:
         """What the newest tick says with those before."""
         now, s = frame.stamp_ns, self.settings
+        if now - self._newest > s.gap:
+            self._since[:], self._is_known[:] = _NEVER, False
+        self._newest = now
         off, band, takes, volts = self._of(frame)
         obeys = volts < s.saturated * self._motors.voltage * np.fmin(frame.supply, 1.0)
         lack = volts * abs(1.0 - frame.supply) if math.isfinite(frame.supply) else 0.0
