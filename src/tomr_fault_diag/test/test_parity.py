@@ -267,7 +267,7 @@ def test_what_it_says_by_hand() -> None:
     said = said_by_parity(Parity(np.array(NONE), np.array(FIRST)))
     assert said[SLIP] == -10.0
     assert not np.delete(said, SLIP).any()
-    said = said_by_parity(Parity(breaks=np.array(FIRST)))
+    said = said_by_parity(Parity(broken=np.array(FIRST), breaks=np.array(FIRST)))
     lowered = [NORMAL, SLIP, EXTERNAL, DRAGS.start]
     assert said[lowered].tolist() == [-10.0] * 4
     assert not np.delete(said, lowered).any()

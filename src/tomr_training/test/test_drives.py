@@ -35,7 +35,12 @@ def test_every_value_is_passed_through_but_of_a_ratio_what_it_differs_from_one_b
     given = shipped_robot("reference")
     one = {"scale": 1.002}
     drag = {"coefficient": 0.5, "slip": 0.2}
-    physics = {"sensor.encoder_scale": (one, None, one), "contact.roller_drag": (drag, drag, drag)}
+    loss = {"efficiency": 0.5}  # which is never more than its neutral value
+    physics = {
+        "sensor.encoder_scale": (one, None, one),
+        "contact.roller_drag": (drag, drag, drag),
+        "electrical.regeneration_loss": (loss, loss, loss),
+    }
     off = every_value(evolve(given, physics=physics), lambda value: 1.02 * value)
     assert off.mass == pytest.approx(1.02 * given.mass)
     assert off.motors[1].resistance == pytest.approx(1.02 * given.motors[1].resistance)
@@ -45,6 +50,7 @@ def test_every_value_is_passed_through_but_of_a_ratio_what_it_differs_from_one_b
     assert off.physics["contact.roller_drag"][2] == pytest.approx(
         {"coefficient": 0.51, "slip": 0.204}
     )
+    assert off.physics["electrical.regeneration_loss"][0] == pytest.approx({"efficiency": 0.51})
 
 
 @pytest.mark.parametrize(

@@ -195,9 +195,12 @@ def every_value(robot: Robot, off: Callable[[float], float]) -> Robot:
         )
 
     def effect(name: str, values: Mapping[str, float]) -> dict[str, float]:
-        parameters = EFFECTS[name].parameters
-        about = {key: parameters[key].neutral * parameters[key].is_ratio for key in values}
-        return {key: about[key] + off(value - about[key]) for key, value in values.items()}
+        found = {}
+        for key, value in values.items():
+            parameter = EFFECTS[name].parameters[key]
+            about = parameter.neutral if parameter.is_ratio else 0.0
+            found[key] = about + off(value - about)
+        return found
 
     first, second, third = (motor(nominal) for nominal in robot.motors)
     physics = {}

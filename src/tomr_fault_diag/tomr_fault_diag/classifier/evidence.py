@@ -86,8 +86,8 @@ def said_by_parity(parity: Parity) -> Array:
         said[kind] = np.where(parity.holds, -_MOST, 0.0)
     if parity.broken.any():
         said[SLIP] = -_MOST
-    if parity.breaks.any():
-        said[[NORMAL, SLIP, EXTERNAL]] = -_MOST
+    if parity.breaks.any():  # and so is broken
+        said[[NORMAL, EXTERNAL]] = -_MOST
         said[DRAGS][parity.breaks] = -_MOST
     return said
 

@@ -90,10 +90,11 @@ class ParityWatch:
             self._since[:], self._is_known[:] = _NEVER, False
         self._newest = now
         off, band, takes, volts = self._of(frame)
-        obeys = volts < s.saturated * self._motors.voltage * np.fmin(frame.supply, 1.0)
-        lack = volts * abs(1.0 - frame.supply) if math.isfinite(frame.supply) else 0.0
+        supply = frame.supply if math.isfinite(frame.supply) else 1.0
+        obeys = volts < s.saturated * self._motors.voltage * min(supply, 1.0)
         agrees = obeys & (off < s.holds * band)
-        differs = obeys & (off - lack > np.maximum(s.broken * band, s.share * takes))
+        beyond = off - volts * abs(1.0 - supply)
+        differs = obeys & (beyond > np.maximum(s.broken * band, s.share * takes))
         flags = [agrees & (takes > s.shows * band), agrees & (takes > band), differs]
         self._since = np.where(flags, np.minimum(self._since, now), _NEVER)
         holds, agreed, broken = self._since <= now - s.lasts
