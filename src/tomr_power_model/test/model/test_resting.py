@@ -151,6 +151,13 @@ def test_by_its_law_a_driver_forgets_no_more_than_friction_held(path: CommandPat
     assert beyond == pytest.approx(-0.5 + 1.3 * 12.0 * 0.0057, rel=0.06)
 
 
+@pytest.mark.parametrize("speed", [-900.0, 900.0])
+def test_by_its_law_a_driver_gives_no_more_than_its_supply(path: CommandPath, speed: float) -> None:
+    drivers, most = RestingDrivers(ROBOT, TICK), ROBOT.supply.nominal_voltage
+    found = drivers.voltages(path, REST, (speed, 0.0, 0.0), simulated=REST, share=1.0)
+    assert found.by_law == [math.copysign(most, -speed), *found.simulated[1:]]
+
+
 @pytest.mark.parametrize("restart", [RestingDrivers.clear, RestingDrivers.forget])
 def test_by_its_law_a_driver_begins_as_simulated(
     path: CommandPath, restart: Callable[[RestingDrivers], None]

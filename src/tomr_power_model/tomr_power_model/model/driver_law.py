@@ -57,6 +57,7 @@ class DriverLaw:
     def forget(self) -> None:
         """They were asked for what is not known: what their sums differ by means nothing."""
         self._offsets = Offsets()
+        self._sums = [UNKNOWN] * WHEELS  # that drivers have summed up, as far as is known [rad]
         self._before = [UNKNOWN] * WHEELS  # what the sums differed by at the end of the last tick
         self._usual = [UNKNOWN] * WHEELS  # speeds that the offsets stand for [rad/s]
         self._begins = [self._lasts] * WHEELS  # ticks of motion in which an offset fades soon ...
@@ -69,6 +70,7 @@ class DriverLaw:
         simulated: Sequence[float],
         *,
         expected: Sequence[float],
+        sums: Sequence[float],
         holds: Sequence[float],
         share: float,
     ) -> list[float]:
@@ -78,7 +80,8 @@ class DriverLaw:
             ahead: by how much a simulated wheel has turned further at the end of a tick [rad].
             speed: of the wheels, mean of the tick [rad/s].
             simulated: the same as simulated.
-            expected: voltages of the simulated drivers then [V].
+            expected: voltages of the simulated drivers then [V], ...
+            sums: ... and of their errors [rad].
             holds: what friction holds the wheels against while the robot stands [V].
             share: of the tick at the time that is asked about.
         """
@@ -93,8 +96,9 @@ class DriverLaw:
                 apart -= fades * apart
                 self._follow_usual(wheel, simulated[wheel], fades)
             volts = expected[wheel] + self._proportional * slower[wheel]
-            now.append(self._limited(wheel, apart, volts))
-        delay, sums = self._delay(), between(self._before, now, share)
+            volts -= self._integral * sums[wheel]
+            now.append(self._limited(wheel, sums[wheel] + apart, volts) - sums[wheel])
+        delay, middle = self._delay(), between(self._before, now, share)
         faster = [turns - usual for turns, usual in zip(simulated, self._usual, strict=True)]
         for wheel, apart in enumerate(now):
             may_be_late = abs(apart) < self._longest * abs(faster[wheel])  # not where not known
@@ -103,7 +107,7 @@ class DriverLaw:
         self._before = now
         return [
             self._proportional * less + self._integral * (apart - delay * more)
-            for less, apart, more in zip(slower, sums, faster, strict=True)
+            for less, apart, more in zip(slower, middle, faster, strict=True)
         ]
 
     def _fades(self, wheel: int, speed: float, slower: float, apart: float, holds: float) -> float:
@@ -135,14 +139,19 @@ class DriverLaw:
             self._usual[wheel] = simulated
         self._usual[wheel] += fades * (simulated - self._usual[wheel])
 
-    def _limited(self, wheel: int, apart: float, volts: float) -> float:
-        """By how much a driver's sum can be ahead [rad], that gives so much [V] without that."""
-        over = abs(volts + self._integral * apart) - self._most
-        if not (over > 0.0 and self._integral):  # so if it is not known
-            return apart
-        less = math.copysign(min(over / self._integral, abs(apart)), apart)
-        self._offsets.lower(wheel, less)
-        return apart - less
+    def _limited(self, wheel: int, total: float, volts: float) -> float:
+        """What a driver has summed up [rad], that gives so much for its error [V], and would have
+        summed up so much [rad] without a limit: at its limit it does not sum up."""
+        if total != total:
+            return total
+        found, wanted = total, volts + self._integral * total
+        if abs(wanted) > self._most and self._integral:
+            found = self._sums[wheel]
+            if not abs(volts + self._integral * found) > self._most:  # so if it is not known
+                found = (math.copysign(self._most, wanted) - volts) / self._integral
+            self._offsets.lower(wheel, total - found)
+        self._sums[wheel] = found
+        return found
 
     def _learn(self, wheel: int, speed: float, apart: float) -> None:
         """How far a wheel is ahead that turns faster by so much [rad, rad/s]."""

@@ -80,6 +80,7 @@ class RestingDrivers:
         )
         self._proportional = robot.controller.proportional
         self._integral = robot.controller.integral
+        self._most = robot.supply.nominal_voltage
         self._holding = Holding(vehicle_of(robot))
         self._law = DriverLaw(robot, period_s)
         self.clear()
@@ -134,13 +135,17 @@ class RestingDrivers:
         held, simulates = map(between, self._before, (found, expected), (share, share))
         holds = self._holding.voltages(*map(path.wheel, (at.DRY, at.SIDE_LIMIT, at.HOT)))
         beyond = self._law.beyond(
-            ahead, speed, simulated, expected=expected, holds=holds, share=share
+            ahead, speed, simulated, expected=expected, sums=sums, holds=holds, share=share
         )
         taken = self._follow(path, apart, ahead, speed)
         self._law.taken_over(taken)
         after = [volts + self._integral * more for volts, more in zip(expected, taken, strict=True)]
         self._before = found, after
-        by_law = [volts + more for volts, more in zip(simulates, beyond, strict=True)]
+        most = self._most
+        by_law = [
+            min(max(volts + more, -most), most)
+            for volts, more in zip(simulates, beyond, strict=True)
+        ]
         return Voltages(held, simulates, by_law)
 
     def _fades(self, wheel: int, speed: float, simulated: float) -> float:
