@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from tomr_fault_diag.classifier.belief import CONTROLS, DRAGS, ENCODERS, EXTERNAL, HYPOTHESES
 from tomr_fault_diag.classifier.contacts import Contacts
 from tomr_fault_diag.classifier.evidence import Beside, said_by_forces, said_by_parity
+from tomr_fault_diag.classifier.losses import Losses
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.parity import NOT_KNOWN, Parity, ParityWatch
 from tomr_fault_diag.classifier.rules import WINDOW_RULES, Moment
@@ -84,6 +85,10 @@ class Watched:
     def breaks(self, item: ResidualFrame, ticks: int) -> list[bool]:
         """The same: where it breaks."""
         return self._after(item, ticks).breaks.tolist()
+
+    def broke(self, item: ResidualFrame, ticks: int) -> list[bool]:
+        """The same: where it breaks, or broke a moment ago."""
+        return self._after(item, ticks).broke.tolist()
 
     def _after(self, item: ResidualFrame, ticks: int) -> Parity:
         parity = NOT_KNOWN
@@ -165,7 +170,7 @@ def test_it_breaks_where_it_agreed_before() -> None:
         ([], NONE),
         ([WELL, at_its_limit], NONE),
         ([WELL, at_its_limit, WELL], FIRST),
-        ([WELL, low], NONE),
+        ([WELL, low], FIRST),  # whose supply is measured
         ([WELL, unknown], NONE),
     ):
         watched = Watched()
@@ -174,6 +179,54 @@ def test_it_breaks_where_it_agreed_before() -> None:
         assert watched.breaks(MISCOUNTED, 3) == NONE
         assert watched.breaks(MISCOUNTED, 1) == breaks
         assert watched.breaks(WELL, 1) == NONE
+
+
+def test_a_break_counts_for_half_a_second_or_until_it_agrees() -> None:
+    unknown = evolve(WELL, voltages=(evolve(WELL.voltages[0], residual=math.nan),) * 3)
+    still = frame(np.zeros(3), power(np.zeros(3), 0.0 * CURRENT), 0.0 * SPEED)
+    slow = frame(volts(0.2 * SPEED, CURRENT), power(0.2 * SPEED, CURRENT), 0.2 * SPEED)
+    for after, ticks in ((still, 10), (slow, 3)):
+        watched = Watched()
+        watched.after(WELL)
+        assert watched.broke(MISCOUNTED, 3) == NONE
+        assert watched.broke(MISCOUNTED, 1) == FIRST
+        assert watched.broke(after, ticks) == FIRST
+        assert watched.breaks(after, 0) == NONE
+        assert watched.broke(after, 1) == NONE
+    assert watched.broke(unknown, 4) == NONE  # whose law says nothing
+
+
+def test_a_driver_that_was_at_its_limit_may_be_off_by_a_tenth_of_it() -> None:
+    """2.4 V, until it agrees: the driver of the third wheel gives more than it should."""
+    most = np.full(3, ROBOT.supply.nominal_voltage)
+    fast = (most - MOTORS.resistance * CURRENT) / MOTORS.constant
+    at_its_limit = frame(most, power(fast, CURRENT), fast, supply=1.0)
+    held, drawn = volts(SPEED, CURRENT), power(SPEED, CURRENT)
+    third = [False, False, True]
+    for off, before, breaks in (
+        (2.3, [WELL], third),
+        (2.3, [WELL, at_its_limit], NONE),
+        (2.3, [WELL, at_its_limit, WELL], third),
+        (4.0, [WELL, at_its_limit], third),
+    ):
+        watched = Watched()
+        for item in before:
+            watched.after(item)
+        assert watched.breaks(frame(held + np.multiply(third, off), drawn), 4) == breaks
+
+
+def test_at_its_limit_a_driver_s_voltage_is_that_of_its_supply() -> None:
+    """Its wheel turns twice as fast as it shows, at 24 V, or at 18 V of a supply that is low."""
+    for supply in (1.0, 0.75):
+        full = ROBOT.supply.nominal_voltage
+        fast = np.array([(supply * full - MOTORS.resistance[0]) / MOTORS.constant[0], *SPEED[1:]])
+        held, drawn = volts(fast, CURRENT), power(fast, CURRENT)
+        held[0] = full  # by its law
+        watched = Watched()
+        watched.after(evolve(WELL, supply=supply))
+        shown = frame(held, drawn, fast, supply=supply)
+        assert watched.breaks(shown, 4) == NONE
+        assert watched.breaks(frame(held, drawn, fast * [0.5, 1.0, 1.0], supply=supply), 4) == FIRST
 
 
 def test_what_was_before_a_gap_says_nothing() -> None:
@@ -267,10 +320,15 @@ def test_what_it_says_by_hand() -> None:
     said = said_by_parity(Parity(np.array(NONE), np.array(FIRST)))
     assert said[SLIP] == -10.0
     assert not np.delete(said, SLIP).any()
-    said = said_by_parity(Parity(broken=np.array(FIRST), breaks=np.array(FIRST)))
+    said = said_by_parity(Parity(broken=np.array(FIRST), broke=np.array(FIRST)))
     lowered = [NORMAL, SLIP, EXTERNAL, DRAGS.start]
     assert said[lowered].tolist() == [-10.0] * 4
     assert not np.delete(said, lowered).any()
+    none, first = np.array(NONE), np.array(FIRST)
+    for losses, refuted in ((Losses(first, none), ENCODERS), (Losses(none, first), CONTROLS)):
+        said = said_by_parity(Parity(losses=losses))
+        assert said[[NORMAL, EXTERNAL, refuted.start]].tolist() == [-24.0, -24.0, -10.0]
+        assert not np.delete(said, [NORMAL, EXTERNAL, refuted.start]).any()
     assert not said_by_parity(NOT_KNOWN).any()
     moment = Moment(WELL, by_parity=np.arange(HYPOTHESES, dtype=float))
     added = WINDOW_RULES["parity of the motors"](np.ones(HYPOTHESES), moment)

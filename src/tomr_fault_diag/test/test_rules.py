@@ -24,6 +24,7 @@ from tomr_fault_diag.classifier.contacts import Contacts
 from tomr_fault_diag.classifier.evidence import Beside
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.outside import Outside
+from tomr_fault_diag.classifier.parity import Parity
 from tomr_fault_diag.classifier.rules import ALL_RULES, STATE_RULES, WINDOW_RULES, Moment
 from tomr_fault_diag.classifier.states import NORMAL, SLIP
 from tomr_fault_diag.residuals.frame import ENCODERS as DERIVED
@@ -211,6 +212,19 @@ def test_a_force_on_the_body_accuses_no_wheel(outside: Outside) -> None:
     wheels = range(CONTROLS.start, METERS.stop)
     found = changed("a force on the body", beside(outside=outside))
     assert found == dict.fromkeys(wheels, pytest.approx(-10.0))
+
+
+@pytest.mark.parametrize("name", ["a load", "a force on the body"])
+def test_where_a_parity_broke_no_force_on_the_body_explains_it(name: str) -> None:
+    found = Beside(outside=Outside(load=True), parity=Parity(broke=np.array([True, False, False])))
+    assert changed(name, beside(outside=found.outside))
+    assert not changed(name, evolve(QUIET, beside=found))
+
+
+def test_what_breaks_a_parity_is_not_over() -> None:
+    parity = Parity(breaks=np.array([False, True, False]))
+    found = changed("a parity that breaks", evolve(QUIET, beside=Beside(parity=parity)))
+    assert found == dict.fromkeys(range(ENDED.start, ENDED.stop), -24.0)
 
 
 def test_who_leans_on_wheels_that_grip_makes_none_slip() -> None:

@@ -86,9 +86,14 @@ def said_by_parity(parity: Parity) -> Array:
         said[kind] = np.where(parity.holds, -_MOST, 0.0)
     if parity.broken.any():
         said[SLIP] = -_MOST
-    if parity.breaks.any():  # and so is broken
+    if parity.broke.any():
         said[[NORMAL, EXTERNAL]] = -_MOST
-        said[DRAGS][parity.breaks] = -_MOST
+        said[DRAGS][parity.broke] = -_MOST
+    counts, signal = parity.losses.counts, parity.losses.signal
+    if counts.any() or signal.any():
+        said[[NORMAL, EXTERNAL]] = -_CERTAIN
+    said[CONTROLS][counts] = -_MOST
+    said[ENCODERS][signal] = -_MOST
     return said
 
 

@@ -74,6 +74,12 @@ class Motors:
         self._laws.motor_currents(self._numbers, motion, drawn.tolist(), both, WHEELS)
         return np.array(both).reshape(WHEELS, 2)
 
+    def either_current(self, drawn: Array, speed: Array) -> Array:
+        """The same, (3, 2); where only the size of a current is measured, either sign of it."""
+        both = self.both_currents(drawn, speed)
+        is_sign_known = self.reports_signs or not self.reports_currents
+        return both if is_sign_known else both * [-1.0, 1.0]
+
     def per_torque(self, speed: Array, current: Array) -> Array:
         """How what is measured grows with the torque, at wheel speeds and currents [W/(N m)], or
         [A/(N m)]."""

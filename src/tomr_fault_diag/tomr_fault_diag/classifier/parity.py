@@ -7,8 +7,9 @@ encoder shows. Where the three agree the motor has what its driver gives, and tu
 shows. Where they do not, a signal is lost or counts are, or a winding or the power sensor is off:
 slip, slopes, loads and bearings change the current, but not the voltage that goes with it.
 
-A driver that was at its limit has summed up what nobody knows: until the three agree again its law
-does not say its voltage. One that does not know its supply gives as much less as that is low.
+A driver at its limit gives what its supply has, where that is measured. What it has summed up by
+then is known to a tenth of that alone: so much more has to be off until the three agree again. One
+that does not know its supply gives as much less as that is low.
 """
 
 import math
@@ -18,6 +19,7 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import NDArray
 
+from tomr_fault_diag.classifier.losses import UNEXPLAINED, Losses, LossWatch
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.residuals.frame import (
     ENCODERS,
@@ -32,7 +34,6 @@ from tomr_power_model.robot import WHEELS, Robot
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_LEAST_SLOPE = 1e-3  # W/A
 _NEVER = np.iinfo(np.int64).max
 
 
@@ -48,7 +49,9 @@ class ParitySettings:
     broken: float = 3.0  # bands, by which it is off, ...
     share: float = 0.15  # ... and of the voltage that the speed takes
     remembered: int = to_ns(10.0)  # since it was broken, unless it holds again
-    saturated: float = 0.9  # of the supply: a driver gives no more, whatever its law says
+    stays: int = to_ns(0.5)  # for which that counts: a wheel that turns back does not show it
+    saturated: float = 0.9  # of the supply: a driver gives no more, whatever its law says, ...
+    doubt: float = 0.1  # ... which may be off by so much of it from then on
 
 
 def _nowhere() -> Flags:
@@ -61,7 +64,9 @@ class Parity:
 
     holds: Flags = field(factory=_nowhere)
     broken: Flags = field(factory=_nowhere)  # or was of late
-    breaks: Flags = field(factory=_nowhere)  # and did hold before
+    breaks: Flags = field(factory=_nowhere)  # and did hold before ...
+    broke: Flags = field(factory=_nowhere)  # ... or broke a moment ago
+    losses: Losses = UNEXPLAINED  # which alone explain that it breaks
 
 
 NOT_KNOWN = Parity()
@@ -73,6 +78,7 @@ class ParityWatch:
     def __init__(self, robot: Robot, settings: ParitySettings | None = None) -> None:
         self.settings = settings or ParitySettings()
         self._motors = Motors(robot)
+        self._losses = LossWatch(robot, self._motors)
         self.clear()
 
     def clear(self) -> None:
@@ -80,28 +86,43 @@ class ParityWatch:
         # Since when each holds, agrees while the wheel turns, and is broken [ns].
         self._since = np.full((3, WHEELS), _NEVER)
         self._until = np.zeros(WHEELS, dtype=np.int64)  # ns, for which a break is remembered
-        self._is_known = _nowhere()  # whether its driver's law says a motor's voltage
+        self._broke = np.full(WHEELS, -_NEVER)  # ns, when each last broke
+        self._is_known = _nowhere()  # whether its driver's law says a motor's voltage, ...
+        self._doubt = np.zeros(WHEELS)  # ... but for so much [V]
         self._newest = 0  # ns
 
     def take(self, frame: ResidualFrame) -> Parity:
         """What the newest tick says with those before."""
         now, s = frame.stamp_ns, self.settings
         if now - self._newest > s.gap:
-            self._since[:], self._is_known[:] = _NEVER, False
+            self._since[:], self._is_known[:], self._doubt[:] = _NEVER, False, 0.0
         self._newest = now
+        holds, agreed, broken = self._lasting(frame)
+        self._until[broken], self._until[holds] = now + s.remembered, 0
+        self._broke[broken], self._broke[agreed] = now, -_NEVER
+        breaks = self._is_known & broken
+        broke = self._is_known & (self._broke >= now - s.stays)
+        losses = self._losses.take(frame, breaks)
+        return Parity(holds, self._until > now, breaks, broke, losses)
+
+    def _lasting(self, frame: ResidualFrame) -> tuple[Flags, Flags, Flags]:
+        """Where it has held for long enough, agreed while the wheel turns, and been broken."""
+        now, s = frame.stamp_ns, self.settings
+        is_measured = math.isfinite(frame.supply)
+        supply = frame.supply if is_measured else 1.0
         off, band, takes, volts = self._of(frame)
-        supply = frame.supply if math.isfinite(frame.supply) else 1.0
         obeys = volts < s.saturated * self._motors.voltage * min(supply, 1.0)
+        is_said = obeys | is_measured
+        self._doubt[~obeys] = s.doubt * self._motors.voltage
         agrees = obeys & (off < s.holds * band)
-        beyond = off - volts * abs(1.0 - supply)
-        differs = obeys & (beyond > np.maximum(s.broken * band, s.share * takes))
+        least = np.maximum(s.broken * band, s.share * takes) + self._doubt
+        differs = is_said & (off - volts * abs(1.0 - supply) > least)
         flags = [agrees & (takes > s.shows * band), agrees & (takes > band), differs]
         self._since = np.where(flags, np.minimum(self._since, now), _NEVER)
         holds, agreed, broken = self._since <= now - s.lasts
-        self._until[broken] = now + s.remembered
-        self._until[holds] = 0
-        self._is_known = (self._is_known | agreed) & obeys
-        return Parity(holds, self._until > now, self._is_known & broken)
+        self._doubt[agreed] = 0.0
+        self._is_known = (self._is_known | agreed) & is_said
+        return holds, agreed, broken
 
     def _of(self, frame: ResidualFrame) -> tuple[Array, Array, Array, Array]:
         """By how much it is off in one tick, its band, what the speed takes, and what the driver
@@ -113,16 +134,13 @@ class ParityWatch:
         scale = motors.scale_of(powers[0].unit)
         drawn = scale * _of_all(powers)
         takes = motors.constant * speed
-        currents = motors.both_currents(drawn, speed)
-        if motors.reports_currents and not motors.reports_signs:
-            currents = currents * [-1.0, 1.0]
+        currents = motors.either_current(drawn, speed)
         both = volts[:, None] - takes[:, None] - motors.resistance[:, None] * currents
-        nearer = np.argmin(np.abs(both), axis=1)
-        off, current = np.abs(both[range(WHEELS), nearer]), currents[range(WHEELS), nearer]
-        slope = np.maximum(np.abs(motors.per_current(speed, current)), _LEAST_SLOPE)
+        nearer = range(WHEELS), np.argmin(np.abs(both), axis=1)
         band = np.array([item.band for item in frame.voltages])
         widths = scale * np.array([item.band for item in powers])
-        band += motors.resistance * widths / slope
+        more = motors.either_current(drawn + widths, speed)[nearer] - currents[nearer]
+        off, band = np.abs(both[nearer]), band + motors.resistance * np.abs(more)
         return off, band, np.abs(takes), np.abs(volts)
 
 

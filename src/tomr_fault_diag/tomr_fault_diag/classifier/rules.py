@@ -17,6 +17,7 @@ from tomr_fault_diag.classifier.belief import (
     CONTROLS,
     DRAGS,
     ENCODERS,
+    ENDED,
     EXTERNAL,
     HYPOTHESES,
     LOADED,
@@ -181,6 +182,8 @@ def _parity(likelihoods: Array, moment: Moment) -> Array:
 def _load(likelihoods: Array, moment: Moment) -> Array:
     """What stays and drags is a load, and soon over is none."""
     outside, found = moment.beside.outside, likelihoods.copy()
+    if moment.beside.parity.broke.any():
+        return found
     if outside.load:
         found[LOADED] = likelihoods.max() + _LOADED
     elif outside.may_be_push:
@@ -191,6 +194,8 @@ def _load(likelihoods: Array, moment: Moment) -> Array:
 def _shared(likelihoods: Array, moment: Moment) -> Array:
     """All wheels feel a force on the body: none is accused."""
     outside = moment.beside.outside
+    if moment.beside.parity.broke.any():
+        return likelihoods
     if outside.push or outside.load:
         return _less(likelihoods, slice(CONTROLS.start, METERS.stop), _SHARED)
     return likelihoods
@@ -210,6 +215,11 @@ def _slope(likelihoods: Array, moment: Moment) -> Array:
     if is_slope and moment.may_be_slope:
         return _less(likelihoods, slice(CONTROLS.start, WEAKS.stop), _SHARED)
     return likelihoods
+
+
+def _lost(likelihoods: Array, moment: Moment) -> Array:
+    """What breaks a motor's parity is not over."""
+    return _less(likelihoods, ENDED, _LOADED) if moment.beside.parity.breaks.any() else likelihoods
 
 
 # Of the network's hypotheses, (19,), in this order.
@@ -234,6 +244,7 @@ STATE_RULES: Mapping[str, Rule] = {
     "a force on the body": _shared,
     "a push and wheels that grip": _pushed_grip,
     "a slope": _slope,
+    "a parity that breaks": _lost,
 }
 
 

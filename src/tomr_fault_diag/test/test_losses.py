@@ -1,0 +1,159 @@
+"""Whether a lost signal or lost counts explain what motors draw, of a robot that drives evenly."""
+
+import math
+
+import numpy as np
+import pytest
+from attrs import evolve
+from numpy.typing import NDArray
+
+from tomr_fault_diag.classifier.losses import UNEXPLAINED, Losses, LossWatch
+from tomr_fault_diag.classifier.motors import Motors
+from tomr_fault_diag.residuals.frame import Residual, ResidualFrame, Unit
+from tomr_power_model.robot import Robot, shipped_robot
+from tomr_power_model.slides.body import body_of, rolling_forces
+
+Array = NDArray[np.float64]
+
+ROBOT = shipped_robot("reference")
+BASE, TICK = 1_700_000_000_000_000_000, 50_000_000
+SPEED = np.array([14.0, -6.0, 9.0])  # rad/s, in truth
+HALF = 0.5
+BAND = 0.5  # W
+NONE = [False, False, False]
+
+
+def currents(robot: Robot, speed: Array) -> Array:
+    """That motors take of a robot that drives evenly [A]."""
+    motors, (body, radius) = Motors(robot), body_of(robot)
+    drag = robot.everywhere("contact.roller_drag", "coefficient")[0]
+    forces = rolling_forces(body, drag, body.to_twist @ (radius * speed), np.zeros(3))
+    forces -= motors.forces(np.zeros(3), speed, np.zeros(3))
+    return np.asarray(forces * radius / motors.constant)
+
+
+def seen(
+    shown: Array,
+    volts: Array,
+    drawn: Array,
+    *,
+    unit: Unit = "W",
+    supply: float = math.nan,
+    band: float = BAND,
+) -> ResidualFrame:
+    """A tick with such speeds [rad/s], voltages [V] and powers [W], or currents [A]."""
+    motors = [Residual(0.0, band, value, unit) for value in drawn.tolist()]
+    speeds = [Residual(0.0, 0.3, value, "rad/s") for value in shown.tolist()]
+    first, second, third = (Residual(0.0, 0.1, value, "V") for value in volts.tolist())
+    residuals = (Residual(0.0, 1.0, 20.0), *motors, *speeds, *motors)
+    return ResidualFrame(BASE, residuals, voltages=(first, second, third), supply=supply)
+
+
+def after(
+    item: ResidualFrame, breaks: NDArray[np.bool_], robot: Robot = ROBOT, ticks: int = 4
+) -> tuple[list[bool], list[bool]]:
+    """Signals and counts that are lost after so many ticks alike."""
+    watch, found = LossWatch(robot, Motors(robot)), UNEXPLAINED
+    for tick in range(ticks):
+        found = watch.take(evolve(item, stamp_ns=BASE + tick * TICK), breaks)
+    return found.signal.tolist(), found.counts.tolist()
+
+
+def only(wheel: int) -> NDArray[np.bool_]:
+    return np.arange(3) == wheel
+
+
+def miscounted(wheel: int, robot: Robot = ROBOT, **told: float) -> ResidualFrame:
+    """Its encoder shows half of the turns."""
+    motors, current = Motors(robot), currents(robot, SPEED)
+    volts = motors.constant * SPEED + motors.resistance * current
+    shown = np.where(only(wheel), HALF * SPEED, SPEED)
+    return seen(shown, volts, motors.idle + volts * current, **told)  # type: ignore[arg-type]
+
+
+def unsignalled(wheel: int) -> ResidualFrame:
+    """It gets half of what its driver gives."""
+    motors, current = Motors(ROBOT), currents(ROBOT, SPEED)
+    volts = motors.constant * SPEED + motors.resistance * current
+    given = np.where(only(wheel), volts / HALF, volts)
+    return seen(SPEED, given, motors.idle + volts * current)
+
+
+@pytest.mark.parametrize("wheel", [0, 1, 2])
+def test_a_half_of_the_counts_or_of_the_signal_is_told_from_the_other(wheel: int) -> None:
+    there = only(wheel).tolist()
+    assert after(miscounted(wheel), only(wheel)) == (NONE, there)
+    assert after(unsignalled(wheel), only(wheel)) == (there, NONE)
+
+
+def test_it_takes_a_tenth_of_a_second_and_two_ticks() -> None:
+    assert after(miscounted(0), only(0), ticks=3) == (NONE, NONE)
+    watch, item = LossWatch(ROBOT, Motors(ROBOT)), miscounted(0)
+    for tick in range(8):  # every other tick breaks
+        found = watch.take(evolve(item, stamp_ns=BASE + tick * TICK), only(0) & (tick % 2 == 0))
+    assert not found.counts.any()
+
+
+def test_no_other_motor_than_one_whose_parity_breaks_is_looked_at() -> None:
+    assert after(miscounted(0), only(1)) == (NONE, NONE)
+    assert after(miscounted(0), np.zeros(3, dtype=np.bool_)) == (NONE, NONE)
+
+
+def test_of_a_driver_that_gives_next_to_nothing_nothing_is_known() -> None:
+    item = miscounted(0)
+    slow = evolve(item, voltages=(Residual(0.0, 0.1, 0.9, "V"), *item.voltages[1:]))
+    assert after(slow, only(0)) == (NONE, NONE)
+
+
+def test_a_supply_that_is_low_gives_as_much_less() -> None:
+    """By their laws drivers give a fifth more than they do."""
+    item = miscounted(0, supply=0.8)
+    first, second, third = (evolve(v, modelled=v.modelled / 0.8) for v in item.voltages)
+    assert after(evolve(item, voltages=(first, second, third)), only(0)) == (
+        NONE,
+        [True, *NONE[1:]],
+    )
+
+
+def test_what_neither_explains_is_neither() -> None:
+    """A wheel that drags takes 20 W more, and a winding that loses more 6 V: a band is 0.5 W."""
+    item = miscounted(0)
+    first = evolve(item.residuals[1], modelled=item.residuals[1].modelled + 20.0)
+    residuals = (item.residuals[0], first, *item.residuals[2:7], first, *item.residuals[8:])
+    assert after(evolve(item, residuals=residuals), only(0)) == (NONE, NONE)
+
+
+def test_where_both_explain_it_it_is_neither() -> None:
+    """Bands of 100 W hide what either takes."""
+    assert after(miscounted(0, band=100.0), only(0)) == (NONE, NONE)
+
+
+def test_without_a_power_nothing_is_known() -> None:
+    item = miscounted(0)
+    blind = evolve(item.residuals[2], missing="no power", modelled=math.nan)
+    residuals = (*item.residuals[:2], blind, *item.residuals[3:])
+    assert after(evolve(item, residuals=residuals), only(0)) == (NONE, NONE)
+
+
+def test_a_wheel_that_is_let_go_of_is_followed_from_then_on() -> None:
+    """Of a tick alone its change is not known; nor of the first after a pause."""
+    watch, item = LossWatch(ROBOT, Motors(ROBOT)), miscounted(0)
+    found: Losses = UNEXPLAINED
+    for tick in range(4):
+        found = watch.take(evolve(item, stamp_ns=BASE + tick * TICK), only(0))
+    assert found.counts.any()
+    watch.take(evolve(item, stamp_ns=BASE + 4 * TICK), ~only(0) & only(0))
+    found = watch.take(evolve(item, stamp_ns=BASE + 5 * TICK), only(0))
+    assert not found.counts.any()
+
+
+@pytest.mark.parametrize("signed", [True, False])
+def test_currents_do_as_well_as_powers(signed: bool) -> None:
+    measurement = evolve(ROBOT.measurement, quantity="motor_current", signed=signed)
+    robot = evolve(ROBOT, measurement=measurement)
+    motors, current = Motors(robot), currents(robot, SPEED)
+    volts = motors.constant * SPEED + motors.resistance * current
+    drawn = current if signed else np.abs(current)
+    shown = np.where(only(0), HALF * SPEED, SPEED)
+    item = seen(shown, volts, drawn, unit="A", band=0.05)
+    assert after(item, only(0), robot) == (NONE, only(0).tolist())
