@@ -86,12 +86,26 @@ def test_a_half_of_the_counts_or_of_the_signal_is_told_from_the_other(wheel: int
     assert after(unsignalled(wheel), only(wheel)) == (there, NONE)
 
 
-def test_it_takes_a_tenth_of_a_second_and_two_ticks() -> None:
-    assert after(miscounted(0), only(0), ticks=3) == (NONE, NONE)
-    watch, item = LossWatch(ROBOT, Motors(ROBOT)), miscounted(0)
-    for tick in range(8):  # every other tick breaks
-        found = watch.take(evolve(item, stamp_ns=BASE + tick * TICK), only(0) & (tick % 2 == 0))
-    assert not found.counts.any()
+def test_the_less_a_band_leaves_the_sooner_it_is_known() -> None:
+    """At once with the second tick; with bands of 4 W in half a second, of 6 W in no time."""
+    for band, ticks in ((BAND, 2), (4.0, 9)):
+        assert after(miscounted(0, band=band), only(0), ticks=ticks - 1) == (NONE, NONE)
+        assert after(miscounted(0, band=band), only(0), ticks=ticks) == (NONE, [True, *NONE[1:]])
+    assert after(miscounted(0, band=6.0), only(0), ticks=100) == (NONE, NONE)
+
+
+def test_a_pause_in_which_nothing_breaks_ends_it() -> None:
+    watch, item = LossWatch(ROBOT, Motors(ROBOT)), miscounted(0, band=4.0)
+    for tick in range(60):  # every fifth tick does not break
+        found = watch.take(evolve(item, stamp_ns=BASE + tick * TICK), only(0) & (tick % 5 > 0))
+        assert not found.counts.any()
+
+
+def test_a_wheel_that_turns_slower_than_it_shows_has_lost_no_counts() -> None:
+    """Its driver gives less than what it takes."""
+    item = miscounted(0)
+    less = evolve(item.voltages[0], modelled=0.3 * item.voltages[0].modelled)
+    assert after(evolve(item, voltages=(less, *item.voltages[1:])), only(0)) == (NONE, NONE)
 
 
 def test_no_other_motor_than_one_whose_parity_breaks_is_looked_at() -> None:

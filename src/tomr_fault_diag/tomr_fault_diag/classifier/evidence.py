@@ -18,6 +18,7 @@ from tomr_fault_diag.classifier.belief import (
     EXTERNAL,
     HYPOTHESES,
     OTHER,
+    WEAKS,
 )
 from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.misfit import is_far
@@ -79,7 +80,8 @@ def said_by_parity(parity: Parity) -> Array:
     """Of what motors draw at their voltages and speeds.
 
     Where that agrees neither the signal of the motor nor its encoder is lost. Where it does not it
-    is no slip; where it did until then something is wrong, and it is not that axle's friction.
+    is no slip; where it did until then something is wrong, and it is not that axle's friction. A
+    loss that alone explains what all motors draw leaves nothing else but a winding that takes more.
     """
     said = np.zeros(HYPOTHESES)
     for kind in (CONTROLS, ENCODERS):
@@ -89,11 +91,14 @@ def said_by_parity(parity: Parity) -> Array:
     if parity.broke.any():
         said[[NORMAL, EXTERNAL]] = -_MOST
         said[DRAGS][parity.broke] = -_MOST
-    counts, signal = parity.losses.counts, parity.losses.signal
-    if counts.any() or signal.any():
-        said[[NORMAL, EXTERNAL]] = -_CERTAIN
-    said[CONTROLS][counts] = -_MOST
-    said[ENCODERS][signal] = -_MOST
+    losses = parity.losses
+    for lost, kind in ((losses.signal, CONTROLS), (losses.counts, ENCODERS)):
+        if lost.any():
+            said[[NORMAL, EXTERNAL]] = -_CERTAIN
+            left = np.full(HYPOTHESES, -_MOST)
+            left[OTHER] = 0.0
+            left[kind][lost] = left[WEAKS][lost] = 0.0
+            said = np.minimum(said, left)
     return said
 
 

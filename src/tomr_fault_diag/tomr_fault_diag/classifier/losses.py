@@ -7,7 +7,8 @@ with what its winding leaves,
     i = (P - P_idle) / v,   omega = (v - R i) / k.
 
 Either way the body moves as three wheels turn, and what that takes of every motor on a level floor
-is known. Where one of the two explains all three and the other does not, it is that one.
+is known. Where one of the two explains all three and the other does not, as the ticks of half a
+second say it in the mean, it is that one.
 """
 
 import math
@@ -26,7 +27,6 @@ from tomr_power_model.slides.body import body_of, rolling_forces
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_NEVER = np.iinfo(np.int64).max
 _LEAST_SLOPE = 1e-3  # W/A
 
 
@@ -34,10 +34,10 @@ _LEAST_SLOPE = 1e-3  # W/A
 class LossSettings:
     """When one of the two explains what motors draw, and the other does not."""
 
-    lasts: int = to_ns(0.1)  # for which it has to be so
+    memory: int = to_ns(0.5)  # over which log-likelihood ratios are averaged
+    clear: float = 2.0  # mean of a tick, at least
     explains: float = 12.0  # sum of the squares of three motors [sigma^2], at most
     counted: float = 25.0  # of one motor [sigma^2], at most
-    clear: float = 5.0  # log-likelihood ratio, at least
     least: float = 1.0  # V, of a driver that says how its motor turns
 
 
@@ -70,7 +70,7 @@ class LossWatch:
         """Nothing was seen."""
         self._last: Tick | None = None
         self._turned = np.full(WHEELS, math.nan)  # rad/s, in the last tick, without their counts
-        self._since = np.full((2, WHEELS), _NEVER)  # ns, since when each explains it
+        self._odds = np.zeros(WHEELS)  # log, of lost counts over a lost signal, mean of a tick
 
     def take(self, frame: ResidualFrame, breaks: Flags) -> Losses:
         """Of a tick, and of the motors whose parity breaks, (3,)."""
@@ -78,21 +78,22 @@ class LossWatch:
         if tick is None:
             self.clear()
             return UNEXPLAINED
-        turning, found = self._turning(tick, frame), np.zeros((2, WHEELS), dtype=np.bool_)
-        elapsed = math.nan if self._last is None else tick.stamp_ns - self._last.stamp_ns
+        turning, odds = self._turning(tick, frame), np.zeros(WHEELS)
+        elapsed = math.nan if self._last is None else float(tick.stamp_ns - self._last.stamp_ns)
         faster = (turning - self._turned) * (NANOSECONDS / elapsed)
         bands = np.array([frame.residuals[index].band for index in ENCODERS])
         sigma = self._motors.scale_of(frame.residuals[ENCODERS[0]].unit) * bands / BAND_SIGMAS
         shown = (self._beyond(tick.power, tick.speed, tick.change) / sigma) ** 2
-        for wheel in np.flatnonzero(breaks & np.isfinite(faster)).tolist():
+        may_be = np.isfinite(faster) & (np.abs(turning) > np.abs(tick.speed))
+        for wheel in np.flatnonzero(breaks & may_be).tolist():
             speed, change = tick.speed.copy(), tick.change.copy()
             speed[wheel], change[wheel] = turning[wheel], faster[wheel]
             turned = (self._beyond(tick.power, speed, change) / sigma) ** 2
-            found[:, wheel] = self._is_clear(shown, turned), self._is_clear(turned, shown)
+            odds[wheel] = self._log_odds(shown, turned)
+        new = min(elapsed / self.settings.memory, 1.0) if self._last else 0.0
+        self._odds = np.where(breaks, (1.0 - new) * self._odds + new * odds, 0.0)
         self._last, self._turned = tick, turning
-        self._since = np.where(found, np.minimum(self._since, tick.stamp_ns), _NEVER)
-        signal, counts = self._since <= tick.stamp_ns - self.settings.lasts
-        return Losses(signal, counts)
+        return Losses(self._odds < -self.settings.clear, self._odds > self.settings.clear)
 
     def _turning(self, tick: Tick, frame: ResidualFrame) -> Array:
         """How wheels turn whose motors have what their drivers give [rad/s], (3,)."""
@@ -106,11 +107,13 @@ class LossWatch:
             current = drawn if motors.reports_signs else np.copysign(drawn, volts)
         return np.asarray((volts - motors.resistance * current) / motors.constant)
 
-    def _is_clear(self, squares: Array, others: Array) -> bool:
-        """Whether what leaves these squares explains all, and what leaves the others does not."""
+    def _log_odds(self, squares: Array, others: Array) -> float:
+        """Of what leaves the others over what leaves the squares; 0 where neither explains all."""
         s = self.settings
-        more = np.minimum(others, s.counted).sum() - np.minimum(squares, s.counted).sum()
-        return bool(squares.sum() < s.explains and 0.5 * more > s.clear)
+        if not min(squares.sum(), others.sum()) < s.explains:
+            return 0.0
+        counted = [np.minimum(item, s.counted).sum() for item in (squares, others)]
+        return float(np.nan_to_num(0.5 * (counted[0] - counted[1])))
 
     def _beyond(self, drawn: Array, speed: Array, change: Array) -> Array:
         """What motors draw [W], or [A], beyond what the body takes that moves so, (3,)."""
