@@ -142,6 +142,20 @@ def test_where_both_explain_it_it_is_neither() -> None:
     assert after(miscounted(0, band=100.0), only(0)) == (NONE, NONE)
 
 
+def test_a_robot_that_is_to_stand_and_draws_nothing_has_lost_no_signal() -> None:
+    """Its driver gives 12 V by its law, and may have let go; of one that draws counts are lost."""
+    still, volts = np.zeros(3), np.array([12.0, 0.0, 0.0])
+    idle = Motors(ROBOT).idle
+    assert after(seen(still, volts, idle), only(0)) == (NONE, NONE)
+    asked = seen(still, volts, idle)
+    speeds = [evolve(item, modelled=5.0, residual=-5.0) for item in asked.residuals[4:7]]
+    asked = evolve(asked, residuals=(*asked.residuals[:4], *speeds, *asked.residuals[7:]))
+    assert after(asked, only(0)) == ([True, *NONE[1:]], NONE)
+    freely = np.array([12.0 / Motors(ROBOT).constant[0], 0.0, 0.0])
+    drawn = idle + np.abs(volts * currents(ROBOT, 0.95 * freely))
+    assert after(seen(still, volts, drawn), only(0))[1] == [True, *NONE[1:]]
+
+
 def test_without_a_power_nothing_is_known() -> None:
     item = miscounted(0)
     blind = evolve(item.residuals[2], missing="no power", modelled=math.nan)

@@ -140,8 +140,9 @@ def _selected(
     [
         ({"a": 5.0, "b": 1.54}, ["a", "b"]),  # three standard deviations
         ({"a": 5.0, "b": 1.52, "c": 0.2}, ["a"]),
-        ({"a": 0.5, "b": 0.2}, ["a"]),  # something is there
-        ({"a": 0.1}, ["a"]),
+        ({"a": 0.5, "b": 0.2}, []),
+        ({"a": 1.52}, []),  # also one alone
+        ({"a": 1.54}, ["a"]),
         ({}, []),
     ],
 )
@@ -153,4 +154,4 @@ def test_findings_that_may_be_nothing_go_the_least_certain_first(
 
 def test_what_explains_nothing_goes_first_and_even_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     assert _selected(monkeypatch, {"a": 9.0}, ("a",)) == []
-    assert _selected(monkeypatch, {"a": 9.0, "b": 0.5}, ("a",)) == ["b"]
+    assert _selected(monkeypatch, {"a": 9.0, "b": 1.6}, ("a",)) == ["b"]

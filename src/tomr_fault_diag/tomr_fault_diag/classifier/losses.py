@@ -18,7 +18,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_fault_diag.classifier.motors import Motors
-from tomr_fault_diag.classifier.severity.tick import Tick
+from tomr_fault_diag.classifier.severity.tick import MOVES, Tick
 from tomr_fault_diag.residuals.frame import BAND_SIGMAS, ENCODERS, ResidualFrame
 from tomr_power_model.model.ticks import NANOSECONDS, to_ns
 from tomr_power_model.robot import WHEELS, Robot
@@ -92,6 +92,9 @@ class LossWatch:
             odds[wheel] = self._log_odds(shown, turned)
         new = min(elapsed / self.settings.memory, 1.0) if self._last else 0.0
         self._odds = np.where(breaks, (1.0 - new) * self._odds + new * odds, 0.0)
+        if (np.abs(tick.expected) < MOVES).all():
+            # Drivers may let go of a robot that is to stand: none draws, whatever their laws say.
+            self._odds = np.maximum(self._odds, 0.0)
         self._last, self._turned = tick, turning
         return Losses(self._odds < -self.settings.clear, self._odds > self.settings.clear)
 

@@ -31,16 +31,12 @@ _CLEAR = 3.0 / HALF_WIDTH
 
 
 def significant(dataset: Dataset, found: Selection, tick: Tick = lambda done: None) -> Selection:
-    """Findings but for those that explain nothing, and those beside others that are not clearly
-    beyond nothing; of the latter the last one stays: what made it necessary is there.
-    """
+    """Findings but for those that explain nothing, and those not clearly beyond nothing."""
     while found.best.model.hypotheses:
         model = found.best.model
         explained = energies(dataset, found)
         worst = int(np.argmin(explained))
         if explained[worst] > 0.0:
-            if len(model.hypotheses) == 1:
-                break
             away = distances(model, own_sigma(dataset, found, linearise(dataset, model, ())))
             worst = int(np.argmin(away))
             if away[worst] > _CLEAR:
