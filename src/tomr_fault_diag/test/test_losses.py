@@ -23,12 +23,15 @@ BAND = 0.5  # W
 NONE = [False, False, False]
 
 
-def currents(robot: Robot, speed: Array) -> Array:
-    """That motors take of a robot that drives evenly [A]."""
+def currents(robot: Robot, speed: Array, change: Array | None = None) -> Array:
+    """That motors take of a robot that drives evenly, or whose wheels become faster by so much
+    [rad/s^2] [A]."""
     motors, (body, radius) = Motors(robot), body_of(robot)
     drag = robot.everywhere("contact.roller_drag", "coefficient")[0]
-    forces = rolling_forces(body, drag, body.to_twist @ (radius * speed), np.zeros(3))
-    forces -= motors.forces(np.zeros(3), speed, np.zeros(3))
+    faster = np.zeros(3) if change is None else change
+    twist, gains = (body.to_twist @ (radius * part) for part in (speed, faster))
+    forces = rolling_forces(body, drag, twist, gains)
+    forces -= motors.forces(np.zeros(3), speed, faster)
     return np.asarray(forces * radius / motors.constant)
 
 
@@ -50,12 +53,16 @@ def seen(
 
 
 def after(
-    item: ResidualFrame, breaks: NDArray[np.bool_], robot: Robot = ROBOT, ticks: int = 4
+    item: ResidualFrame,
+    breaks: NDArray[np.bool_],
+    robot: Robot = ROBOT,
+    ticks: int = 4,
+    every: int = TICK,
 ) -> tuple[list[bool], list[bool]]:
     """Signals and counts that are lost after so many ticks alike."""
     watch, found = LossWatch(robot, Motors(robot)), UNEXPLAINED
     for tick in range(ticks):
-        found = watch.take(evolve(item, stamp_ns=BASE + tick * TICK), breaks)
+        found = watch.take(evolve(item, stamp_ns=BASE + tick * every), breaks)
     return found.signal.tolist(), found.counts.tolist()
 
 
@@ -92,6 +99,8 @@ def test_the_less_a_band_leaves_the_sooner_it_is_known() -> None:
         assert after(miscounted(0, band=band), only(0), ticks=ticks - 1) == (NONE, NONE)
         assert after(miscounted(0, band=band), only(0), ticks=ticks) == (NONE, [True, *NONE[1:]])
     assert after(miscounted(0, band=6.0), only(0), ticks=100) == (NONE, NONE)
+    slow = after(miscounted(0, band=4.0), only(0), ticks=5, every=2 * TICK)
+    assert slow == (NONE, [True, *NONE[1:]])  # half as many that stand for twice the time
 
 
 def test_a_pause_in_which_nothing_breaks_ends_it() -> None:
@@ -102,10 +111,11 @@ def test_a_pause_in_which_nothing_breaks_ends_it() -> None:
 
 
 def test_a_wheel_that_turns_slower_than_it_shows_has_lost_no_counts() -> None:
-    """Its driver gives less than what it takes."""
+    """Its encoder shows two turns for each."""
     item = miscounted(0)
-    less = evolve(item.voltages[0], modelled=0.3 * item.voltages[0].modelled)
-    assert after(evolve(item, voltages=(less, *item.voltages[1:])), only(0)) == (NONE, NONE)
+    twice = evolve(item.residuals[4], modelled=2.0 * SPEED[0])
+    residuals = (*item.residuals[:4], twice, *item.residuals[5:])
+    assert after(evolve(item, residuals=residuals), only(0)) == (NONE, NONE)
 
 
 def test_no_other_motor_than_one_whose_parity_breaks_is_looked_at() -> None:
@@ -114,9 +124,45 @@ def test_no_other_motor_than_one_whose_parity_breaks_is_looked_at() -> None:
 
 
 def test_of_a_driver_that_gives_next_to_nothing_nothing_is_known() -> None:
-    item = miscounted(0)
-    slow = evolve(item, voltages=(Residual(0.0, 0.1, 0.9, "V"), *item.voltages[1:]))
-    assert after(slow, only(0)) == (NONE, NONE)
+    """Of the same motion, slower: 1.1 V, and 0.9."""
+    motors = Motors(ROBOT)
+    for volts, counts in ((1.1, [True, *NONE[1:]]), (0.9, NONE)):
+        low, high = 0.0, 1.0
+        for _ in range(40):
+            share = 0.5 * (low + high)
+            current = currents(ROBOT, share * SPEED)
+            held = motors.constant * share * SPEED + motors.resistance * current
+            low, high = (share, high) if held[0] < volts else (low, share)
+        shown = share * np.where(only(0), HALF * SPEED, SPEED)
+        item = seen(shown, held, motors.idle + held * current, band=1e-4)
+        assert after(item, only(0)) == (NONE, counts)
+
+
+def test_what_drivers_draw_themselves_is_no_current_of_a_motor() -> None:
+    physics = {**ROBOT.physics, "electrical.driver_standby": ({"power": 40.0},) * 3}
+    robot = evolve(ROBOT, physics=physics)
+    assert (Motors(robot).idle > 39.0).all()
+    assert after(miscounted(0, robot), only(0), robot) == (NONE, [True, *NONE[1:]])
+
+
+def test_a_wheel_of_lost_counts_speeds_up_as_its_driver_makes_it() -> None:
+    """Each tick all turn a twentieth faster than in the first; 20 ticks, and no misfit."""
+    motors, watch, found = Motors(ROBOT), LossWatch(ROBOT, Motors(ROBOT)), UNEXPLAINED
+    for tick in range(6):
+        speed, change = (1.0 + 0.2 * tick) * SPEED, 0.2 * SPEED / 0.05
+        current = currents(ROBOT, speed, change)
+        volts = motors.constant * speed + motors.resistance * current
+        shown = np.where(only(0), HALF * speed, speed)
+        item = seen(shown, volts, motors.idle + volts * current)
+        found = watch.take(evolve(item, stamp_ns=BASE + tick * TICK), only(0))
+        assert found.counts.tolist() == [tick > 0, False, False]
+
+
+def test_no_motor_counts_for_more_than_five_standard_deviations() -> None:
+    watch, nothing = LossWatch(ROBOT, Motors(ROBOT)), np.zeros(3)
+    assert watch._log_odds(np.array([900.0, 1.0, 2.0]), nothing) == 14.0
+    assert watch._log_odds(nothing, np.array([900.0, 1.0, 2.0])) == -14.0
+    assert watch._log_odds(np.array([900.0, 0.0, 0.0]), np.array([13.0, 0.0, 0.0])) == 0.0
 
 
 def test_a_supply_that_is_low_gives_as_much_less() -> None:
@@ -170,9 +216,15 @@ def test_a_wheel_that_is_let_go_of_is_followed_from_then_on() -> None:
     for tick in range(4):
         found = watch.take(evolve(item, stamp_ns=BASE + tick * TICK), only(0))
     assert found.counts.any()
-    watch.take(evolve(item, stamp_ns=BASE + 4 * TICK), ~only(0) & only(0))
-    found = watch.take(evolve(item, stamp_ns=BASE + 5 * TICK), only(0))
-    assert not found.counts.any()
+    for pause in (np.zeros(3, dtype=np.bool_), only(1)):  # or another's parity breaks alone
+        for tick in range(4):
+            found = watch.take(evolve(item, stamp_ns=BASE + tick * TICK), only(0))
+        assert found.counts.any()
+        for tick, breaks in ((4, pause), (5, only(0))):
+            weak = miscounted(0, band=4.0)
+            found = watch.take(evolve(weak, stamp_ns=BASE + tick * TICK), breaks)
+        assert not found.counts.any()
+        watch.clear()
 
 
 @pytest.mark.parametrize("signed", [True, False])

@@ -95,7 +95,7 @@ class ParityWatch:
         """What the newest tick says with those before."""
         now, s = frame.stamp_ns, self.settings
         if now - self._newest > s.gap:
-            self._since[:], self._is_known[:], self._doubt[:] = _NEVER, False, 0.0
+            self._since[:], self._is_known[:] = _NEVER, False
         self._newest = now
         holds, agreed, broken = self._lasting(frame)
         self._until[broken], self._until[holds] = now + s.remembered, 0

@@ -154,6 +154,7 @@ def test_by_its_law_a_driver_forgets_no_more_than_friction_held(path: CommandPat
 @pytest.mark.parametrize("speed", [-900.0, 900.0])
 def test_by_its_law_a_driver_gives_no_more_than_its_supply(path: CommandPath, speed: float) -> None:
     drivers, most = RestingDrivers(ROBOT, TICK), ROBOT.supply.nominal_voltage
+    _volts(drivers, path, REST)  # so that what its driver has summed up is known
     found = drivers.voltages(path, REST, (speed, 0.0, 0.0), simulated=REST, share=1.0)
     assert found.by_law == [math.copysign(most, -speed), *found.simulated[1:]]
 
