@@ -28,13 +28,13 @@ from tomr_fault_diag.residuals.frame import (
     ResidualFrame,
     measured_speed,
 )
-from tomr_power_model.model.ticks import to_ns
+from tomr_power_model.model.ticks import NEVER, to_ns
 from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_NEVER = np.iinfo(np.int64).max
+_NOT_YET = np.iinfo(np.int64).max
 
 
 @frozen
@@ -84,9 +84,8 @@ class ParityWatch:
     def clear(self) -> None:
         """Nothing was seen."""
         # Since when each holds, agrees while the wheel turns, and is broken [ns].
-        self._since = np.full((3, WHEELS), _NEVER)
-        self._until = np.zeros(WHEELS, dtype=np.int64)  # ns, for which a break is remembered
-        self._broke = np.full(WHEELS, -_NEVER)  # ns, when each last broke
+        self._since = np.full((3, WHEELS), _NOT_YET)
+        self._broken = np.full(WHEELS, NEVER)  # ns, when each last was, unless it held since
         self._is_known = _nowhere()  # whether its driver's law says a motor's voltage, ...
         self._doubt = np.zeros(WHEELS)  # ... but for so much [V]
         self._newest = 0  # ns
@@ -95,15 +94,14 @@ class ParityWatch:
         """What the newest tick says with those before."""
         now, s = frame.stamp_ns, self.settings
         if now - self._newest > s.gap:
-            self._since[:], self._is_known[:] = _NEVER, False
+            self._since[:], self._is_known[:] = _NOT_YET, False
         self._newest = now
         holds, agreed, broken = self._lasting(frame)
-        self._until[broken], self._until[holds] = now + s.remembered, 0
-        self._broke[broken], self._broke[agreed] = now, -_NEVER
+        self._broken[broken], self._broken[holds] = now, NEVER
         breaks = self._is_known & broken
-        broke = self._is_known & (self._broke >= now - s.stays)
+        broke = self._is_known & ~agreed & (self._broken >= now - s.stays)
         losses = self._losses.take(frame, breaks)
-        return Parity(holds, self._until > now, breaks, broke, losses)
+        return Parity(holds, self._broken > now - s.remembered, breaks, broke, losses)
 
     def _lasting(self, frame: ResidualFrame) -> tuple[Flags, Flags, Flags]:
         """Where it has held for long enough, agreed while the wheel turns, and been broken."""
@@ -118,7 +116,7 @@ class ParityWatch:
         least = np.maximum(s.broken * band, s.share * takes) + self._doubt
         differs = is_said & (off - volts * abs(1.0 - supply) > least)
         flags = [agrees & (takes > s.shows * band), agrees & (takes > band), differs]
-        self._since = np.where(flags, np.minimum(self._since, now), _NEVER)
+        self._since = np.where(flags, np.minimum(self._since, now), _NOT_YET)
         holds, agreed, broken = self._since <= now - s.lasts
         self._doubt[agreed] = 0.0
         self._is_known = (self._is_known | agreed) & is_said

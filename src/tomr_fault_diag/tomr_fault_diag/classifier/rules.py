@@ -28,6 +28,7 @@ from tomr_fault_diag.classifier.belief import (
 )
 from tomr_fault_diag.classifier.evidence import ALONE, Beside, astray
 from tomr_fault_diag.classifier.observability import Unseen
+from tomr_fault_diag.classifier.outside import NOTHING_ACTS, Outside
 from tomr_fault_diag.classifier.states import NORMAL, SLIP
 from tomr_fault_diag.residuals.frame import ENCODERS as DERIVED
 from tomr_fault_diag.residuals.frame import MOTORS, SPEEDS, ResidualFrame
@@ -179,11 +180,14 @@ def _parity(likelihoods: Array, moment: Moment) -> Array:
     return likelihoods + moment.by_parity
 
 
+def _outside(moment: Moment) -> Outside:
+    """What acts on the body; nothing that is known where a motor's parity breaks."""
+    return NOTHING_ACTS if moment.beside.parity.broke.any() else moment.beside.outside
+
+
 def _load(likelihoods: Array, moment: Moment) -> Array:
     """What stays and drags is a load, and soon over is none."""
-    outside, found = moment.beside.outside, likelihoods.copy()
-    if moment.beside.parity.broke.any():
-        return found
+    outside, found = _outside(moment), likelihoods.copy()
     if outside.load:
         found[LOADED] = likelihoods.max() + _LOADED
     elif outside.may_be_push:
@@ -193,9 +197,7 @@ def _load(likelihoods: Array, moment: Moment) -> Array:
 
 def _shared(likelihoods: Array, moment: Moment) -> Array:
     """All wheels feel a force on the body: none is accused."""
-    outside = moment.beside.outside
-    if moment.beside.parity.broke.any():
-        return likelihoods
+    outside = _outside(moment)
     if outside.push or outside.load:
         return _less(likelihoods, slice(CONTROLS.start, METERS.stop), _SHARED)
     return likelihoods

@@ -23,7 +23,7 @@ def beyond(
     speed: list[float] | None = None,
     simulated: list[float] | None = None,
     *,
-    expected: list[float] | None = None,
+    asked: list[float] | None = None,
     sums: list[float] | None = None,
     holds: float = 2.0,
     share: float = 1.0,
@@ -31,8 +31,8 @@ def beyond(
     """Of a tick, by default at its end and of wheels that stand."""
     given = STILL if speed is None else speed
     same = given if simulated is None else simulated
-    volts, summed, held = expected or STILL, sums or STILL, [holds] * 3
-    return law.beyond(ahead, given, same, expected=volts, sums=summed, holds=held, share=share)
+    wanted, summed, held = asked or given, sums or STILL, [holds] * 3
+    return law.beyond(ahead, given, same, asked=wanted, sums=summed, holds=held, share=share)
 
 
 @pytest.fixture
@@ -229,22 +229,23 @@ def test_wheels_that_turn_otherwise_than_simulated_say_nothing_of_a_delay(law: D
 
 def test_a_driver_gives_no_more_than_its_supply_and_does_not_sum_up_then(law: DriverLaw) -> None:
     most = ROBOT.supply.nominal_voltage
-    found = beyond(law, [9.0, 0.0, 0.0], expected=[4.0, 0.0, 0.0])
+    asked = [4.0 / PROPORTIONAL, 0.0, 0.0]  # 4 V for its error
+    found = beyond(law, [9.0, 0.0, 0.0], asked=asked)
     assert found[0] == pytest.approx(most - 4.0)
     # As soon as the wheel catches up the voltage falls.
-    after = beyond(law, [8.9, 0.0, 0.0], expected=[4.0, 0.0, 0.0])
+    after = beyond(law, [8.9, 0.0, 0.0], asked=asked)
     assert after[0] == pytest.approx(most - 4.0 - 0.1 * INTEGRAL)
-    back = beyond(law, [-9.0, 0.0, 0.0], expected=[4.0, 0.0, 0.0])
+    back = beyond(law, [-9.0, 0.0, 0.0], asked=asked)
     assert back[0] == pytest.approx(-most - 4.0)
 
 
 def test_at_its_limit_a_driver_s_sum_stays_what_it_was(law: DriverLaw) -> None:
     """Its wheel is so slow that its error alone is a limit and a half; it neither winds up nor
     down, whatever the wheel does, also where its angle is not shown."""
-    before, slow = [0.02, 0.0, 0.0], [-1.5 * ROBOT.supply.nominal_voltage / PROPORTIONAL, 0.0, 0.0]
-    beyond(law, before)
+    slow = [-1.5 * ROBOT.supply.nominal_voltage / PROPORTIONAL, 0.0, 0.0]
+    beyond(law, [0.02, 0.0, 0.0])
     for ahead in (3.0, 6.0, math.nan, 50.0):
-        beyond(law, [ahead, 0.0, 0.0], slow, STILL)
+        beyond(law, [ahead, 0.0, 0.0], slow, STILL, asked=STILL)
     assert beyond(law, [50.0, 0.0, 0.0])[0] == pytest.approx(0.02 * INTEGRAL)
     assert beyond(law, [50.01, 0.0, 0.0])[0] == pytest.approx(0.03 * INTEGRAL)
 
@@ -254,11 +255,11 @@ def test_of_a_driver_that_begins_at_its_limit_the_sum_is_that_which_gives_it(
 ) -> None:
     """10 V of its own error, and 4 V that the simulated one has summed up."""
     most, error = ROBOT.supply.nominal_voltage, [-10.0 / PROPORTIONAL, 0.0, 0.0]
-    expected, sums = [4.0, 0.0, 0.0], [4.0 / INTEGRAL, 0.0, 0.0]
+    sums = [4.0 / INTEGRAL, 0.0, 0.0]
     law.forget()
-    beyond(law, STILL, error, STILL, expected=expected, sums=sums)
-    beyond(law, [9.0, 0.0, 0.0], error, STILL, expected=expected, sums=sums)
-    found = beyond(law, [9.0, 0.0, 0.0], expected=expected, sums=sums)
+    beyond(law, STILL, error, STILL, asked=STILL, sums=sums)
+    beyond(law, [9.0, 0.0, 0.0], error, STILL, asked=STILL, sums=sums)
+    found = beyond(law, [9.0, 0.0, 0.0], sums=sums)
     assert found[0] == pytest.approx(most - 10.0 - 4.0)
 
 

@@ -159,6 +159,17 @@ def test_by_its_law_a_driver_gives_no_more_than_its_supply(path: CommandPath, sp
     assert found.by_law == [math.copysign(most, -speed), *found.simulated[1:]]
 
 
+def test_what_it_gives_for_its_error_leaves_less_for_its_sum_at_the_limit(
+    path: CommandPath,
+) -> None:
+    """It turns backwards by 2 rad/s, for which k_p gives 2.4 V, and then stands."""
+    drivers, far = RestingDrivers(ROBOT, TICK), (-9.0, 0.0, 0.0)
+    _volts(drivers, path, REST)
+    drivers.voltages(path, far, (-2.0, 0.0, 0.0), simulated=REST, share=1.0)
+    found = drivers.voltages(path, far, REST, simulated=REST, share=1.0)
+    assert found.by_law[0] == pytest.approx(ROBOT.supply.nominal_voltage - 2.4)
+
+
 @pytest.mark.parametrize("restart", [RestingDrivers.clear, RestingDrivers.forget])
 def test_by_its_law_a_driver_begins_as_simulated(
     path: CommandPath, restart: Callable[[RestingDrivers], None]

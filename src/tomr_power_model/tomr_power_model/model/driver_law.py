@@ -69,7 +69,7 @@ class DriverLaw:
         speed: Sequence[float],
         simulated: Sequence[float],
         *,
-        expected: Sequence[float],
+        asked: Sequence[float],
         sums: Sequence[float],
         holds: Sequence[float],
         share: float,
@@ -80,8 +80,8 @@ class DriverLaw:
             ahead: by how much a simulated wheel has turned further at the end of a tick [rad].
             speed: of the wheels, mean of the tick [rad/s].
             simulated: the same as simulated.
-            expected: voltages of the simulated drivers then [V], ...
-            sums: ... and of their errors [rad].
+            asked: speeds that the drivers are asked for then [rad/s].
+            sums: of the simulated drivers' errors then [rad].
             holds: what friction holds the wheels against while the robot stands [V].
             share: of the tick at the time that is asked about.
         """
@@ -95,8 +95,7 @@ class DriverLaw:
                 self._offsets.lower(wheel, fades * apart)
                 apart -= fades * apart
                 self._follow_usual(wheel, simulated[wheel], fades)
-            volts = expected[wheel] + self._proportional * slower[wheel]
-            volts -= self._integral * sums[wheel]
+            volts = self._proportional * (asked[wheel] - speed[wheel])
             now.append(self._limited(wheel, sums[wheel] + apart, volts) - sums[wheel])
         delay, middle = self._delay(), between(self._before, now, share)
         faster = [turns - usual for turns, usual in zip(simulated, self._usual, strict=True)]

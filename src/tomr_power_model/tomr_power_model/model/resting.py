@@ -135,7 +135,7 @@ class RestingDrivers:
         held, simulates = map(between, self._before, (found, expected), (share, share))
         holds = self._holding.voltages(*map(path.wheel, (at.DRY, at.SIDE_LIMIT, at.HOT)))
         beyond = self._law.beyond(
-            ahead, speed, simulated, expected=expected, sums=sums, holds=holds, share=share
+            ahead, speed, simulated, asked=asked, sums=sums, holds=holds, share=share
         )
         taken = self._follow(path, apart, ahead, speed)
         self._law.taken_over(taken)
