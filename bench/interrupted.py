@@ -3,7 +3,8 @@
     .venv/bin/python bench/interrupted.py [--placements 24] [--seeds 2] [--only WORD] [--json OUT]
 
 Drives in MuJoCo with the reference robot, in whose recordings streams pause, stamps leap and
-scatter, samples are lost, sensors die, freeze or send what no sensor measures. Counted are the
+scatter, samples are lost, sensors die, freeze or send what no sensor measures, and that obeyed
+other commands than were recorded: late ones, or none that came. Counted are the
 drives in which a fault is named that the undisturbed drive does not name, and, of faulty drives,
 those in which the fault is not named (again) within 2 s of what it needs being back.
 """
@@ -23,9 +24,10 @@ from typing import Any
 import numpy as np
 from attrs import frozen
 from tqdm import tqdm
+from winding import winding
 
 from tomr_fault_diag.classifier.stage import Diagnosis
-from tomr_fault_diag.classifier.states import FAULTLESS, POWER_SENSOR
+from tomr_fault_diag.classifier.states import DISOBEYS, FAULTLESS, POWER_SENSOR, State
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_power_model.cli import EXIT_OK, run_main
@@ -37,6 +39,7 @@ from tomr_sim_bridge.missions.mission import load_mission
 
 _START = 1_700_000_000 * NANOSECONDS
 _AGAIN = 2.0  # s in which a fault must be named again
+WINDING = "winding"  # no mission: see there
 FAULTY = ("circle_encoder_lost", "circle_control_signal_lost", "square_encoder_lost")
 _LATEST = 26.0  # s of a drive that is played
 POWER = ("wheel_1/power", "wheel_2/power", "wheel_3/power")
@@ -64,13 +67,17 @@ Change = Callable[[Drive, np.random.Generator], Drive]
 
 @cache
 def recorded(mission: str, seed: int) -> Drive:
-    """A mission of the simulated reference robot."""
-    robot, plan = shipped_robot("reference"), load_mission(mission)
-    topics = set(STREAMS["all"])
+    """A mission of the simulated reference robot, or a winding drive."""
+    robot, topics = shipped_robot("reference"), set(STREAMS["all"])
+    plan = load_mission("random_tour" if mission == WINDING else mission)
     simulation = start_mission(plan, robot, seed, _START)
+    if mission == WINDING:
+        driven = winding(simulation, seed, _LATEST)
+    else:
+        driven = drive(plan, simulation, seed)
     return tuple(
         Item(sample.stamp_ns, sample.topic, to_bag(sample.message))
-        for samples in drive(plan, simulation, seed)
+        for samples in driven
         for sample in samples
         if sample.topic in topics and sample.stamp_ns < _START + to_ns(_LATEST)
     )
@@ -92,6 +99,24 @@ def pause(streams: str, at: float, length: float) -> Change:
     return lambda items, _: tuple(
         item for item in items if item.topic not in topics or not first <= item.stamp_ns < last
     )
+
+
+def disobeyed(at: float, length: float) -> Change:
+    """For a while [s] the command before is recorded, and another obeyed: as one that is late."""
+    first, last = _START + to_ns(at), _START + to_ns(at + length)
+
+    def change(items: Drive, _: np.random.Generator) -> Drive:
+        before, found = None, []
+        for item in items:
+            if item.topic == "cmd_vel":
+                before = before if before and first <= item.stamp_ns < last else item.message.twist
+                message = copy(item.message)
+                message.twist = before
+                item = Item(item.stamp_ns, item.topic, message)
+            found.append(item)
+        return tuple(found)
+
+    return change
 
 
 def leap(at: float, by: float) -> Change:
@@ -178,14 +203,14 @@ def both(*changes: Change) -> Change:
 class Case:
     """A disturbance of a drive, when what it takes away is back [s], and the seed of its chance.
 
-    `dead`: the wheel (0..2) whose power sensor it kills, which may be said.
+    `true`: the state that it brings about, which may be said.
     """
 
     kind: str
     change: Change
     back: float = 0.0
     seed: int = 0
-    dead: int | None = None
+    true: State | None = None
 
 
 def gaps(places: Sequence[float]) -> Iterator[Case]:
@@ -212,11 +237,19 @@ def cases(placements: int) -> Iterator[Case]:
         yield Case("2 % lost, 5 ms, 1 s without power", worn, seed=seed)
     for at in places[::3]:
         for wheel in range(3):
-            yield Case("power frozen", power(wheel, at, frozen_sensor), dead=wheel)
-            yield Case("power reads zero", power(wheel, at, dead), dead=wheel)
+            yield Case("power frozen", power(wheel, at, frozen_sensor), true=POWER_SENSOR[wheel])
+            yield Case("power reads zero", power(wheel, at, dead), true=POWER_SENSOR[wheel])
             yield Case("one sample of 1e30 V", power(wheel, at, absurd, 0.015))
-            yield Case("1e30 V for good", power(wheel, at, absurd), dead=wheel)
-            yield Case("unplugged", unplugged(wheel, at), dead=wheel)
+            yield Case("1e30 V for good", power(wheel, at, absurd), true=POWER_SENSOR[wheel])
+            yield Case("unplugged", unplugged(wheel, at), true=POWER_SENSOR[wheel])
+
+
+def disobedience(mission: str, placements: int) -> Iterator[Case]:
+    """Commands of a drive that are not obeyed in time, at some times."""
+    for length in (0.1, 0.2, 0.3, 0.4):
+        for at in np.linspace(3.0, 21.0, placements).tolist():
+            kind = f"{length} s of other commands, {mission}"
+            yield Case(kind, disobeyed(at, length), at + length, true=DISOBEYS)
 
 
 def unplugged(wheel: int, at: float) -> Change:
@@ -237,9 +270,8 @@ def states(items: Drive) -> list[Diagnosis]:
     ]
 
 
-def accused(found: Sequence[Diagnosis], dead: int | None = None) -> list[str]:
-    """Faults in the order in which they were named, but for that of a wheel's dead power sensor."""
-    true = None if dead is None else POWER_SENSOR[dead]
+def accused(found: Sequence[Diagnosis], true: State | None = None) -> list[str]:
+    """Faults in the order in which they were named, but for one that is there."""
     names = [d.state.name for d in found if d.changed and d.state != true]
     return [name for name in names if name not in FAULTLESS]
 
@@ -249,7 +281,7 @@ def healthy(case: Case, mission: str, seed: int) -> tuple[str, list[str], float]
     found = states(case.change(recorded(mission, seed), np.random.default_rng(case.seed)))
     periodic = [d for d in found if not d.changed]
     decided = [d for d in periodic if d.state.name == "normal" or d.state.name not in FAULTLESS]
-    return case.kind, accused(found, case.dead), len(decided) / max(len(periodic), 1)
+    return case.kind, accused(found, case.true), len(decided) / max(len(periodic), 1)
 
 
 def faulty(case: Case, mission: str, seed: int) -> tuple[str, list[str], float]:
@@ -304,6 +336,9 @@ def plays(placements: int, seeds: int) -> Iterator[Play]:
     for seed in range(seeds):
         for case in cases(placements):
             yield healthy, case, "random_tour", 100 + seed
+        for mission in ("random_tour", "circle", WINDING):
+            for case in disobedience(mission, placements):
+                yield healthy, case, mission, 100 + seed
         for mission in FAULTY:
             first, _ = fault_times(mission)
             for case in gaps([first - 0.2, first + 1.0, first + 1.7]):

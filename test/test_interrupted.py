@@ -22,6 +22,7 @@ from interrupted import (
     accused,
     both,
     dead,
+    disobeyed,
     leap,
     loss,
     pause,
@@ -30,7 +31,7 @@ from interrupted import (
     states,
 )
 
-from tomr_fault_diag.classifier.states import POWER_SENSOR
+from tomr_fault_diag.classifier.states import DISOBEYS, POWER_SENSOR
 from tomr_power_model.messages.intake import stamp_of
 from tomr_power_model.recordings import open_recording
 
@@ -74,14 +75,28 @@ CASES = {
 }
 
 
-DEAD = {"absurd samples": 1, "a dead sensor": 2}  # the wheel whose sensor may be said to be
+# What may be said, for it is so.
+TRUE = {"absurd samples": POWER_SENSOR[1], "a dead sensor": POWER_SENSOR[2]}
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_healthy_robot_is_not_accused(name: str) -> None:
     found = states(CASES[name]()(drive("square"), np.random.default_rng(3)))
-    assert accused(found, DEAD.get(name)) == []
+    assert accused(found, TRUE.get(name)) == []
     assert any(d.state.name == "normal" for d in found)
+
+
+@pytest.mark.parametrize("length", [0.1, 0.2, 0.3])
+def test_commands_that_are_late_accuse_nobody(
+    length: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In bags/circle_encoder_lost, before that fault comes."""
+    circle = drive("circle_encoder_lost")
+    monkeypatch.setattr(interrupted, "_START", start := circle[0].stamp_ns)
+    well = tuple(item for item in circle if item.stamp_ns < start + 7.9e9)
+    found = states(disobeyed(3.5, length)(well, np.random.default_rng(3)))
+    assert accused(found, DISOBEYS) == []
+    assert found[-1].state.name == "normal"
 
 
 @pytest.mark.parametrize("streams", ["all", "cmd_vel", "joint_states", "motors"])
@@ -101,4 +116,4 @@ def test_a_fault_is_neither_cleared_nor_missed(
 
 def test_a_dead_sensor_excuses_no_other() -> None:
     found: Any = [SimpleNamespace(state=state, changed=True) for state in POWER_SENSOR]
-    assert accused(found, 1) == [POWER_SENSOR[0].name, POWER_SENSOR[2].name]
+    assert accused(found, POWER_SENSOR[1]) == [POWER_SENSOR[0].name, POWER_SENSOR[2].name]

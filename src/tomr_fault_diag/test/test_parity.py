@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from attrs import evolve
 from numpy.typing import NDArray
 
@@ -79,6 +80,7 @@ class Watched:
 
     def __init__(self, robot: Robot = ROBOT) -> None:
         self.watch = ParityWatch(robot)
+        self.last = NOT_KNOWN
         self._stamp = BASE
 
     def after(self, item: ResidualFrame, ticks: int = 4) -> tuple[list[bool], list[bool]]:
@@ -103,6 +105,7 @@ class Watched:
         for _ in range(ticks):
             self._stamp += TICK
             parity = self.watch.take(evolve(item, stamp_ns=self._stamp))
+        self.last = parity
         return parity
 
 
@@ -254,10 +257,63 @@ def test_what_a_supply_lacks_is_no_break() -> None:
     """Its driver gives a fifth less than its law says: of 10 V and more 2 V are no break."""
     fast = 1.8 * SPEED
     held, drawn = volts(fast, CURRENT), power(fast, CURRENT)
-    for more, breaks in ((0.2, NONE), (0.3, NONE), (0.5, ALL)):
+    for more, breaks in ((0.2, NONE), (0.3, NONE), (0.5, FIRST)):
         watched = Watched()
         watched.after(frame(held, drawn, fast, supply=0.8))
-        assert watched.breaks(frame((1.0 + more) * held, drawn, fast, supply=0.8), 4) == breaks
+        by_law = held * [1.0 + more, 1.0, 1.0]
+        assert watched.breaks(frame(by_law, drawn, fast, supply=0.8), 4) == breaks
+
+
+def beside(*off: float) -> ResidualFrame:
+    """Motors whose drivers' laws are so far off [V]; a band of each is 0.1 V and 0.026 of power."""
+    return frame(volts(SPEED, CURRENT) + off, power(SPEED, CURRENT))
+
+
+def test_several_motors_that_are_off_at_once_obey_what_is_not_known() -> None:
+    """Of one that is off alone something is wrong; of others alike, or a third as much, nothing."""
+    for off, breaks in (
+        ((5.0, 0.0, 0.0), FIRST),
+        ((5.0, 5.0, 5.0), NONE),
+        ((5.0, -2.0, 0.0), NONE),
+        ((5.0, 0.0, 1.4), [True, False, True]),
+        ((5.0, 0.0, 1.6), NONE),
+    ):
+        watched = Watched()
+        watched.after(WELL)
+        assert watched.breaks(beside(*off), 4) == breaks
+        assert watched.after(beside(*off), 4) == (watched.last.holds.tolist(), breaks)
+
+
+def test_one_that_is_off_for_long_says_nothing_of_the_others() -> None:
+    """The second fault of a robot is one, 0.5 s after the first, and none a moment after it."""
+    for ticks, breaks in ((14, [True, True, False]), (9, NONE)):
+        watched = Watched()
+        watched.after(WELL)
+        assert watched.breaks(beside(5.0, 0.0, 0.0), ticks) == FIRST
+        assert watched.breaks(beside(5.0, 5.0, 0.0), 4) == breaks
+
+
+def test_drivers_that_were_misled_are_believed_after_two_seconds() -> None:
+    for ticks, breaks in ((38, NONE), (45, FIRST)):
+        watched = Watched()
+        watched.after(WELL)
+        watched.breaks(beside(5.0, 5.0, 5.0), 4)
+        assert watched.after(WELL, ticks)[1] == NONE
+        assert watched.breaks(beside(5.0, 0.0, 0.0), 4) == breaks
+
+
+def test_how_far_beyond_what_is_allowed() -> None:
+    """15 % of what the speed takes is allowed, or two bands."""
+    takes = float(MOTORS.constant[0] * SPEED[0])
+    for more in (0.5, 3.0):
+        watched = Watched()
+        watched.after(WELL)
+        watched.breaks(beside((1.0 + more) * 0.15 * takes, 0.0, 0.0), 4)
+        assert watched.last.beyond == pytest.approx(more)
+        watched.after(WELL, 1)
+        assert watched.last.beyond == pytest.approx(more)
+        watched.after(WELL, 12)
+        assert watched.last.beyond == 0.0
 
 
 def test_a_stray_tick_is_none() -> None:
@@ -328,10 +384,12 @@ def test_what_it_says_by_hand() -> None:
     said = said_by_parity(Parity(np.array(NONE), np.array(FIRST)))
     assert said[SLIP] == -10.0
     assert not np.delete(said, SLIP).any()
-    said = said_by_parity(Parity(broken=np.array(FIRST), broke=np.array(FIRST)))
-    lowered = [NORMAL, SLIP, EXTERNAL, DRAGS.start]
-    assert said[lowered].tolist() == [-10.0] * 4
-    assert not np.delete(said, lowered).any()
+    for beyond, less in ((0.0, 0.0), (0.2, -4.0), (0.5, -10.0), (3.0, -10.0)):
+        parity = Parity(broken=np.array(FIRST), broke=np.array(FIRST), beyond=beyond)
+        said = said_by_parity(parity)
+        assert said[SLIP] == -10.0
+        assert said[[NORMAL, EXTERNAL, DRAGS.start]].tolist() == [less] * 3
+        assert not np.delete(said, [NORMAL, SLIP, EXTERNAL, DRAGS.start]).any()
     none, first = np.array(NONE), np.array(FIRST)
     for losses, lost in ((Losses(first, none), CONTROLS), (Losses(none, first), ENCODERS)):
         said = said_by_parity(Parity(losses=losses))

@@ -31,7 +31,8 @@ Array = NDArray[np.float64]
 
 _PER_BAND = 8.0  # that a gyro says for slip, for each band beyond the first
 _PER_ODDS = 3.0  # times the log odds of a slide, that forces say for it
-_MOST = 10.0  # that either says in a tick
+_PER_BEYOND = 20.0  # that a parity that broke says, by how far it is off beyond what is allowed
+_MOST = 10.0  # that any of them says in a tick
 _LEAST_DOUBT = 1e-6  # of a slide
 _MISCOUNTS = 0.7  # of what forces say for slip: for an encoder that loses counts
 _CERTAIN = 24.0  # against all that leaves a wheel turning
@@ -89,8 +90,9 @@ def said_by_parity(parity: Parity) -> Array:
     if parity.broken.any():
         said[SLIP] = -_MOST
     if parity.broke.any():
-        said[[NORMAL, EXTERNAL]] = -_MOST
-        said[DRAGS][parity.broke] = -_MOST
+        most = min(_PER_BEYOND * parity.beyond, _MOST)
+        said[[NORMAL, EXTERNAL]] = -most
+        said[DRAGS][parity.broke] = -most
     losses = parity.losses
     for lost, kind in ((losses.signal, CONTROLS), (losses.counts, ENCODERS)):
         if lost.any():

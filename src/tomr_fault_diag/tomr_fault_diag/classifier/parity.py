@@ -7,6 +7,10 @@ encoder shows. Where the three agree the motor has what its driver gives, and tu
 shows. Where they do not, a signal is lost or counts are, or a winding or the power sensor is off:
 slip, slopes, loads and bearings change the current, but not the voltage that goes with it.
 
+Drivers that obey a command later than it was given, or not at all, sum up what nobody knows: the
+law of each is off by a voltage that stays, most often of several at once. Of those nothing is said
+until they have agreed again for long.
+
 A driver at its limit gives what its supply has, where that is measured. What it has summed up by
 then is known to a tenth of that alone: so much more has to be off until the three agree again. One
 that does not know its supply gives as much less as that is low.
@@ -52,6 +56,9 @@ class ParitySettings:
     stays: int = to_ns(0.5)  # for which that counts: a wheel that turns back does not show it
     saturated: float = 0.9  # of the supply: a driver gives no more, whatever its law says, ...
     doubt: float = 0.1  # ... which may be off by so much of it from then on
+    alike: float = 0.3  # times as much, by which another one is off that ...
+    together: int = to_ns(0.5)  # ... is off for no longer: drivers obey what is not known
+    again: int = to_ns(2.0)  # for which one has to agree then
 
 
 def _nowhere() -> Flags:
@@ -66,6 +73,7 @@ class Parity:
     broken: Flags = field(factory=_nowhere)  # or was of late
     breaks: Flags = field(factory=_nowhere)  # and did hold before ...
     broke: Flags = field(factory=_nowhere)  # ... or broke a moment ago
+    beyond: float = 0.0  # by how much those are off, in parts of what is allowed, beyond it
     losses: Losses = UNEXPLAINED  # which alone explain that it breaks
 
 
@@ -83,11 +91,13 @@ class ParityWatch:
 
     def clear(self) -> None:
         """Nothing was seen."""
-        # Since when each holds, agrees while the wheel turns, and is broken [ns].
-        self._since = np.full((3, WHEELS), _NOT_YET)
+        # Since when each holds, agrees while the wheel turns, is broken, and agrees [ns].
+        self._since = np.full((4, WHEELS), _NOT_YET)
         self._broken = np.full(WHEELS, NEVER)  # ns, when each last was, unless it held since
         self._is_known = _nowhere()  # whether its driver's law says a motor's voltage, ...
         self._doubt = np.zeros(WHEELS)  # ... but for so much [V]
+        self._misled = _nowhere()  # drivers that obeyed what is not known
+        self._beyond = np.zeros(WHEELS)  # by how much each was off when last broken, see `Parity`
         self._newest = 0  # ns
 
     def take(self, frame: ResidualFrame) -> Parity:
@@ -101,7 +111,8 @@ class ParityWatch:
         breaks = self._is_known & broken
         broke = self._is_known & ~agreed & (self._broken >= now - s.stays)
         losses = self._losses.take(frame, breaks)
-        return Parity(holds, self._broken > now - s.remembered, breaks, broke, losses)
+        beyond = float(self._beyond[broke].max(initial=0.0))
+        return Parity(holds, self._broken > now - s.remembered, breaks, broke, beyond, losses)
 
     def _lasting(self, frame: ResidualFrame) -> tuple[Flags, Flags, Flags]:
         """Where it has held for long enough, agreed while the wheel turns, and been broken."""
@@ -114,13 +125,29 @@ class ParityWatch:
         self._doubt[~obeys] = s.doubt * self._motors.voltage
         agrees = obeys & (off < s.holds * band)
         least = np.maximum(s.broken * band, s.share * takes) + self._doubt
-        differs = is_said & (off - volts * abs(1.0 - supply) > least)
-        flags = [agrees & (takes > s.shows * band), agrees & (takes > band), differs]
+        off -= volts * abs(1.0 - supply)
+        differs = is_said & (off > least)
+        if self._obey_others(off, s.holds * band + self._doubt, differs):
+            self._misled[:], self._is_known[:], self._broken[:] = True, False, NEVER
+        differs &= ~self._misled
+        turning = agrees & (takes > band)
+        flags = [agrees & (takes > s.shows * band), turning, differs, agrees]
         self._since = np.where(flags, np.minimum(self._since, now), _NOT_YET)
-        holds, agreed, broken = self._since <= now - s.lasts
+        holds, agreed, broken, _ = self._since <= now - s.lasts
+        self._beyond[broken] = (off / least - 1.0)[broken]
+        self._misled &= self._since[3] > now - s.again
+        agreed &= ~self._misled
         self._doubt[agreed] = 0.0
         self._is_known = (self._is_known | agreed) & is_said
         return holds, agreed, broken
+
+    def _obey_others(self, off: Array, least: Array, differs: Flags) -> bool:
+        """Whether drivers obey commands that are not known: several motors are off alike, and were
+        not before."""
+        is_new = self._since[2] > self._newest - self.settings.together
+        most = np.max(off, where=differs & is_new, initial=0.0)
+        alike = is_new & (off > np.maximum(least, self.settings.alike * most))
+        return bool(most > 0.0 and np.count_nonzero(alike) > 1)
 
     def _of(self, frame: ResidualFrame) -> tuple[Array, Array, Array, Array]:
         """By how much it is off in one tick, its band, what the speed takes, and what the driver
@@ -138,8 +165,8 @@ class ParityWatch:
         band = np.array([item.band for item in frame.voltages])
         widths = scale * np.array([item.band for item in powers])
         more = motors.either_current(drawn + widths, speed)[nearer] - currents[nearer]
-        off, band = np.abs(both[nearer]), band + motors.resistance * np.abs(more)
-        return off, band, np.abs(takes), np.abs(volts)
+        band = band + motors.resistance * np.abs(more)
+        return np.abs(both[nearer]), band, np.abs(takes), np.abs(volts)
 
 
 def _of_all(items: Sequence[Residual]) -> Array:
