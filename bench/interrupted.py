@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from copy import copy
 from functools import cache, partial
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -244,10 +244,10 @@ def cases(placements: int) -> Iterator[Case]:
             yield Case("unplugged", unplugged(wheel, at), true=POWER_SENSOR[wheel])
 
 
-def disobedience(mission: str, placements: int) -> Iterator[Case]:
-    """Commands of a drive that are not obeyed in time, at some times."""
+def disobedience(mission: str, places: Sequence[float]) -> Iterator[Case]:
+    """Commands of a drive that are not obeyed in time, at some times [s]."""
     for length in (0.1, 0.2, 0.3, 0.4):
-        for at in np.linspace(3.0, 21.0, placements).tolist():
+        for at in places:
             kind = f"{length} s of other commands, {mission}"
             yield Case(kind, disobeyed(at, length), at + length, true=DISOBEYS)
 
@@ -337,11 +337,12 @@ def plays(placements: int, seeds: int) -> Iterator[Play]:
         for case in cases(placements):
             yield healthy, case, "random_tour", 100 + seed
         for mission in ("random_tour", "circle", WINDING):
-            for case in disobedience(mission, placements):
+            for case in disobedience(mission, np.linspace(3.0, 21.0, placements).tolist()):
                 yield healthy, case, mission, 100 + seed
         for mission in FAULTY:
             first, _ = fault_times(mission)
-            for case in gaps([first - 0.2, first + 1.0, first + 1.7]):
+            places = [first - 0.2, first + 1.0, first + 1.7]
+            for case in chain(gaps(places), disobedience(mission, places)):
                 yield faulty, case, mission, 100 + seed
 
 
