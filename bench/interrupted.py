@@ -334,8 +334,9 @@ Play = tuple[Callable[[Case, str, int], tuple[str, list[str], float]], Case, str
 def plays(placements: int, seeds: int) -> Iterator[Play]:
     """All drives to play: healthy ones, and those with a fault."""
     for seed in range(seeds):
-        for case in cases(placements):
-            yield healthy, case, "random_tour", 100 + seed
+        for mission in ("random_tour", WINDING):
+            for case in cases(placements):
+                yield healthy, case, mission, 100 + seed
         for mission in ("random_tour", "circle", WINDING):
             for case in disobedience(mission, np.linspace(3.0, 21.0, placements).tolist()):
                 yield healthy, case, mission, 100 + seed
