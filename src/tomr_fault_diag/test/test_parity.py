@@ -302,6 +302,19 @@ def test_drivers_that_were_misled_are_believed_after_two_seconds() -> None:
         assert watched.breaks(beside(5.0, 0.0, 0.0), 4) == breaks
 
 
+def test_what_wheels_do_is_unsettled_a_moment_longer() -> None:
+    """For 0.35 s since several motors were last found off at once."""
+    watched = Watched()
+    watched.after(WELL)
+    assert not watched.last.misled
+    watched.breaks(beside(5.0, 5.0, 5.0), 1)
+    assert watched.last.misled
+    watched.after(WELL, 6)
+    assert watched.last.misled
+    watched.after(WELL, 1)
+    assert not watched.last.misled
+
+
 def test_how_far_beyond_what_is_allowed() -> None:
     """15 % of what the speed takes is allowed, or two bands."""
     takes = float(MOTORS.constant[0] * SPEED[0])

@@ -227,6 +227,16 @@ def test_what_breaks_a_parity_is_not_over() -> None:
     assert found == dict.fromkeys(range(ENDED.start, ENDED.stop), -24.0)
 
 
+def test_commands_that_are_not_known_accuse_no_wheel_that_was_well() -> None:
+    name, moment = "commands that are not known", beside()
+    assert not changed(name, moment)
+    moment = evolve(moment, beside=Beside(parity=Parity(misled=True)))
+    less = [*range(CONTROLS.start, METERS.stop), OTHER]
+    assert changed(name, moment) == dict.fromkeys(less, pytest.approx(-10.0))
+    assert not changed(name, evolve(moment, is_well=False))
+    assert not changed(name, evolve(moment, is_unaccused=False))
+
+
 def test_who_leans_on_wheels_that_grip_makes_none_slip() -> None:
     name, leans = "a push and wheels that grip", Outside(may_be_push=True)
     assert changed(name, beside(GRIPS, leans)) == {SLIP: -10.0}
@@ -237,7 +247,7 @@ def test_what_a_slope_explains_accuses_no_wheel_that_was_well() -> None:
     moment = beside(Contacts(force=True))
     wheels = range(CONTROLS.start, WEAKS.stop)  # a power sensor feels no slope
     assert changed("a slope", moment) == dict.fromkeys(wheels, pytest.approx(-10.0))
-    assert changed("a slope", evolve(moment, may_be_slope=False)) == {}
+    assert changed("a slope", evolve(moment, is_unaccused=False)) == {}
     some = Contacts(0.0, slopes=True)  # an accelerometer would know which
     assert changed("a slope", beside(some)) == changed("a slope", moment)
     assert changed("a slope", beside(evolve(some, felt=True))) == {}

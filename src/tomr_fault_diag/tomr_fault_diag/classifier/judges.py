@@ -189,11 +189,11 @@ class WindowJudge:
     def _so_far(self, moment: Moment) -> Moment:
         """With what was concluded so far."""
         is_well = self._best in _GROUPS[0]
-        is_unaccused = is_well or self._best == OTHER  # which accuses none
+        accuses_none = is_well or self._best == OTHER
         return evolve(
             moment,
             is_well=is_well,
-            may_be_slope=is_unaccused and self._since_accused > _REMEMBERED,
+            is_unaccused=accuses_none and self._since_accused > _REMEMBERED,
             is_shaken=self._shaken > 0,
         )
 

@@ -59,6 +59,7 @@ class ParitySettings:
     alike: float = 0.3  # times as much, by which another one is off that ...
     together: int = to_ns(0.5)  # ... is off for no longer: drivers obey what is not known
     again: int = to_ns(2.0)  # for which one has to agree then
+    unsettled: int = to_ns(0.35)  # for which wheels still do what nobody seems to have asked for
 
 
 def _nowhere() -> Flags:
@@ -74,6 +75,7 @@ class Parity:
     breaks: Flags = field(factory=_nowhere)  # and did hold before ...
     broke: Flags = field(factory=_nowhere)  # ... or broke a moment ago
     beyond: float = 0.0  # by how much those are off, in parts of what is allowed, beyond it
+    misled: bool = False  # drivers obeyed what is not known, a moment ago
     losses: Losses = UNEXPLAINED  # which alone explain that it breaks
 
 
@@ -96,7 +98,8 @@ class ParityWatch:
         self._broken = np.full(WHEELS, NEVER)  # ns, when each last was, unless it held since
         self._is_known = _nowhere()  # whether its driver's law says a motor's voltage, ...
         self._doubt = np.zeros(WHEELS)  # ... but for so much [V]
-        self._misled = _nowhere()  # drivers that obeyed what is not known
+        self._misled = _nowhere()  # drivers that obeyed what is not known, ...
+        self._misled_at = NEVER  # ... which showed last [ns]
         self._beyond = np.zeros(WHEELS)  # by how much each was off when last broken, see `Parity`
         self._newest = 0  # ns
 
@@ -110,9 +113,15 @@ class ParityWatch:
         self._broken[broken], self._broken[holds] = now, NEVER
         breaks = self._is_known & broken
         broke = self._is_known & ~agreed & (self._broken >= now - s.stays)
-        losses = self._losses.take(frame, breaks)
-        beyond = float(self._beyond[broke].max(initial=0.0))
-        return Parity(holds, self._broken > now - s.remembered, breaks, broke, beyond, losses)
+        return Parity(
+            holds,
+            self._broken > now - s.remembered,
+            breaks,
+            broke,
+            beyond=float(self._beyond[broke].max(initial=0.0)),
+            misled=self._misled_at > now - s.unsettled,
+            losses=self._losses.take(frame, breaks),
+        )
 
     def _lasting(self, frame: ResidualFrame) -> tuple[Flags, Flags, Flags]:
         """Where it has held for long enough, agreed while the wheel turns, and been broken."""
@@ -128,7 +137,8 @@ class ParityWatch:
         off -= volts * abs(1.0 - supply)
         differs = is_said & (off > least)
         if self._obey_others(off, s.holds * band + self._doubt, differs):
-            self._misled[:], self._is_known[:], self._broken[:] = True, False, NEVER
+            self._misled[:], self._misled_at = True, now
+            self._is_known[:], self._broken[:] = False, NEVER
         differs &= ~self._misled
         turning = agrees & (takes > band)
         flags = [agrees & (takes > s.shows * band), turning, differs, agrees]

@@ -57,7 +57,7 @@ class Moment:
     unseen: Unseen = field(factory=Unseen)
     beside: Beside = ALONE
     is_well: bool = True  # no fault led so far
-    may_be_slope: bool = True  # nor was a wheel accused of late
+    is_unaccused: bool = True  # no wheel was accused of late
     is_shaken: bool = False  # a push still shows
     commissioned: bool = False
     striking: float = 0.0  # log-likelihood ratio that a striking window reaches
@@ -214,7 +214,7 @@ def _slope(likelihoods: Array, moment: Moment) -> Array:
     """What a slope explains accuses no wheel; one that is accused already stays so."""
     contacts = moment.beside.contacts
     is_slope = contacts.force or (contacts.slopes and contacts.hides_slopes)
-    if is_slope and moment.may_be_slope:
+    if is_slope and moment.is_unaccused:
         return _less(likelihoods, slice(CONTROLS.start, WEAKS.stop), _SHARED)
     return likelihoods
 
@@ -222,6 +222,14 @@ def _slope(likelihoods: Array, moment: Moment) -> Array:
 def _lost(likelihoods: Array, moment: Moment) -> Array:
     """What breaks a motor's parity is not over."""
     return _less(likelihoods, ENDED, _LOADED) if moment.beside.parity.breaks.any() else likelihoods
+
+
+def _misled(likelihoods: Array, moment: Moment) -> Array:
+    """Drivers that obeyed what is not known: what their wheels do accuses none that was well."""
+    if moment.is_well and moment.is_unaccused and moment.beside.parity.misled:
+        likelihoods = _less(likelihoods, OTHER, _SHARED)
+        return _less(likelihoods, slice(CONTROLS.start, METERS.stop), _SHARED)
+    return likelihoods
 
 
 # Of the network's hypotheses, (19,), in this order.
@@ -247,6 +255,7 @@ STATE_RULES: Mapping[str, Rule] = {
     "a push and wheels that grip": _pushed_grip,
     "a slope": _slope,
     "a parity that breaks": _lost,
+    "commands that are not known": _misled,
 }
 
 
