@@ -284,6 +284,22 @@ def test_several_motors_that_are_off_at_once_obey_what_is_not_known() -> None:
         assert watched.after(beside(*off), 4) == (watched.last.holds.tolist(), breaks)
 
 
+def test_what_is_within_a_band_or_in_doubt_is_not_off_with_others() -> None:
+    for other, breaks in ((1.8, FIRST), (2.2, NONE)):  # of a band of 2 V; 5 V are more than two
+        watched = Watched()
+        held = volts(SPEED, CURRENT) + np.array([5.0, other, 0.0])
+        watched.after(frame(volts(SPEED, CURRENT), power(SPEED, CURRENT), band=1.9))
+        assert watched.breaks(frame(held, power(SPEED, CURRENT), band=1.9), 4) == breaks
+    for was_full, breaks in ((True, FIRST), (False, NONE)):  # a tenth of 24 V is in doubt then
+        watched = Watched()
+        watched.after(evolve(WELL, supply=1.0))
+        full = volts(SPEED, CURRENT)
+        full[1] = -24.0 if was_full else full[1]
+        watched.after(frame(full, power(SPEED, CURRENT), supply=1.0), 1)
+        off = evolve(beside(5.0, 2.0, 0.0), supply=1.0)
+        assert watched.breaks(off, 4) == breaks
+
+
 def test_one_that_is_off_for_long_says_nothing_of_the_others() -> None:
     """The second fault of a robot is one, 0.5 s after the first, and none a moment after it."""
     for ticks, breaks in ((14, [True, True, False]), (9, NONE)):
@@ -291,6 +307,11 @@ def test_one_that_is_off_for_long_says_nothing_of_the_others() -> None:
         watched.after(WELL)
         assert watched.breaks(beside(5.0, 0.0, 0.0), ticks) == FIRST
         assert watched.breaks(beside(5.0, 5.0, 0.0), 4) == breaks
+        assert watched.last.broken.tolist() == breaks
+    watched = Watched()
+    watched.after(WELL)
+    assert watched.breaks(beside(14.0, 0.0, 0.0), 14) == FIRST
+    assert watched.breaks(beside(14.0, 4.0, 4.0), 4) == NONE  # these two, together, are no faults
 
 
 def test_drivers_that_were_misled_are_believed_after_two_seconds() -> None:
@@ -298,8 +319,17 @@ def test_drivers_that_were_misled_are_believed_after_two_seconds() -> None:
         watched = Watched()
         watched.after(WELL)
         watched.breaks(beside(5.0, 5.0, 5.0), 4)
-        assert watched.after(WELL, ticks)[1] == NONE
+        assert watched.after(WELL, 20)[1] == NONE
+        turning_back = 0.01 * SPEED
+        watched.after(
+            frame(volts(turning_back, CURRENT), power(turning_back, CURRENT), turning_back), 1
+        )
+        assert watched.after(WELL, ticks - 21)[1] == NONE
         assert watched.breaks(beside(5.0, 0.0, 0.0), 4) == breaks
+    watched.breaks(beside(5.0, 5.0, 5.0), 4)
+    watched.watch.clear()
+    watched.after(WELL)
+    assert watched.breaks(beside(5.0, 0.0, 0.0), 4) == FIRST
 
 
 def test_what_wheels_do_is_unsettled_a_moment_longer() -> None:

@@ -137,8 +137,7 @@ class ParityWatch:
         off -= volts * abs(1.0 - supply)
         differs = is_said & (off > least)
         if self._obey_others(off, s.holds * band + self._doubt, differs):
-            self._misled[:], self._misled_at = True, now
-            self._is_known[:], self._broken[:] = False, NEVER
+            self._misled[:], self._misled_at, self._broken[:] = True, now, NEVER
         differs &= ~self._misled
         turning = agrees & (takes > band)
         flags = [agrees & (takes > s.shows * band), turning, differs, agrees]
@@ -146,7 +145,6 @@ class ParityWatch:
         holds, agreed, broken, _ = self._since <= now - s.lasts
         self._beyond[broken] = (off / least - 1.0)[broken]
         self._misled &= self._since[3] > now - s.again
-        agreed &= ~self._misled
         self._doubt[agreed] = 0.0
         self._is_known = (self._is_known | agreed) & is_said
         return holds, agreed, broken
