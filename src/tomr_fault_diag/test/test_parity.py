@@ -333,15 +333,15 @@ def test_drivers_that_were_misled_are_believed_after_two_seconds() -> None:
 
 
 def test_what_wheels_do_is_unsettled_a_moment_longer() -> None:
-    """For 0.35 s since several motors were last found off at once."""
+    """For 0.35 s since several motors were found off at once, however long they are."""
     watched = Watched()
     watched.after(WELL)
     assert not watched.last.misled
     watched.breaks(beside(5.0, 5.0, 5.0), 1)
     assert watched.last.misled
-    watched.after(WELL, 6)
+    watched.after(beside(5.0, 5.0, 5.0), 6)
     assert watched.last.misled
-    watched.after(WELL, 1)
+    watched.after(beside(5.0, 5.0, 5.0), 1)
     assert not watched.last.misled
 
 

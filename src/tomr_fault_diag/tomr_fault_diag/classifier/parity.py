@@ -135,7 +135,7 @@ class ParityWatch:
         agrees = obeys & (off < s.holds * band)
         least = np.maximum(s.broken * band, s.share * takes) + self._doubt
         off -= volts * abs(1.0 - supply)
-        differs = is_said & (off > least)
+        differs = is_said & (off > least) & ~self._misled
         if self._obey_others(off, s.holds * band + self._doubt, differs):
             self._misled[:], self._misled_at, self._broken[:] = True, now, NEVER
         differs &= ~self._misled
