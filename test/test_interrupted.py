@@ -30,6 +30,7 @@ from interrupted import (
     scatter,
     states,
 )
+from winding import winding
 
 from tomr_fault_diag.classifier.states import DISOBEYS, POWER_SENSOR
 from tomr_power_model.messages.intake import stamp_of
@@ -84,6 +85,48 @@ def test_a_healthy_robot_is_not_accused(name: str) -> None:
     found = states(CASES[name]()(drive("square"), np.random.default_rng(3)))
     assert accused(found, TRUE.get(name)) == []
     assert any(d.state.name == "normal" for d in found)
+
+
+def test_where_others_are_obeyed_the_command_before_is_recorded(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    circle = drive("circle_encoder_lost")
+    monkeypatch.setattr(interrupted, "_START", start := circle[0].stamp_ns)
+    found = disobeyed(3.5, 0.2)(circle, np.random.default_rng(3))
+    changed = [(was, now) for was, now in zip(circle, found, strict=True) if was is not now]
+    at = [1e-9 * (was.stamp_ns - start) for was, _ in changed]
+    assert len(at) == 4
+    assert 3.5 <= at[0] < at[-1] < 3.7
+    commands = [item for item in circle if item.topic == "cmd_vel"]
+    before = commands[commands.index(changed[0][0]) - 1].message.twist
+    for was, now in changed:
+        assert (now.stamp_ns, now.message.header) == (was.stamp_ns, was.message.header)
+        assert now.message.twist == before != was.message.twist
+
+
+def test_a_winding_drive_changes_all_three_parts_of_its_command() -> None:
+    """After half a second of rest, within 0.5 m/s and 1 rad/s."""
+
+    def commands(seed: int) -> np.ndarray[Any, Any]:
+        given: list[tuple[float, ...]] = []
+        simulation: Any = SimpleNamespace(
+            stamp_ns=10**9,
+            step_to=lambda _: [],
+            command=lambda *twist, stamp_ns: given.append((stamp_ns, *twist)),
+        )
+        recorded = [sample for samples in winding(simulation, seed, 10.0) for sample in samples]
+        assert [sample.stamp_ns for sample in recorded] == [int(stamp) for stamp, *_ in given]
+        return np.array(given)
+
+    given = commands(3)
+    assert np.allclose(np.diff(given[:, 0]), 5e7)
+    assert given.shape == (200, 4)
+    rest, rest_of_it = given[:11, 1:], given[11:, 1:]
+    assert not rest.any()
+    assert (np.abs(rest_of_it) <= [0.5, 0.5, 1.0]).all()
+    assert (np.ptp(rest_of_it, axis=0) > 0.1).all()
+    assert (given == commands(3)).all()
+    assert (given != commands(4)).any()
 
 
 @pytest.mark.parametrize("length", [0.1, 0.2, 0.3])

@@ -99,7 +99,7 @@ class ParityWatch:
         self._is_known = _nowhere()  # whether its driver's law says a motor's voltage, ...
         self._doubt = np.zeros(WHEELS)  # ... but for so much [V]
         self._misled = _nowhere()  # drivers that obeyed what is not known, ...
-        self._misled_at = NEVER  # ... which showed last [ns]
+        self._misled_at = NEVER  # ... since when they do, the last time [ns]
         self._beyond = np.zeros(WHEELS)  # by how much each was off when last broken, see `Parity`
         self._newest = 0  # ns
 
@@ -138,7 +138,7 @@ class ParityWatch:
         differs = is_said & (off > least) & ~self._misled
         if self._obey_others(off, s.holds * band + self._doubt, differs):
             self._misled[:], self._misled_at, self._broken[:] = True, now, NEVER
-        differs &= ~self._misled
+            differs[:] = False
         turning = agrees & (takes > band)
         flags = [agrees & (takes > s.shows * band), turning, differs, agrees]
         self._since = np.where(flags, np.minimum(self._since, now), _NOT_YET)
