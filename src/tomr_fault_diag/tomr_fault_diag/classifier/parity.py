@@ -58,7 +58,7 @@ class ParitySettings:
     doubt: float = 0.1  # ... which may be off by so much of it from then on
     alike: float = 0.3  # times as much, by which another one is off that ...
     together: int = to_ns(0.5)  # ... is off for no longer: drivers obey what is not known
-    again: int = to_ns(2.0)  # for which one has to agree then
+    again: int = to_ns(2.0)  # for which one has to agree then, or after a limit, to be trusted
     unsettled: int = to_ns(0.35)  # for which wheels still do what nobody seems to have asked for
 
 
@@ -144,8 +144,9 @@ class ParityWatch:
         self._since = np.where(flags, np.minimum(self._since, now), _NOT_YET)
         holds, agreed, broken, _ = self._since <= now - s.lasts
         self._beyond[broken] = (off / least - 1.0)[broken]
-        self._misled &= self._since[3] > now - s.again
-        self._doubt[agreed] = 0.0
+        trusted = self._since[3] <= now - s.again
+        self._misled &= ~trusted
+        self._doubt[trusted] = 0.0
         self._is_known = (self._is_known | agreed) & is_said
         return holds, agreed, broken
 
