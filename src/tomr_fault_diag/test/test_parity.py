@@ -208,7 +208,7 @@ def test_a_break_counts_for_half_a_second_or_until_it_agrees() -> None:
 
 
 def test_a_driver_that_was_at_its_limit_may_be_off_by_a_tenth_of_it() -> None:
-    """2.4 V, until it has agreed for two seconds on end: the driver of the third wheel gives more than it should."""
+    """2.4 V, until it has agreed for two seconds on end: that of the third wheel gives too much."""
     most = np.full(3, ROBOT.supply.nominal_voltage)
     fast = (most - MOTORS.resistance * CURRENT) / MOTORS.constant
     at_its_limit = frame(most, power(fast, CURRENT), fast, supply=1.0)
