@@ -74,6 +74,15 @@ def test_names_may_change_from_message_to_message() -> None:
     assert finder.missing() == (WHEELS[1],)
 
 
+def test_angles_that_begin_anew_each_turn_go_on() -> None:
+    finder, found = WheelFinder(WHEELS), []
+    for angle in (3.0, -3.0, 3.0):
+        found.append(finder.read(_joints(list(WHEELS), position=[0.0, angle, angle])).position)
+    assert found[0] == (0.0, 3.0, 3.0)
+    assert found[1] == pytest.approx((0.0, 2.0 * math.pi - 3.0, 2.0 * math.pi - 3.0))
+    assert found[2] == pytest.approx(found[0])
+
+
 @pytest.mark.parametrize(
     ("message", "words"),
     [

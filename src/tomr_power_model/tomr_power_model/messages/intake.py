@@ -10,6 +10,7 @@ from typing import Any
 from attrs import frozen
 
 from tomr_power_model.messages.plain import NANOSECONDS
+from tomr_power_model.messages.turns import Turns
 
 Triple = tuple[float, float, float]
 NAN = float("nan")
@@ -100,7 +101,10 @@ class Wheels:
 
 
 class WheelFinder:
-    """Reads the wheels of a JointState by name; other joints may be there, in any order."""
+    """Reads the wheels of a JointState by name; other joints may be there, in any order.
+
+    Angles that begin anew each turn go on: one stream, message by message.
+    """
 
     def __init__(self, wheel_names: tuple[str, str, str]) -> None:
         self._wheels = wheel_names
@@ -109,6 +113,7 @@ class WheelFinder:
         self._missing: tuple[str, ...] = wheel_names
         self._last: Any = None
         self._found = Wheels(_UNKNOWN, _UNKNOWN, _UNKNOWN)
+        self._turns = Turns(len(wheel_names))
 
     def read(self, message: Any) -> Wheels:
         """Wheels of a message; raises Unusable if none is there or the lengths disagree."""
@@ -121,11 +126,11 @@ class WheelFinder:
             found = ", ".join(names) or "no joint"
             raise Unusable(f"none of {', '.join(self._wheels)} is there, but {found}")
         count = len(names)
-        self._found = Wheels(
-            self._pick(message.position, count, "position", LARGEST.angle),
-            self._pick(message.velocity, count, "velocity", LARGEST.speed),
-            self._pick(message.effort, count, "effort", LARGEST.current),
-        )
+        position = self._pick(message.position, count, "position", LARGEST.angle)
+        velocity = self._pick(message.velocity, count, "velocity", LARGEST.speed)
+        effort = self._pick(message.effort, count, "effort", LARGEST.current)
+        a, b, c = self._turns.go_on(position, velocity)
+        self._found = Wheels((a, b, c), velocity, effort)
         self._last = message
         return self._found
 
