@@ -14,7 +14,8 @@ from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 
 import numpy as np
-from interrupted import recorded, stamped
+from disturbances import stamped
+from interrupted import recorded
 
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings

@@ -4,10 +4,10 @@
         [--only WORD] [--json OUT]
 
 Drives in MuJoCo with the reference robot, in whose recordings streams pause, stamps leap and
-scatter, samples are lost, sensors die, freeze or send what no sensor measures, and that obeyed
-other commands than were recorded: late ones, or none that came. Counted are the
-drives in which a fault is named that the undisturbed drive does not name, and, of faulty drives,
-those in which the fault is not named (again) within 2 s of what it needs being back.
+scatter, samples are lost, sensors die, freeze or send what no sensor measures, whose angles begin
+anew each turn, and that obeyed other commands than were recorded: late ones, or none that came.
+Counted are the drives in which a fault is named that the undisturbed drive does not name, and, of
+faulty drives, those in which the fault is not named (again) within 2 s of what it needs being back.
 """
 
 import argparse
@@ -16,7 +16,6 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from copy import copy
 from functools import cache, partial
 from itertools import chain, islice
 from pathlib import Path
@@ -24,6 +23,30 @@ from typing import Any
 
 import numpy as np
 from attrs import frozen
+from disturbances import (
+    IMU,
+    START_NS,
+    STREAMS,
+    Change,
+    Drive,
+    Item,
+    absurd,
+    begun_anew_each_turn,
+    both,
+    dead,
+    disobeyed,
+    frozen_sensor,
+    inertial,
+    leap,
+    loss,
+    pause,
+    power,
+    repeating_gyro,
+    repeating_imu,
+    scatter,
+    unplugged,
+    zeros_of_imu,
+)
 from tqdm import tqdm
 from winding import winding
 
@@ -33,45 +56,23 @@ from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.messages.bag import to_bag
-from tomr_power_model.model.ticks import NANOSECONDS, to_ns
+from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import shipped_robot
 from tomr_sim_bridge.missions.drive import drive, start_mission
 from tomr_sim_bridge.missions.mission import load_mission
 
-_START = 1_700_000_000 * NANOSECONDS
 _AGAIN = 2.0  # s in which a fault must be named again
 WINDING = "winding"  # no mission: see there
 FAULTY = ("circle_encoder_lost", "circle_control_signal_lost", "square_encoder_lost")
 _LATEST = 26.0  # s of a drive that is played
-POWER = ("wheel_1/power", "wheel_2/power", "wheel_3/power")
-STREAMS: dict[str, tuple[str, ...]] = {
-    "all": ("cmd_vel", "joint_states", *POWER, "battery_state"),
-    "cmd_vel": ("cmd_vel",),
-    "joint_states": ("joint_states",),
-    "one motor": (POWER[1],),
-    "motors": POWER,
-}
-
-
-@frozen
-class Item:
-    """One message of a drive."""
-
-    stamp_ns: int
-    topic: str
-    message: Any
-
-
-Drive = tuple[Item, ...]
-Change = Callable[[Drive, np.random.Generator], Drive]
 
 
 @cache
-def recorded(mission: str, seed: int) -> Drive:
+def recorded(mission: str, seed: int, has_imu: bool = False) -> Drive:
     """A mission of the simulated reference robot, or a winding drive."""
-    robot, topics = shipped_robot("reference"), set(STREAMS["all"])
+    robot, topics = shipped_robot("reference"), {*STREAMS["all"], *([IMU] if has_imu else [])}
     plan = load_mission("random_tour" if mission == WINDING else mission)
-    simulation = start_mission(plan, robot, seed, _START)
+    simulation = start_mission(plan, robot, seed, START_NS)
     if mission == WINDING:
         driven = winding(simulation, seed, _LATEST)
     else:
@@ -80,132 +81,15 @@ def recorded(mission: str, seed: int) -> Drive:
         Item(sample.stamp_ns, sample.topic, to_bag(sample.message))
         for samples in driven
         for sample in samples
-        if sample.topic in topics and sample.stamp_ns < _START + to_ns(_LATEST)
+        if sample.topic in topics and sample.stamp_ns < START_NS + to_ns(_LATEST)
     )
-
-
-def stamped(item: Item, stamp_ns: int) -> Item:
-    """The same message with another stamp."""
-    message, header = copy(item.message), copy(item.message.header)
-    time = copy(header.stamp)
-    time.sec, time.nanosec = divmod(stamp_ns, NANOSECONDS)
-    header.stamp, message.header = time, header
-    return Item(stamp_ns, item.topic, message)
-
-
-def pause(streams: str, at: float, length: float) -> Change:
-    """Nothing comes on some streams for a while [s]."""
-    first, last = _START + to_ns(at), _START + to_ns(at + length)
-    topics = STREAMS[streams]
-    return lambda items, _: tuple(
-        item for item in items if item.topic not in topics or not first <= item.stamp_ns < last
-    )
-
-
-def disobeyed(at: float, length: float) -> Change:
-    """For a while [s] the command before is recorded, and another obeyed: as one that is late."""
-    first, last = _START + to_ns(at), _START + to_ns(at + length)
-
-    def change(items: Drive, _: np.random.Generator) -> Drive:
-        before, found = None, []
-        for item in items:
-            if item.topic == "cmd_vel" and before and first <= item.stamp_ns < last:
-                message = copy(item.message)
-                message.twist = before
-                item = Item(item.stamp_ns, item.topic, message)
-            elif item.topic == "cmd_vel":
-                before = item.message.twist
-            found.append(item)
-        return tuple(found)
-
-    return change
-
-
-def leap(at: float, by: float) -> Change:
-    """All stamps leap [s]."""
-    first = _START + to_ns(at)
-    return lambda items, _: tuple(
-        stamped(item, item.stamp_ns + to_ns(by)) if item.stamp_ns >= first else item
-        for item in items
-    )
-
-
-def loss(share: float, streams: str = "all") -> Change:
-    """A share of the samples is lost."""
-    topics = STREAMS[streams]
-    return lambda items, random: tuple(
-        item for item in items if item.topic not in topics or random.random() >= share
-    )
-
-
-def scatter(std: float, streams: str = "all") -> Change:
-    """Stamps scatter around when samples were taken [s]; each stream stays in order."""
-    topics = STREAMS[streams]
-
-    def change(items: Drive, random: np.random.Generator) -> Drive:
-        newest = dict.fromkeys(topics, 0)
-        found = []
-        for item in items:
-            if item.topic in topics:
-                stamp = item.stamp_ns + round(1e9 * random.normal(0.0, std))
-                newest[item.topic] = stamp = max(stamp, newest[item.topic] + 1000)
-                item = stamped(item, stamp)
-            found.append(item)
-        return tuple(found)
-
-    return change
-
-
-def power(wheel: int, at: float, make: Callable[[Any, Any], Any], length: float = 1e9) -> Change:
-    """A motor's power as another sensor would give it: from its message and the one at `at`."""
-    first, last = _START + to_ns(at), _START + to_ns(min(at + length, 1e6))
-
-    def change(items: Drive, _: np.random.Generator) -> Drive:
-        held, found = None, []
-        for item in items:
-            if item.topic == POWER[wheel] and first <= item.stamp_ns < last:
-                held = held or item.message
-                item = Item(item.stamp_ns, item.topic, make(copy(item.message), held))
-            found.append(item)
-        return tuple(found)
-
-    return change
-
-
-def frozen_sensor(message: Any, held: Any) -> Any:
-    """A sensor that repeats what it said at first."""
-    message.voltage, message.current = held.voltage, held.current
-    return message
-
-
-def absurd(message: Any, _: Any) -> Any:
-    """What no sensor measures."""
-    message.voltage = 1e30
-    return message
-
-
-def dead(message: Any, _: Any) -> Any:
-    """A bus that answers with zeros."""
-    message.voltage, message.current = 0.0, 0.0
-    return message
-
-
-def both(*changes: Change) -> Change:
-    """Several disturbances one after the other."""
-
-    def change(items: Drive, random: np.random.Generator) -> Drive:
-        for one in changes:
-            items = one(items, random)
-        return items
-
-    return change
 
 
 @frozen
 class Case:
     """A disturbance of a drive, when what it takes away is back [s], and the seed of its chance.
 
-    `true`: the state that it brings about, which may be said.
+    `true`: the state that it brings about, which may be said. `has_imu`: whether the robot has one.
     """
 
     kind: str
@@ -213,6 +97,12 @@ class Case:
     back: float = 0.0
     seed: int = 0
     true: State | None = None
+    has_imu: bool = False
+
+    def played(self, mission: str, seed: int) -> list[Diagnosis]:
+        """What is published of a drive with the disturbance."""
+        items = recorded(mission, seed, self.has_imu)
+        return states(self.change(items, np.random.default_rng(self.seed)))
 
 
 def gaps(places: Sequence[float]) -> Iterator[Case]:
@@ -230,6 +120,8 @@ def cases(placements: int) -> Iterator[Case]:
     """All disturbances, those in one place at many."""
     places = np.linspace(2.0, 20.0, placements).tolist()
     yield from gaps(places)
+    yield from of_imu(places[::3])
+    yield Case("angles begin anew each turn", begun_anew_each_turn())
     for seed in range(placements // 2):
         for share in (0.02, 0.2, 0.5, 0.67, 0.9):
             yield Case(f"{share:.0%} lost", loss(share), seed=seed)
@@ -246,20 +138,24 @@ def cases(placements: int) -> Iterator[Case]:
             yield Case("unplugged", unplugged(wheel, at), true=POWER_SENSOR[wheel])
 
 
+def of_imu(places: Sequence[float]) -> Iterator[Case]:
+    """An IMU that dies at some times [s]."""
+    kinds = {
+        "IMU repeats itself": repeating_imu,
+        "gyro repeats itself": repeating_gyro,
+        "IMU reads zero": zeros_of_imu,
+    }
+    for kind, make in kinds.items():
+        for at in places:
+            yield Case(kind, inertial(at, make), has_imu=True)
+
+
 def disobedience(mission: str, places: Sequence[float]) -> Iterator[Case]:
     """Commands of a drive that are not obeyed in time, at some times [s]."""
     for length in (0.1, 0.2, 0.3, 0.4):
         for at in places:
             kind = f"{length} s of other commands, {mission}"
             yield Case(kind, disobeyed(at, length), at + length, true=DISOBEYS)
-
-
-def unplugged(wheel: int, at: float) -> Change:
-    """Nothing comes from a motor's power sensor any more."""
-    first = _START + to_ns(at)
-    return lambda items, _: tuple(
-        item for item in items if item.topic != POWER[wheel] or item.stamp_ns < first
-    )
 
 
 def states(items: Drive) -> list[Diagnosis]:
@@ -280,7 +176,7 @@ def accused(found: Sequence[Diagnosis], true: State | None = None) -> list[str]:
 
 def healthy(case: Case, mission: str, seed: int) -> tuple[str, list[str], float]:
     """The kind of a case, what it made to be named, and the share of time that was decided."""
-    found = states(case.change(recorded(mission, seed), np.random.default_rng(case.seed)))
+    found = case.played(mission, seed)
     periodic = [d for d in found if not d.changed]
     decided = [d for d in periodic if d.state.name == "normal" or d.state.name not in FAULTLESS]
     return case.kind, accused(found, case.true), len(decided) / max(len(periodic), 1)
@@ -289,14 +185,14 @@ def healthy(case: Case, mission: str, seed: int) -> tuple[str, list[str], float]
 def faulty(case: Case, mission: str, seed: int) -> tuple[str, list[str], float]:
     """As `healthy` of a drive with a fault: what became of the fault's name, if not what should."""
     usual = usually(mission, seed)
-    found = states(case.change(recorded(mission, seed), np.random.default_rng(case.seed)))
+    found = case.played(mission, seed)
     wrong = [f"{name} for {usual}" for name in accused(found) if name != usual]
     first, last = fault_times(mission)
     until = max(case.back, first) + _AGAIN
-    named = [d.state.name for d in found if d.stamp_ns <= _START + to_ns(until)]
+    named = [d.state.name for d in found if d.stamp_ns <= START_NS + to_ns(until)]
     if until < last and named[-1] != usual:
         wrong.append(f"{usual} not found again")
-    inside = [d.state.name for d in found if first < 1e-9 * (d.stamp_ns - _START) < last]
+    inside = [d.state.name for d in found if first < 1e-9 * (d.stamp_ns - START_NS) < last]
     after = inside[inside.index(usual) :] if usual in inside else []
     if any(name != usual for name in after):
         wrong.append(f"{usual} cleared")

@@ -1,7 +1,9 @@
 """Whole drives in which data are missing or bad: no fault is named because of that."""
 # ruff: noqa: E402 (bench/ is no package)
 
+import math
 import sys
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,23 +15,29 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "bench"))
 
-import interrupted
-from interrupted import (
+import disturbances
+from disturbances import (
+    START_NS,
+    STREAMS,
     Change,
     Drive,
     Item,
     absurd,
-    accused,
+    begun_anew_each_turn,
     both,
     dead,
     disobeyed,
+    inertial,
     leap,
     loss,
     pause,
     power,
+    repeating_gyro,
+    repeating_imu,
     scatter,
-    states,
+    zeros_of_imu,
 )
+from interrupted import WINDING, accused, recorded, states
 from winding import winding
 
 from tomr_fault_diag.classifier.states import DISOBEYS, POWER_SENSOR
@@ -41,7 +49,7 @@ FAULT = "motor system fault 3"  # in bags/circle_encoder_lost, from 8 s to 14 s
 
 @cache
 def drive(bag: str) -> Drive:
-    topics = {f"/{topic}" for topic in interrupted.STREAMS["all"]}
+    topics = {f"/{topic}" for topic in STREAMS["all"]}
     with open_recording(ROOT / "bags" / bag) as recording:
         return tuple(
             Item(stamp_of(message, received), topic.removeprefix("/"), message)
@@ -52,7 +60,7 @@ def drive(bag: str) -> Drive:
 @pytest.fixture(autouse=True)
 def _start(monkeypatch: pytest.MonkeyPatch) -> None:
     """Times of disturbances count from the start of the recordings."""
-    monkeypatch.setattr(interrupted, "_START", drive("square")[0].stamp_ns)
+    monkeypatch.setattr(disturbances, "START_NS", drive("square")[0].stamp_ns)
 
 
 def pauses(streams: str, length: float) -> Change:
@@ -87,11 +95,26 @@ def test_a_healthy_robot_is_not_accused(name: str) -> None:
     assert any(d.state.name == "normal" for d in found)
 
 
+def test_angles_that_begin_anew_each_turn_make_no_difference() -> None:
+    square = drive("square")
+    turned = begun_anew_each_turn()(square, np.random.default_rng(3))
+    angles = [max(np.abs(i.message.position)) for i in turned if i.topic == "joint_states"]
+    assert max(angles) <= math.pi
+    assert [d.state for d in states(turned)] == [d.state for d in states(square)]
+
+
+@pytest.mark.parametrize("make", [repeating_imu, repeating_gyro, zeros_of_imu])
+def test_an_imu_that_dies_accuses_nobody(make: Callable[[Any, Any], Any]) -> None:
+    """While the robot winds, so that what a dead one says soon is wrong."""
+    winds = (item for item in recorded(WINDING, 100, True) if item.stamp_ns < START_NS + 14e9)
+    assert accused(states(inertial(8.0, make)(tuple(winds), np.random.default_rng(3)))) == []
+
+
 def test_where_others_are_obeyed_the_command_before_is_recorded(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     circle = drive("circle_encoder_lost")
-    monkeypatch.setattr(interrupted, "_START", start := circle[0].stamp_ns)
+    monkeypatch.setattr(disturbances, "START_NS", start := circle[0].stamp_ns)
     found = disobeyed(3.5, 0.2)(circle, np.random.default_rng(3))
     changed = [(was, now) for was, now in zip(circle, found, strict=True) if was is not now]
     at = [1e-9 * (was.stamp_ns - start) for was, _ in changed]
@@ -135,7 +158,7 @@ def test_commands_that_are_late_accuse_nobody(
 ) -> None:
     """In bags/circle_encoder_lost, before that fault comes."""
     circle = drive("circle_encoder_lost")
-    monkeypatch.setattr(interrupted, "_START", start := circle[0].stamp_ns)
+    monkeypatch.setattr(disturbances, "START_NS", start := circle[0].stamp_ns)
     well = tuple(item for item in circle if item.stamp_ns < start + 7.9e9)
     found = states(disobeyed(3.5, length)(well, np.random.default_rng(3)))
     assert accused(found, DISOBEYS) == []
@@ -147,7 +170,7 @@ def test_a_fault_is_neither_cleared_nor_missed(
     streams: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     circle = drive("circle_encoder_lost")
-    monkeypatch.setattr(interrupted, "_START", start := circle[0].stamp_ns)
+    monkeypatch.setattr(disturbances, "START_NS", start := circle[0].stamp_ns)
     at_onset, within = pause(streams, 7.8, 0.5), pause(streams, 11.0, 0.5)
     found = states(both(at_onset, within)(circle, np.random.default_rng(3)))
     assert accused(found) == [FAULT]

@@ -11,6 +11,7 @@ import pytest
 from tomr_fault_diag.residuals.accelerometer import AccelerometerWatch, Force, Pair
 from tomr_fault_diag.residuals.frame import (
     ALONG,
+    IMU_REPEATS,
     NO_ENCODERS,
     NO_IMU,
     NO_WEIGHT,
@@ -128,6 +129,35 @@ def test_one_that_is_mounted_otherwise_is_not_believed_until_it_agrees(period_ms
     assert {pair[0].missing for at, pair in found.items() if 1500 < at <= 3000} == {NOT_BELIEVED}
     first = min(at for at, pair in found.items() if at > 3000 and not pair[0].missing)
     assert 3400 <= first <= 3700  # half a second of acceleration
+
+
+@pytest.mark.parametrize("is_noisy", [True, False])
+def test_one_that_repeats_itself_while_wheels_speed_up_and_slow_down_is_not_believed(
+    is_noisy: bool,
+) -> None:
+    """From 3.3 s to 5.3 s; one without any noise repeats itself as the motion does."""
+    random, last = np.random.default_rng(1), [(0.0, 0.0, 0.0)]
+
+    def felt(time: float) -> Force:
+        noise = random.normal(0.0, 0.01, 3) if is_noisy else np.zeros(3)
+        x, y, z = (np.array(level(time)) + noise).tolist()
+        if not 3.3 <= time < 5.3:
+            last[0] = (x, y, z)
+        return last[0]
+
+    found = followed(felt, seconds=7.0)
+    assert {pair[0].missing for at, pair in found.items() if 4400 < at < 5300} == {IMU_REPEATS}
+    assert not any(pair[0].missing for at, pair in found.items() if 200 < at < 4000 or at > 5500)
+
+
+def test_an_accelerometer_without_noise_repeats_itself_as_the_motion_does() -> None:
+    def straight(time: float) -> np.ndarray:
+        return twist(time) * [1.0, 0.0, 0.0]
+
+    found = followed(
+        lambda time: (-FASTER if time % 2.0 < 1.0 else FASTER, 0.0, GRAVITY), motion=straight
+    )
+    assert not any(pair[0].missing for at, pair in found.items() if at > 200)
 
 
 def test_a_slide_within_the_bands_does_not_make_it_a_liar() -> None:

@@ -15,6 +15,7 @@ from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.classifier.states import SLIP
 from tomr_fault_diag.residuals.frame import (
+    IMU_REPEATS,
     NO_IMU,
     NOT_BELIEVED,
     RESIDUALS,
@@ -30,6 +31,7 @@ from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.geometry.kinematics import wheels_to_twist
 from tomr_power_model.messages.bag import to_bag
+from tomr_power_model.messages.plain import Level
 from tomr_power_model.messages.readings import SupplyReading
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.ticks import TickSettings
@@ -156,6 +158,87 @@ def test_after_a_leap_of_time_the_samples_of_before_are_forgotten() -> None:
     found = frames(lambda at_ms: RATE + 0.5 * (at_ms >= 4500), leap_ms=4000)
     assert found[2600].yaw.residual == pytest.approx(0.5, abs=1e-6)
     assert found[2600].along[0].residual == pytest.approx(0.1 * (RATE + 0.5), abs=1e-4)
+
+
+def moving(
+    gyro: Callable[[int], float],
+) -> tuple[dict[int, ResidualFrame], list[tuple[str, Level, str]]]:
+    """As `frames`, faster and slower by turns, with an IMU that has noise; and what is said of it.
+
+    `gyro`: by time [ms], what is added to its reading.
+    """
+    random, stage = np.random.default_rng(1), ResidualStage(ROBOT, ResidualSettings())
+    reading = SupplyReading.rounded(24.0, 0.4)
+    along, across, _ = wheels_to_twist(ROBOT) @ SPEED
+    found, said, turned, last = {}, [], np.zeros(3), (0.0, 0.0, 0.0, 0.0)
+    for at_ms in range(0, 9000, 10):
+        stamp, share = BASE + at_ms * MS, 1.0 + 0.4 * math.sin(0.003 * at_ms)
+        speeds = tuple(share * speed for speed in SPEED)
+        if at_ms % 50 == 0:
+            motors = (reading, reading, reading)
+            stage.prediction(Prediction(stamp, speeds, speeds, motors, reading, motors))
+        first, second, third = turned
+        turned = turned + 0.01 * np.array(speeds)
+        stage.encoders(stamp, (first, second, third), speeds)
+        more, rate = gyro(at_ms), share * RATE
+        if more == more:
+            change = 1.2 * math.cos(0.003 * at_ms)
+            turning = (change * along - rate * share * across, rate * share * along, GRAVITY)
+            noise = random.normal(0.0, 0.01, 4)
+            last = tuple(np.array([rate + more, *turning]) + noise)
+        stage.imu(stamp, last[0], last[1:])
+        found.update({(frame.stamp_ns - BASE) // MS: frame for frame in stage.due()})
+        said += [
+            (status.name, status.level, status.message)
+            for report in stage.reports()
+            for status in report.statuses
+            if status.name == "inputs: imu/data"
+        ]
+    return found, said
+
+
+def test_an_imu_that_repeats_itself_is_not_believed_until_it_goes_on() -> None:
+    found, said = moving(lambda at_ms: math.nan if 5000 <= at_ms < 7000 else 0.0)
+    for at, frame in found.items():
+        if not 5000 <= at < 5500:  # the first repeats may be noise, and are what it measured last
+            assert not any(item.code for item in (frame.yaw, *frame.along)), at
+        if 5500 <= at < 7000:
+            assert frame.yaw.missing == IMU_REPEATS, at
+        elif at > 7200 or 3000 < at < 5000:
+            assert not frame.yaw.missing, at
+    words = [message for _, level, message in said if level == Level.WARN]
+    assert "repeats itself while the robot moves" in words
+    assert said[-1] == ("inputs: imu/data", Level.OK, "as it should be")
+
+
+def test_a_bus_that_answers_with_zeros_measures_nothing() -> None:
+    """And says so."""
+    stage, reading = ResidualStage(ROBOT, ResidualSettings()), SupplyReading.rounded(24.0, 0.4)
+    for at_ms in range(0, 600, 10):
+        stamp, rest = BASE + at_ms * MS, (0.0, 0.0, 0.0)
+        if at_ms % 50 == 0:
+            stage.prediction(Prediction(stamp, rest, rest, (reading,) * 3, reading, (reading,) * 3))
+        stage.encoders(stamp, rest, rest)
+        stage.imu(stamp, 0.01 if at_ms < 200 else 0.0, rest)
+    last = stage.due()[-1]
+    assert last.yaw.missing == NO_IMU
+    (status,) = (
+        status
+        for report in stage.reports()[-1:]
+        for status in report.statuses
+        if status.name == "inputs: imu/data"
+    )
+    assert (status.level, status.message) == (Level.WARN, "sends what cannot be used")
+
+
+def test_without_an_imu_nothing_is_said_of_one() -> None:
+    stage = ResidualStage(ROBOT, ResidualSettings())
+    for at_ms in range(0, 500, 10):
+        stage.encoders(BASE + at_ms * MS, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    assert stage.due()
+    names = {status.name for report in stage.reports() for status in report.statuses}
+    assert names
+    assert "inputs: imu/data" not in names
 
 
 def test_the_mean_is_of_the_tick() -> None:

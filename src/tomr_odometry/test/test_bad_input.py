@@ -77,6 +77,31 @@ def repeating() -> Change:
     return change
 
 
+def imu_repeating(since: float) -> Change:
+    """A driver that goes on with the last reading of a dead sensor."""
+    held: list[Any] = []
+
+    def change(time: float, topic: str, message: Any) -> Any:
+        if topic != "imu/data" or time < since:
+            return message
+        held.append(message)
+        copy = deepcopy(message)
+        copy.angular_velocity = held[0].angular_velocity
+        copy.linear_acceleration = held[0].linear_acceleration
+        return copy
+
+    return change
+
+
+def imu_of_zeros(time: float, topic: str, message: Any) -> Any:
+    if topic != "imu/data" or time < 4.0:
+        return message
+    copy = deepcopy(message)
+    for vector in (copy.angular_velocity, copy.linear_acceleration):
+        vector.x = vector.y = vector.z = 0.0
+    return copy
+
+
 def leaping(at: float, by: int) -> Change:
     def change(time: float, topic: str, message: Any) -> Any:
         if time < at:
@@ -95,6 +120,9 @@ CHANGES: dict[str, tuple[Change, float, float]] = {
     "biased IMU": (biased, 0.01, 0.06),
     "IMU spikes": (spiking, 0.01, 0.06),
     "IMU dies": (silent("imu/data", 4.0), 0.01, math.inf),
+    "IMU repeats itself": (imu_repeating(4.0), 0.06, math.inf),
+    "IMU repeats itself from the start": (imu_repeating(0.0), 0.06, math.inf),
+    "IMU reads zero": (imu_of_zeros, 0.01, math.inf),
     "encoders pause": (silent("joint_states", 1.6, 2.1), 0.01, 0.06),
     "encoders pause while turning round": (silent("joint_states", 3.6, 4.3), 0.02, 0.2),
     "encoders repeat themselves": (repeating(), 0.02, 0.4),

@@ -34,6 +34,14 @@ _REGAINED = 3.0  # times as fast as it is lost
 _STANDING = 0.3  # s of both, after which a robot stands whose wheels do
 _STANDS = 0.01  # m/s, rad/s: how surely
 _NONE = np.zeros(WHEELS, dtype=bool)
+_NO_IMU = np.full(6, np.nan)
+
+
+def mean_of(samples: list[tuple[float, ...]]) -> Array:
+    """Of IMU samples since the last step, one as a rule: (6,), NaN where there is none."""
+    if len(samples) == 1:
+        return np.array(samples[0])
+    return np.asarray(np.mean(samples, axis=0)) if samples else _NO_IMU
 
 
 class Aided:

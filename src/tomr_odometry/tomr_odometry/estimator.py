@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from tomr_odometry.aided import Aided
+from tomr_odometry.aided import Aided, mean_of
 from tomr_odometry.estimate import SLIDES, SLIDES_UNAIDED, Estimate
 from tomr_odometry.grip import Available, Floor
 from tomr_odometry.hindsight import Inputs
@@ -16,6 +16,7 @@ from tomr_odometry.lifted import Lifted
 from tomr_odometry.rims import Rims
 from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.start import Beginning, start
+from tomr_odometry.stuck import StuckImu
 from tomr_odometry.traction import Traction, Tractions
 from tomr_odometry.unaided import FEWEST_POWERS, Unaided
 from tomr_power_model.drive.sources import PowerReading
@@ -33,7 +34,6 @@ _LEAST_STEP_NS = to_ns(0.004)  # between encoder samples that are used
 _SILENT_NS = to_ns(0.1)  # of the encoders, from which the IMU alone goes on
 _UNKNOWN_WAY = 1e4  # m^2
 _FRESH_NS = to_ns(0.25)  # how long a sensor may be silent
-_NO_IMU = np.full(6, np.nan)
 _NONE_SLIDES = np.zeros(WHEELS, dtype=bool)
 _ALONG, _EACH = np.diag([1.0, 1.0, 0.0]), np.eye(3)
 _TURNING = 0.02  # m/s: below it there is no slip ratio
@@ -95,6 +95,7 @@ class SlipOdometry:
         self._heard: dict[str, int] = {}
         self._is_aided = False
         self._lifted = Lifted()
+        self._stuck = StuckImu(self._body.to_twist)
         self._seen = np.zeros(3)  # m/s, m/s, rad/s: the twist at the last sample of the IMU
 
     def _start_afresh(self, stamp_ns: int) -> None:
@@ -139,6 +140,8 @@ class SlipOdometry:
         """Estimates for the ticks that the stamps have reached, in order."""
         for tick in self._clock.due():
             for stamp, stream, values in self._until(tick):
+                if stream == "imu" and self._stuck.take(stamp, values):
+                    continue
                 self._heard[stream] = stamp
                 self._take(stamp, stream, values)
             if self._time:
@@ -192,6 +195,8 @@ class SlipOdometry:
         noise = self.settings.noise
         ways = self._rims.take(time, angle, noise.jitter)
         ways[1] += noise.rim**2
+        if self._stuck.look(time, self._rims.speed) and self._is_aided:
+            self._disbelieve()
         self._tractions.encoders(time, counted)
         if self._time:
             self._step(time, ways)
@@ -204,13 +209,23 @@ class SlipOdometry:
         for place in (0, 1):
             self._P[place, place] += lost
 
+    def _disbelieve(self) -> None:
+        """The IMU has repeated itself for a while: what came of that is forgotten."""
+        self._lose_sight()
+        twist = self._body.to_twist @ self._rims.speed
+        for place, off in enumerate(self._x[VX : WZ + 1] - twist, VX):
+            self._P[place, place] += off**2
+        self._x[VX : WZ + 1] = twist
+        self._heard["imu"] -= _FRESH_NS
+        self._is_aided = False
+
     def _step(self, time: int, ways: Array) -> None:
         """Go on to a time, with the ways of the rims there."""
         dt = 1e-9 * (time - self._time)
         self._keep_forces(dt)
         self._ask_power(dt)
         ways[0] -= self._by_power.slid
-        inertial = _mean(self._inertial)
+        inertial = mean_of(self._inertial)
         self._inertial, self._tractive = [], []
         self._advance(time, dt, ways, inertial)
         if self._by_power.correction is not None:
@@ -380,10 +395,3 @@ class SlipOdometry:
         named = [("creep", x[CREEP]), ("gyro_bias", x[GYRO])]
         named += [("slope_x", x[SLOPE]), ("slope_y", x[SLOPE + 1])]
         return tuple((name, float(value)) for name, value in named)
-
-
-def _mean(samples: list[tuple[float, ...]]) -> Array:
-    """Of IMU samples since the last step: one as a rule."""
-    if len(samples) == 1:
-        return np.array(samples[0])
-    return np.asarray(np.mean(samples, axis=0)) if samples else _NO_IMU

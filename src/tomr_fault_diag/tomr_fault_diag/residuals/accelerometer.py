@@ -4,7 +4,7 @@ they differ where a slope pulls at the robot, or wheels slide.
 What it shows of a robot that moves as described is its bias, which is learnt. One that takes
 gravity off itself is not believed: it has to weigh the robot as gravity does. Nor is one that is
 mounted otherwise: where it goes on differing though all is well, it has to agree with the wheels
-anew while they accelerate.
+anew while they accelerate. One that repeats itself is dead.
 """
 
 import math
@@ -15,6 +15,7 @@ from attrs import evolve
 from numpy.typing import NDArray
 
 from tomr_fault_diag.residuals.frame import (
+    IMU_REPEATS,
     NO_ENCODERS,
     NO_IMU,
     NO_WEIGHT,
@@ -24,6 +25,7 @@ from tomr_fault_diag.residuals.frame import (
     rounded,
 )
 from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_power_model.model.repeats import RepeatWatch
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import GRAVITY
 
@@ -42,6 +44,7 @@ _BIAS = 0.4  # m/s^2, at most
 _MOST = 600.0  # ticks, over which a bias is averaged
 _UNSURE = 0.3  # m/s^2, of a band, for a bias that is not known ...
 _PRIOR = 80.0  # ... and half as much after so many ticks: a slope within the bands may be in them
+_REPEATS = 0.1  # share of repeats that is usual where nothing is known yet
 _UNKNOWN = np.full(2, math.nan)
 
 
@@ -55,6 +58,7 @@ class AccelerometerWatch:
         self._samples: deque[tuple[int, Force]] = deque(maxlen=_KEPT)
         self._twists: deque[tuple[int, Array]] = deque(maxlen=1 + self._window // period_ns)
         self._recent: deque[Array] = deque(maxlen=lately)
+        self._repeats = RepeatWatch(_REPEATS)
         self._agreed, self._is_doubted = _AGREED, False  # ns so far, and whether it ever ran out
         self._bias, self._count = np.zeros(2), 0.0  # m/s^2, ticks
         self.clear()
@@ -64,6 +68,7 @@ class AccelerometerWatch:
         self._samples.clear()
         self._twists.clear()
         self._recent.clear()
+        self._repeats.clear()
 
     @property
     def is_believed(self) -> bool:
@@ -73,6 +78,7 @@ class AccelerometerWatch:
     def add(self, stamp_ns: int, force: Force) -> None:
         """Take a sample newer than those before [m/s^2]."""
         self._samples.append((stamp_ns, force))
+        self._repeats.take(stamp_ns, force)
 
     def residuals(self, tick_ns: int, twist: Array, bands: BandSettings, *, is_well: bool) -> Pair:
         """What it measures at a tick less what the wheels show along x and y [m/s^2], of the twist
@@ -80,8 +86,14 @@ class AccelerometerWatch:
 
         `is_well`: whether all motors and wheels are within their bands, so that no slope pulls.
         """
-        force, acceleration = self._force(tick_ns), self._acceleration(tick_ns, twist)
+        acceleration = self._acceleration(tick_ns, twist)
+        moves = float(np.abs(twist).max()) > _MOVES  # false where it is NaN
+        shown = (acceleration / bands.along).tolist()
+        force = self._force(tick_ns)
         is_weight = abs(float(force[2]) - GRAVITY) < _WEIGHS  # false where it is NaN
+        if self._repeats.is_stuck(tick_ns, shown, moves=moves) and is_weight:
+            self._samples.clear()
+            return _unknown(IMU_REPEATS)
         beyond = force[:2] - acceleration if is_weight else _UNKNOWN
         band = np.maximum(bands.along, bands.along_relative * np.abs(acceleration))
         band += bands.along_transient * self._spread(acceleration)

@@ -34,6 +34,7 @@ NOT_BELIEVED = "it has not agreed with the wheels for long enough yet"
 NO_IMU = "no fresh imu/data"
 NO_ENCODERS = "no fresh joint_states"
 NO_WEIGHT = "imu/data does not feel gravity along z"
+IMU_REPEATS = "imu/data repeats itself while the robot moves"
 FROZEN = " repeats itself while the motor works"  # and before it which stream
 
 Unit = Literal["W", "A", "V", "rad/s", "m/s^2"]

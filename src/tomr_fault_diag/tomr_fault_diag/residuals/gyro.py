@@ -2,7 +2,8 @@
 encoders are wrong.
 
 A gyro that is mounted otherwise, or belongs to another robot, differs always. So one is believed
-only once it has agreed with the wheels while the robot turned for a while.
+only once it has agreed with the wheels while the robot turned for a while. One that repeats itself
+is dead.
 """
 
 from collections import deque
@@ -10,6 +11,7 @@ from collections import deque
 from attrs import evolve
 
 from tomr_fault_diag.residuals.frame import (
+    IMU_REPEATS,
     NO_ENCODERS,
     NO_IMU,
     NOT_BELIEVED,
@@ -18,10 +20,12 @@ from tomr_fault_diag.residuals.frame import (
     rounded,
 )
 from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_power_model.model.repeats import RepeatWatch
 from tomr_power_model.model.ticks import to_ns
 
 _TURNS = 0.2  # rad/s: slower turning says nothing of how a gyro is mounted
 _AGREED = to_ns(2.0)  # of turning, tick after tick, in which it has to agree
+_STRAYS = 0.5  # bands: a gyro that repeats itself while the wheels' rate changes more is dead
 _MOST_HZ = 60  # samples beyond add nothing
 _KEPT = 1024  # samples, should no tick come
 CLOSEST_NS = to_ns(1.0 / _MOST_HZ)
@@ -36,6 +40,7 @@ class GyroWatch:
         self._window = max(period_ns, to_ns(0.05))
         self._samples: deque[tuple[int, float]] = deque(maxlen=_KEPT)
         self._recent: deque[float] = deque(maxlen=lately)
+        self._repeats = RepeatWatch()
         self._agreed = 0  # ns
         self.clear()
 
@@ -43,6 +48,7 @@ class GyroWatch:
         """Forget all samples; whether it is believed stays: it is the same gyro."""
         self._samples.clear()
         self._recent.clear()
+        self._repeats.clear()
 
     @property
     def is_believed(self) -> bool:
@@ -52,6 +58,7 @@ class GyroWatch:
     def add(self, stamp_ns: int, yaw_rate: float) -> None:
         """Take a sample newer than those before [rad/s]."""
         self._samples.append((stamp_ns, yaw_rate))
+        self._repeats.take(stamp_ns, (yaw_rate,))
 
     def rate(self, tick_ns: int) -> float:
         """Mean yaw rate of the window that ends at a tick [rad/s]; NaN without a sample in it."""
@@ -61,13 +68,18 @@ class GyroWatch:
         found = [rate for stamp, rate in samples if stamp <= tick_ns]
         return sum(found) / len(found) if found else float("nan")
 
-    def residual(self, tick_ns: int, wheels: float, bands: BandSettings) -> Residual:
+    def residual(
+        self, tick_ns: int, wheels: float, bands: BandSettings, *, moves: bool
+    ) -> Residual:
         """What it measures at a tick less what the wheels show [rad/s], NaN where that is
-        unknown, or the gyro is not believed yet."""
+        unknown, or the gyro is not believed; `moves`: whether wheels turn."""
+        least = max(bands.yaw, bands.yaw_relative * abs(wheels))
+        band = least + bands.yaw_transient * self.spread(wheels)
+        if self._repeats.is_stuck(tick_ns, [wheels / (_STRAYS * least)], moves=moves):
+            self._samples.clear()
+            return evolve(UNKNOWN_YAW, missing=IMU_REPEATS)
         measured = self.rate(tick_ns)
         residual = measured - wheels
-        band = max(bands.yaw, bands.yaw_relative * abs(wheels))
-        band += bands.yaw_transient * self.spread(wheels)
         self.compare(wheels, residual, band)
         if residual != residual:
             return evolve(UNKNOWN_YAW, missing=NO_IMU if measured != measured else NO_ENCODERS)

@@ -8,7 +8,6 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from tomr_fault_diag.residuals.accelerometer import AccelerometerWatch
 from tomr_fault_diag.residuals.frame import (
     BAND_SIGMAS,
     FROZEN,
@@ -23,9 +22,8 @@ from tomr_fault_diag.residuals.frame import (
     Unit,
     rounded,
 )
-from tomr_fault_diag.residuals.gyro import GyroWatch
+from tomr_fault_diag.residuals.inertial import IMU, InertialWatch
 from tomr_fault_diag.residuals.measured import Measured, SupplyWindow
-from tomr_fault_diag.residuals.repeats import RepeatWatch, Work
 from tomr_fault_diag.residuals.scatter import ScatterWatch
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_fault_diag.residuals.voltages import VoltageWatch
@@ -52,6 +50,7 @@ from tomr_power_model.model.encoders import (
 )
 from tomr_power_model.model.input_health import InputReporter, InputState
 from tomr_power_model.model.prediction import Prediction
+from tomr_power_model.model.repeats import RepeatWatch, Work
 from tomr_power_model.model.ticks import Arrival, TickClock, to_ns
 from tomr_power_model.robot import WHEELS, Robot
 
@@ -59,7 +58,6 @@ Array = NDArray[np.float64]
 
 PREDICTIONS = "predictions"
 ENCODERS = "joint_states"
-IMU = "imu/data"
 
 # The model's change over so long, in ticks, widens the band: where power jumps, a lag of a few
 # milliseconds between the streams is a large residual.
@@ -125,8 +123,7 @@ class ResidualStage:
         lately = max(_FEWEST, round(_TRANSIENT / period))
         self._recent: deque[_Modelled] = deque(maxlen=lately)
         self._scatter = ScatterWatch(fastest)
-        self._gyro = GyroWatch(period, lately)
-        self._accelerometer = AccelerometerWatch(period, lately)
+        self._inertial = InertialWatch(period, lately)
         self._voltages = VoltageWatch(lately)
         self._flaws = EncoderFlaws.of(robot)
         self._to_twist = Body.of(robot).to_twist
@@ -178,9 +175,7 @@ class ResidualStage:
         """Take a gyro's yaw rate [rad/s] and an accelerometer's specific force [m/s^2], NaN for
         what is not measured."""
         arrival = self._arrive(IMU, stamp_ns)
-        if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
-            self._gyro.add(stamp_ns, yaw_rate)
-            self._accelerometer.add(stamp_ns, force)
+        self._inertial.add(arrival, stamp_ns, yaw_rate, force)
         return arrival
 
     def refused(self, topic: str) -> None:
@@ -217,6 +212,7 @@ class ResidualStage:
                 found.append(InputState(f"{topic}/power", self._flows[wheel], ailment))
         if self._robot.measurement.total == TOTAL_TOPIC:
             found.append(InputState(TOTAL_TOPIC, self._flows[TOTAL]))
+        found += self._inertial.states(tick)
         return found
 
     def _arrive(self, stream: str, stamp_ns: int) -> Arrival:
@@ -231,8 +227,7 @@ class ResidualStage:
             self._decided = 0
             self._encoders.leap()
             self._scatter.clear()
-            self._gyro.clear()
-            self._accelerometer.clear()
+            self._inertial.leap()
             self._voltages.clear()
             self._predictions.clear()
             self._recent.clear()
@@ -250,13 +245,15 @@ class ResidualStage:
         powers = [self._motor(wheel, motors[wheel], absent) for wheel in range(WHEELS)]
         derived = [self._derived(wheel, motors[wheel], absent) for wheel in range(WHEELS)]
         twist, bands = self._twist(estimate, speeds), self.settings.bands
+        moves = float(np.abs(estimate.speed).max()) > _TURNS  # false where it is NaN
         is_well = not any(item.stale or item.code for item in (*powers, *speeds, *derived))
+        yaw, along = self._inertial.residuals(tick, twist, bands, moves=moves, is_well=is_well)
         return ResidualFrame(
             tick,
             (self._total(tick, motors, absent), *powers, *speeds, *derived),
             self._supply_share(tick),
-            self._gyro.residual(tick, float(twist[2]), bands),
-            self._accelerometer.residuals(tick, twist, bands, is_well=is_well),
+            yaw,
+            along,
             self._voltages.residuals(known, bands),
         )
 
