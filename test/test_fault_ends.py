@@ -10,8 +10,9 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "bench"))
 
-import fault_ends
-from fault_ends import Ending, back_after, random_ending, said_of
+from fault_ends import Ending, Said, accusing, back_after, random_ending, said_of
+
+from tomr_power_model.model.ticks import to_ns
 
 SOAKED = Ending(
     fault="encoder_lost",
@@ -26,7 +27,7 @@ SOAKED = Ending(
 
 def test_normal_is_named_soon_after_a_lost_encoder_s_end() -> None:
     """The other wheels feel the one that catches up: it took 1.9 s, and takes 1.3."""
-    said = said_of(SOAKED)
+    said, _ = said_of(SOAKED)
     assert [name for time, name in said if time <= SOAKED.ends][-1] == "motor system fault 1"
     back = next(time for time, name in said if time > SOAKED.ends and name == "normal")
     assert back - SOAKED.ends < 1.4
@@ -41,15 +42,23 @@ def test_normal_is_named_soon_after_a_lost_encoder_s_end() -> None:
         ([(2.0, "normal"), (4.5, "normal")], math.nan),
     ],
 )
-def test_how_soon_is_counted_from_the_end_of_what_was_named(
-    said: fault_ends.Said, after: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(fault_ends, "said_of", lambda _: said)
+def test_how_soon_is_counted_from_the_end_of_what_was_named(said: Said, after: float) -> None:
     ending = Ending("floor_slippery", 0, 0, 1.5, 4.0)
-    assert back_after(ending) == pytest.approx(after, nan_ok=True)
+    assert back_after(ending, said) == pytest.approx(after, nan_ok=True)
 
 
 def test_a_seed_gives_one_moment() -> None:
     endings = [random_ending("encoder_lost", seed) for seed in (1, 1, 2)]
     assert endings[0] == endings[1] != endings[2]
     assert {ending.wheel for ending in (random_ending("", seed) for seed in range(20))} == {1, 2, 3}
+
+
+@pytest.mark.parametrize(("fault", "seed"), [("control_signal_lost", 8), ("encoder_lost", 6)])
+def test_a_classifier_that_begins_after_a_fault_accuses_nobody(fault: str, seed: int) -> None:
+    """The stamps leapt while a driver summed up what its motor lacked: nobody knows how much that
+    is, and wheels that turn back agree with any for a moment."""
+    ending = random_ending(fault, seed, leap=60.0)
+    _, frames = said_of(ending)
+    ends = ending.begin_ns + to_ns(ending.ends + ending.leap)
+    assert accusing(frames, ends - to_ns(1.0))
+    assert not any(accusing(frames, ends + to_ns(seconds)) for seconds in (2.0, 3.0))

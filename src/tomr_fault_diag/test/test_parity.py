@@ -1,6 +1,7 @@
 """Parity of voltage, power and speed, from ticks whose numbers are worked by hand."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -40,6 +41,7 @@ BAND = 0.1  # V, and W
 NONE = [False, False, False]
 ALL = [True, True, True]
 FIRST = [True, False, False]
+LONG = 44  # ticks: two seconds, and some
 
 
 def volts(speed: Array, current: Array) -> Array:
@@ -87,6 +89,11 @@ class Watched:
         """Where it holds and where it is broken after so many alike."""
         parity = self._after(item, ticks)
         return parity.holds.tolist(), parity.broken.tolist()
+
+    def after_all(self, items: Sequence[ResidualFrame]) -> None:
+        """The first for long, so that it is trusted; the others for a moment."""
+        for index, item in enumerate(items):
+            self.after(item, 4 if index else LONG)
 
     def skip(self, ticks: int) -> None:
         """So many are missing."""
@@ -185,11 +192,26 @@ def test_it_breaks_where_it_agreed_before() -> None:
         ([WELL, unknown], NONE),
     ):
         watched = Watched()
-        for item in before:
-            watched.after(item)
+        watched.after_all(before)
         assert watched.breaks(MISCOUNTED, 3) == NONE
         assert watched.breaks(MISCOUNTED, 1) == breaks
         assert watched.breaks(WELL, 1) == NONE
+
+
+def test_at_first_a_law_is_trusted_after_two_seconds() -> None:
+    """Before, what its driver has summed up may be anything: wheels that turn back agree with that
+    for a moment. So is one again that is off before it is known, as after a gap."""
+    for ticks, breaks in ((40, NONE), (41, FIRST)):
+        watched = Watched()
+        watched.after(WELL, ticks)
+        assert watched.breaks(MISCOUNTED, 4) == breaks
+    for off, ticks, breaks in ((0, 4, FIRST), (3, 4, FIRST), (4, 4, NONE), (4, 41, FIRST)):
+        watched = Watched()
+        watched.after(WELL, LONG)
+        watched.skip(6)
+        watched.after(MISCOUNTED, off)
+        watched.after(WELL, ticks)
+        assert watched.breaks(MISCOUNTED, 4) == breaks
 
 
 def test_a_break_counts_for_half_a_second_or_until_it_agrees() -> None:
@@ -198,7 +220,7 @@ def test_a_break_counts_for_half_a_second_or_until_it_agrees() -> None:
     slow = frame(volts(0.2 * SPEED, CURRENT), power(0.2 * SPEED, CURRENT), 0.2 * SPEED)
     for after, ticks in ((still, 10), (slow, 3)):
         watched = Watched()
-        watched.after(WELL)
+        watched.after_all([WELL])
         assert watched.broke(MISCOUNTED, 3) == NONE
         assert watched.broke(MISCOUNTED, 1) == FIRST
         assert watched.broke(after, ticks) == FIRST
@@ -222,8 +244,7 @@ def test_a_driver_that_was_at_its_limit_may_be_off_by_a_tenth_of_it() -> None:
         (4.0, [WELL, at_its_limit], third),
     ):
         watched = Watched()
-        for item in before:
-            watched.after(item)
+        watched.after_all(before)
         assert watched.breaks(frame(held + np.multiply(third, off), drawn), 4) == breaks
 
 
@@ -235,7 +256,7 @@ def test_at_its_limit_a_driver_s_voltage_is_that_of_its_supply() -> None:
         held, drawn = volts(fast, CURRENT), power(fast, CURRENT)
         held[0] = full  # by its law
         watched = Watched()
-        watched.after(evolve(WELL, supply=supply))
+        watched.after_all([evolve(WELL, supply=supply)])
         shown = frame(held, drawn, fast, supply=supply)
         assert watched.breaks(shown, 4) == NONE
         assert watched.breaks(frame(held, drawn, fast * [0.5, 1.0, 1.0], supply=supply), 4) == FIRST
@@ -244,11 +265,11 @@ def test_at_its_limit_a_driver_s_voltage_is_that_of_its_supply() -> None:
 def test_what_was_before_a_gap_says_nothing() -> None:
     for gap, breaks in ((2, FIRST), (5, FIRST), (6, NONE)):  # ticks; 0.3 s are none too many
         watched = Watched()
-        watched.after(WELL)
+        watched.after_all([WELL])
         watched.skip(gap)
         assert watched.breaks(MISCOUNTED, 4) == breaks
     watched = Watched()
-    watched.after(WELL)
+    watched.after_all([WELL])
     watched.after(MISCOUNTED, 3)
     watched.skip(6)
     assert watched.after(MISCOUNTED, 1)[1] == NONE
@@ -260,7 +281,7 @@ def test_what_a_supply_lacks_is_no_break() -> None:
     held, drawn = volts(fast, CURRENT), power(fast, CURRENT)
     for more, breaks in ((0.2, NONE), (0.3, NONE), (0.5, FIRST)):
         watched = Watched()
-        watched.after(frame(held, drawn, fast, supply=0.8))
+        watched.after_all([frame(held, drawn, fast, supply=0.8)])
         by_law = held * [1.0 + more, 1.0, 1.0]
         assert watched.breaks(frame(by_law, drawn, fast, supply=0.8), 4) == breaks
 
@@ -280,7 +301,7 @@ def test_several_motors_that_are_off_at_once_obey_what_is_not_known() -> None:
         ((5.0, 0.0, 1.6), NONE),
     ):
         watched = Watched()
-        watched.after(WELL)
+        watched.after_all([WELL])
         assert watched.breaks(beside(*off), 4) == breaks
         assert watched.after(beside(*off), 4) == (watched.last.holds.tolist(), breaks)
 
@@ -289,11 +310,11 @@ def test_what_is_within_a_band_or_in_doubt_is_not_off_with_others() -> None:
     for other, breaks in ((1.8, FIRST), (2.2, NONE)):  # of a band of 2 V; 5 V are more than two
         watched = Watched()
         held = volts(SPEED, CURRENT) + np.array([5.0, other, 0.0])
-        watched.after(frame(volts(SPEED, CURRENT), power(SPEED, CURRENT), band=1.9))
+        watched.after_all([frame(volts(SPEED, CURRENT), power(SPEED, CURRENT), band=1.9)])
         assert watched.breaks(frame(held, power(SPEED, CURRENT), band=1.9), 4) == breaks
     for was_full, breaks in ((True, FIRST), (False, NONE)):  # a tenth of 24 V is in doubt then
         watched = Watched()
-        watched.after(evolve(WELL, supply=1.0))
+        watched.after_all([evolve(WELL, supply=1.0)])
         full = volts(SPEED, CURRENT)
         full[1] = -24.0 if was_full else full[1]
         watched.after(frame(full, power(SPEED, CURRENT), supply=1.0), 1)
@@ -305,12 +326,12 @@ def test_one_that_is_off_for_long_says_nothing_of_the_others() -> None:
     """The second fault of a robot is one, 0.5 s after the first, and none a moment after it."""
     for ticks, breaks in ((14, [True, True, False]), (9, NONE)):
         watched = Watched()
-        watched.after(WELL)
+        watched.after_all([WELL])
         assert watched.breaks(beside(5.0, 0.0, 0.0), ticks) == FIRST
         assert watched.breaks(beside(5.0, 5.0, 0.0), 4) == breaks
         assert watched.last.broken.tolist() == breaks
     watched = Watched()
-    watched.after(WELL)
+    watched.after_all([WELL])
     assert watched.breaks(beside(14.0, 0.0, 0.0), 14) == FIRST
     assert watched.breaks(beside(14.0, 4.0, 4.0), 4) == NONE  # these two, together, are no faults
 
@@ -318,7 +339,7 @@ def test_one_that_is_off_for_long_says_nothing_of_the_others() -> None:
 def test_drivers_that_were_misled_are_believed_after_two_seconds() -> None:
     for ticks, breaks in ((38, NONE), (45, FIRST)):
         watched = Watched()
-        watched.after(WELL)
+        watched.after_all([WELL])
         watched.breaks(beside(5.0, 5.0, 5.0), 4)
         assert watched.after(WELL, 20)[1] == NONE
         turning_back = 0.01 * SPEED
@@ -329,14 +350,14 @@ def test_drivers_that_were_misled_are_believed_after_two_seconds() -> None:
         assert watched.breaks(beside(5.0, 0.0, 0.0), 4) == breaks
     watched.breaks(beside(5.0, 5.0, 5.0), 4)
     watched.watch.clear()
-    watched.after(WELL)
+    watched.after_all([WELL])
     assert watched.breaks(beside(5.0, 0.0, 0.0), 4) == FIRST
 
 
 def test_what_wheels_do_is_unsettled_a_moment_longer() -> None:
     """For 0.35 s since several motors were found off at once, however long they are."""
     watched = Watched()
-    watched.after(WELL)
+    watched.after_all([WELL])
     assert not watched.last.misled
     watched.breaks(beside(5.0, 5.0, 5.0), 1)
     assert watched.last.misled
@@ -351,7 +372,7 @@ def test_how_far_beyond_what_is_allowed() -> None:
     takes = float(MOTORS.constant[0] * SPEED[0])
     for more in (0.5, 3.0):
         watched = Watched()
-        watched.after(WELL)
+        watched.after_all([WELL])
         watched.breaks(beside((1.0 + more) * 0.15 * takes, 0.0, 0.0), 4)
         assert watched.last.beyond == pytest.approx(more)
         watched.after(WELL, 1)

@@ -58,7 +58,8 @@ class ParitySettings:
     doubt: float = 0.1  # ... which may be off by so much of it from then on
     alike: float = 0.3  # times as much, by which another one is off that ...
     together: int = to_ns(0.5)  # ... is off for no longer: drivers obey what is not known
-    again: int = to_ns(2.0)  # for which one has to agree then, or after a limit, to be trusted
+    # For which one has to agree then, or after a limit, or at first, to be trusted.
+    again: int = to_ns(2.0)
     unsettled: int = to_ns(0.35)  # for which wheels still do what nobody seems to have asked for
 
 
@@ -98,6 +99,8 @@ class ParityWatch:
         self._broken = np.full(WHEELS, NEVER)  # ns, when each last was, unless it held since
         self._is_known = _nowhere()  # whether its driver's law says a motor's voltage, ...
         self._doubt = np.zeros(WHEELS)  # ... but for so much [V]
+        # Whether it has agreed for long: by chance it does for a moment, where a wheel turns back.
+        self._is_proven = _nowhere()
         self._misled = _nowhere()  # drivers that obeyed what is not known, ...
         self._misled_at = NEVER  # ... since when they do, the last time [ns]
         self._beyond = np.zeros(WHEELS)  # by how much each was off when last broken, see `Parity`
@@ -147,7 +150,8 @@ class ParityWatch:
         trusted = self._since[3] <= now - s.again
         self._misled &= ~trusted
         self._doubt[trusted] = 0.0
-        self._is_known = (self._is_known | agreed) & is_said
+        self._is_proven = (self._is_proven & ~(broken & ~self._is_known)) | trusted
+        self._is_known = (self._is_known | (agreed & self._is_proven)) & is_said
         return holds, agreed, broken
 
     def _obey_others(self, off: Array, least: Array, differs: Flags) -> bool:
