@@ -72,6 +72,27 @@ def disobeyed(at: float, length: float) -> Change:
     return change
 
 
+def unseen(at: float, length: float, is_silent: bool) -> Change:
+    """For a while [s] another commands the robot: here it is told to stand, or told nothing."""
+    first, last = START_NS + to_ns(at), START_NS + to_ns(at + length)
+
+    def change(items: Drive, _: np.random.Generator) -> Drive:
+        found = []
+        for item in items:
+            if item.topic == "cmd_vel" and first <= item.stamp_ns < last:
+                if is_silent:
+                    continue
+                message, twist = copy(item.message), copy(item.message.twist)
+                twist.linear, twist.angular = copy(twist.linear), copy(twist.angular)
+                twist.linear.x = twist.linear.y = twist.angular.z = 0.0
+                message.twist = twist
+                item = Item(item.stamp_ns, item.topic, message)
+            found.append(item)
+        return tuple(found)
+
+    return change
+
+
 def leap(at: float, by: float) -> Change:
     """All stamps leap [s]."""
     first = START_NS + to_ns(at)

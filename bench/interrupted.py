@@ -5,9 +5,10 @@
 
 Drives in MuJoCo with the reference robot, in whose recordings streams pause, stamps leap and
 scatter, samples are lost, sensors die, freeze or send what no sensor measures, whose angles begin
-anew each turn, and that obeyed other commands than were recorded: late ones, or none that came.
-Counted are the drives in which a fault is named that the undisturbed drive does not name, and, of
-faulty drives, those in which the fault is not named (again) within 2 s of what it needs being back.
+anew each turn, and that obeyed other commands than were recorded: late ones, another's, or none
+that came. Counted are the drives in which a fault is named that the undisturbed drive does
+not name, and, of faulty drives, those in which the fault is not named (again) within 2 s of what it
+needs being back.
 """
 
 import argparse
@@ -45,6 +46,7 @@ from disturbances import (
     repeating_imu,
     scatter,
     unplugged,
+    unseen,
     zeros_of_imu,
 )
 from tqdm import tqdm
@@ -158,6 +160,14 @@ def disobedience(mission: str, places: Sequence[float]) -> Iterator[Case]:
             yield Case(kind, disobeyed(at, length), at + length, true=DISOBEYS)
 
 
+def strangers(mission: str, places: Sequence[float]) -> Iterator[Case]:
+    """Commands of another, from some times on [s], while the robot is told to rest, or nothing."""
+    for is_silent in (False, True):
+        kind = f"another commands, {'silence' if is_silent else 'rest'} here, {mission}"
+        for at in places:
+            yield Case(kind, unseen(at, 3.0, is_silent), at + 3.0, true=DISOBEYS)
+
+
 def states(items: Drive) -> list[Diagnosis]:
     """What is published of a drive."""
     pipeline = Pipeline(shipped_robot("reference"), DiagnosisSettings.of({}, "defaults"))
@@ -236,7 +246,8 @@ def plays(placements: int, seeds: Iterable[int]) -> Iterator[Play]:
             for case in cases(placements):
                 yield healthy, case, mission, seed
         for mission in ("random_tour", "circle", WINDING):
-            for case in disobedience(mission, np.linspace(3.0, 21.0, placements).tolist()):
+            where = np.linspace(3.0, 21.0, placements).tolist()
+            for case in chain(disobedience(mission, where), strangers(mission, where)):
                 yield healthy, case, mission, seed
         for mission in FAULTY:
             first, _ = fault_times(mission)

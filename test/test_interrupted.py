@@ -35,6 +35,7 @@ from disturbances import (
     repeating_gyro,
     repeating_imu,
     scatter,
+    unseen,
     zeros_of_imu,
 )
 from interrupted import WINDING, accused, recorded, states
@@ -162,6 +163,17 @@ def test_commands_that_are_late_accuse_nobody(
     well = tuple(item for item in circle if item.stamp_ns < start + 7.9e9)
     found = states(disobeyed(3.5, length)(well, np.random.default_rng(3)))
     assert accused(found, DISOBEYS) == []
+    assert found[-1].state.name == "normal"
+
+
+def test_a_robot_that_another_commands_does_not_follow_and_no_motor_is_accused() -> None:
+    """It is told to rest, and winds: for three seconds no motor's law says what it gives."""
+    winds = (item for item in recorded(WINDING, 101) if item.stamp_ns < START_NS + 14e9)
+    items = unseen(8.0, 3.0, is_silent=False)(tuple(winds), np.random.default_rng(3))
+    found = states(items)
+    assert set(accused(found)) == {DISOBEYS.name}
+    named = next(d.stamp_ns for d in found if d.state == DISOBEYS)
+    assert named < START_NS + 10e9
     assert found[-1].state.name == "normal"
 
 

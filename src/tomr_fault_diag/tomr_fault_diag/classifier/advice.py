@@ -16,7 +16,7 @@ CHECKS: Mapping[str, str] = {
     "power sensor fault": "the power sensor's plug and its bus; the motor itself may be well",
     "external load": "what the robot pushes or tows, and what leans on it",
     "does not follow its commands": "e-stop, contactor, the drivers' supply, a collision monitor "
-    "between cmd_vel and the drivers",
+    "between cmd_vel and the drivers; where it moves, who else commands it, and the base's limits",
     "low supply": "the battery's charge, its plugs and its fuse; charge it",
     "unknown": "what the evidence names, and whether robot.yaml still describes this robot",
     "stale": "whether the sensors' drivers and the other two nodes run",

@@ -10,6 +10,7 @@ import numpy as np
 from attrs import frozen
 
 from tomr_fault_diag.classifier.braking import BrakingWatch
+from tomr_fault_diag.classifier.others import OthersWatch
 from tomr_fault_diag.residuals.frame import (
     MOTORS,
     RESIDUALS,
@@ -42,7 +43,8 @@ class Misfit:
     """What a frame shows beside the classifier's states."""
 
     ignores_commands: bool = False  # for a moment already: wheels stand that should turn
-    # And for long enough to be named; or it brakes unasked, or no motor has been driven for long.
+    # And for long enough to be named; or it brakes unasked, obeys others, or no motor has been
+    # driven for long.
     disobeys: bool = False
     unexplained: bool = False  # some residual has been far out of its band for long
     stays_so: bool = False  # for so long that even a push or a slope is known by then
@@ -58,12 +60,15 @@ class MisfitWatch:
         `braking` a robot that ignores its commands is known once it stands."""
         self._idle = tuple(idle)
         self._braking = braking
+        self._others = OthersWatch(self._idle) if self._idle else None
         self.clear()
 
     def clear(self) -> None:
         """Forget what was seen."""
         if self._braking is not None:
             self._braking.clear()
+        if self._others is not None:
+            self._others.clear()
         self._halting_since: int | None = None
         self._unpowered_since: int | None = None
         self._far_since: dict[int, int] = {}
@@ -92,10 +97,10 @@ class MisfitWatch:
         self._unpowered_since = _since(self._unpowered_since, now, holds=unpowered)
         far_since = min(self._far_since.values(), default=now)
         stands = ignores and _lasts(self._halting_since, now, _IGNORED_FOR)
-        brakes = self._brakes(now, speeds)
+        brakes, obeys_others = self._brakes(now, speeds), self._obeys_others(frame)
         return Misfit(
             ignores,
-            stands or brakes or _lasts(self._unpowered_since, now, _IGNORED_FOR),
+            stands or brakes or obeys_others or _lasts(self._unpowered_since, now, _IGNORED_FOR),
             now - far_since >= _FAR_FOR,
             now - far_since >= _FAR_LONG,
             _lasts(self._low_since, now, _LOW_FOR),
@@ -109,6 +114,10 @@ class MisfitWatch:
         expected = np.array([item.modelled for item in speeds])
         far = sum(is_far(item) for item in speeds)
         return self._braking.take(now, measured, expected, far)
+
+    def _obeys_others(self, frame: ResidualFrame) -> bool:
+        """Whether it does what is asked of it by commands that are not known."""
+        return self._others is not None and self._others.take(frame)
 
     def _is_unpowered(self, frame: ResidualFrame, speeds: list[Residual]) -> bool:
         """Whether no motor is driven, and wheels therefore turn otherwise than they should."""
