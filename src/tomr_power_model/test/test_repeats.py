@@ -52,7 +52,7 @@ def _stuck(
     readings: list[float], shown: list[float], share: float = 0.9, still: range = range(0)
 ) -> list[int]:
     """Samples of 100 Hz at which a sensor of the motion counts as stuck; `shown` by wheels."""
-    watch, found = RepeatWatch(share), []
+    watch, found = RepeatWatch(share, is_inertial=True), []
     for index, value in enumerate(readings):
         watch.take(index * 10 * MS, (value,))
         moves = index not in still
@@ -78,6 +78,7 @@ def test_where_it_stands_an_imu_without_noise_may_repeat_itself() -> None:
     held, ramp = [*_noisy(300), *[0.2] * 100], [0.02 * index for index in range(400)]
     assert not _stuck(held, ramp, still=range(250, 400))
     assert _stuck(held, ramp, still=range(250, 310))
+    assert _stuck(held, ramp, still=range(310))  # it showed its noise there
 
 
 @pytest.mark.parametrize(("share", "is_stuck"), [(0.9, False), (0.1, True)])

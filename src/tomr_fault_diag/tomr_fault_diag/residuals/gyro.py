@@ -40,7 +40,7 @@ class GyroWatch:
         self._window = max(period_ns, to_ns(0.05))
         self._samples: deque[tuple[int, float]] = deque(maxlen=_KEPT)
         self._recent: deque[float] = deque(maxlen=lately)
-        self._repeats = RepeatWatch()
+        self._repeats = RepeatWatch(is_inertial=True)
         self._agreed = 0  # ns
         self.clear()
 

@@ -40,9 +40,10 @@ class Work:
 class RepeatWatch:
     """Follows the readings of one sensor."""
 
-    def __init__(self, share: float = 0.9) -> None:
-        """`share` of repeats that is expected before any reading was seen."""
-        self._expected = share
+    def __init__(self, share: float = 0.9, *, is_inertial: bool = False) -> None:
+        """`share` of repeats that is expected before any reading was seen; one that is inertial
+        shows its noise at rest as well."""
+        self._expected, self._is_inertial = share, is_inertial
         self.clear()
 
     def clear(self) -> None:
@@ -112,7 +113,7 @@ class RepeatWatch:
             return
         if not self._is_improbable():
             self._repeats += self._run
-            self._samples += self._run + turns
+            self._samples += self._run + (turns or self._is_inertial)
         if self._samples > _MEMORY:
             self._repeats, self._samples = 0.5 * self._repeats, 0.5 * self._samples
         self._last = reading
