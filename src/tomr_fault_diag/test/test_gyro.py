@@ -26,7 +26,7 @@ from tomr_fault_diag.residuals.frame import (
 )
 from tomr_fault_diag.residuals.gyro import GyroWatch
 from tomr_fault_diag.residuals.messages import frame_of, residual_message
-from tomr_fault_diag.residuals.settings import ResidualSettings
+from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.geometry.kinematics import wheels_to_twist
@@ -209,6 +209,17 @@ def test_an_imu_that_repeats_itself_is_not_believed_until_it_goes_on() -> None:
     words = [message for _, level, message in said if level == Level.WARN]
     assert "repeats itself while the robot moves" in words
     assert said[-1] == ("inputs: imu/data", Level.OK, "as it should be")
+
+
+def test_readings_of_before_a_leap_hide_no_repeats() -> None:
+    watch, random = GyroWatch(50 * MS, 3), np.random.default_rng(1)
+    for at_ms in range(0, 2000, 10):
+        watch.add(BASE + (at_ms + 60_000) * MS, random.normal())
+    watch.clear()
+    for at_ms in range(0, 2000, 10):
+        watch.add(BASE + at_ms * MS, 1.0 if at_ms > 1000 else random.normal())
+        last = watch.residual(BASE + at_ms * MS, 1e-3 * at_ms, BandSettings(), moves=True)
+    assert last.missing == IMU_REPEATS
 
 
 def test_a_bus_that_answers_with_zeros_measures_nothing() -> None:

@@ -55,6 +55,11 @@ def test_else_they_are_not(off: list[float], drawn: np.ndarray, beside: list[flo
     assert found((40, np.array(off), np.asarray(drawn), np.array(beside))) == []
 
 
+def test_a_motor_that_no_longer_draws_what_its_wheel_shows_has_a_fault_of_its_own() -> None:
+    off = np.array([0.5, 1.1, 0.0])
+    assert found((6, FAR, WORKING, FITS), (30, FAR, WORKING, off)) == []
+
+
 def test_a_wheel_that_turns_as_asked_by_chance_is_no_end() -> None:
     """For 0.15 s."""
     far, one = (FAR, WORKING, FITS), (np.array([2.0, 0.0, 0.1]), WORKING, FITS)

@@ -92,7 +92,6 @@ class AccelerometerWatch:
         force = self._force(tick_ns)
         is_weight = abs(float(force[2]) - GRAVITY) < _WEIGHS  # false where it is NaN
         if self._repeats.is_stuck(tick_ns, shown, moves=moves) and is_weight:
-            self._samples.clear()
             return _unknown(IMU_REPEATS)
         beyond = force[:2] - acceleration if is_weight else _UNKNOWN
         band = np.maximum(bands.along, bands.along_relative * np.abs(acceleration))

@@ -73,10 +73,9 @@ class GyroWatch:
     ) -> Residual:
         """What it measures at a tick less what the wheels show [rad/s], NaN where that is
         unknown, or the gyro is not believed; `moves`: whether wheels turn."""
-        least = max(bands.yaw, bands.yaw_relative * abs(wheels))
-        band = least + bands.yaw_transient * self.spread(wheels)
-        if self._repeats.is_stuck(tick_ns, [wheels / (_STRAYS * least)], moves=moves):
-            self._samples.clear()
+        band = max(bands.yaw, bands.yaw_relative * abs(wheels))
+        band += bands.yaw_transient * self.spread(wheels)
+        if self._repeats.is_stuck(tick_ns, [wheels / (_STRAYS * bands.yaw)], moves=moves):
             return evolve(UNKNOWN_YAW, missing=IMU_REPEATS)
         measured = self.rate(tick_ns)
         residual = measured - wheels

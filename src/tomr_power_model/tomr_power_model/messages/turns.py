@@ -12,7 +12,6 @@ from attrs import define
 
 _TURN = 2.0 * math.pi
 _LEEWAY = 1e-3  # rad: angles may be of single precision
-_LEAP = math.pi  # rad: less is no beginning of another turn
 _STEP = 0.5 * math.pi  # rad, between two samples, at most: what is left without the turn
 
 
@@ -32,7 +31,7 @@ class _Turning:
         self.least, self.most = min(self.least, angle), max(self.most, angle)
         leap = angle - self.last  # NaN at first
         self.last = angle
-        if abs(leap) > _LEAP and self.most - self.least <= _TURN + _LEEWAY:
+        if self.most - self.least <= _TURN + _LEEWAY:
             turn = math.copysign(_TURN, -leap)
             # Angles that were missed go the way of the wheel, those that begin anew against it.
             is_new = abs(leap + turn) < _STEP and not turn * speed < 0.0
