@@ -58,8 +58,8 @@ class ParitySettings:
     doubt: float = 0.1  # ... which may be off by so much of it from then on
     alike: float = 0.3  # times as much, by which another one is off that ...
     together: int = to_ns(0.5)  # ... is off for no longer: drivers obey what is not known
-    # For which one has to agree then, or after a limit, or at first, to be trusted.
-    again: int = to_ns(2.0)
+    again: int = to_ns(2.0)  # for which one has to agree then, or after a limit, to be trusted
+    first: int = to_ns(1.0)  # for which it has to at first
     unsettled: int = to_ns(0.35)  # for which wheels still do what nobody seems to have asked for
 
 
@@ -150,7 +150,8 @@ class ParityWatch:
         trusted = self._since[3] <= now - s.again
         self._misled &= ~trusted
         self._doubt[trusted] = 0.0
-        self._is_proven = (self._is_proven & ~(broken & ~self._is_known)) | trusted
+        proven = self._since[3] <= now - s.first
+        self._is_proven = (self._is_proven & ~(broken & ~self._is_known)) | proven
         self._is_known = (self._is_known | (agreed & self._is_proven)) & is_said
         return holds, agreed, broken
 
