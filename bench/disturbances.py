@@ -33,6 +33,7 @@ class Item:
 
 Drive = tuple[Item, ...]
 Change = Callable[[Drive, np.random.Generator], Drive]
+Made = Callable[[Any, Any], Any]
 
 
 def stamped(item: Item, stamp_ns: int) -> Item:
@@ -128,20 +129,31 @@ def scatter(std: float, streams: str = "all") -> Change:
     return change
 
 
-def power(wheel: int, at: float, make: Callable[[Any, Any], Any], length: float = 1e9) -> Change:
-    """A motor's power as another sensor would give it: from its message and the one at `at`."""
+def replaced(topic: str, at: float, make: Made, length: float = 1e9) -> Change:
+    """For a while [s] a topic's messages as another sensor would give them: `make` makes each from
+    it and the one at `at`."""
     first, last = START_NS + to_ns(at), START_NS + to_ns(min(at + length, 1e6))
 
     def change(items: Drive, _: np.random.Generator) -> Drive:
         held, found = None, []
         for item in items:
-            if item.topic == POWER[wheel] and first <= item.stamp_ns < last:
+            if item.topic == topic and first <= item.stamp_ns < last:
                 held = held or item.message
                 item = Item(item.stamp_ns, item.topic, make(copy(item.message), held))
             found.append(item)
         return tuple(found)
 
     return change
+
+
+def power(wheel: int, at: float, make: Made, length: float = 1e9) -> Change:
+    """A motor's power as another sensor would give it, for a while [s]."""
+    return replaced(POWER[wheel], at, make, length)
+
+
+def inertial(at: float, make: Made) -> Change:
+    """What the IMU measures as another would give it, from a time on [s]."""
+    return replaced(IMU, at, make)
 
 
 def frozen_sensor(message: Any, held: Any) -> Any:
@@ -191,22 +203,6 @@ def begun_anew_each_turn() -> Change:
                 message, angles = copy(item.message), np.array(item.message.position)
                 message.position = (angles + math.pi) % (2.0 * math.pi) - math.pi
                 item = Item(item.stamp_ns, item.topic, message)
-            found.append(item)
-        return tuple(found)
-
-    return change
-
-
-def inertial(at: float, make: Callable[[Any, Any], Any]) -> Change:
-    """The IMU's messages as another sensor would give them: from each and the one at `at` [s]."""
-    first = START_NS + to_ns(at)
-
-    def change(items: Drive, _: np.random.Generator) -> Drive:
-        held, found = None, []
-        for item in items:
-            if item.topic == IMU and item.stamp_ns >= first:
-                held = held or item.message
-                item = Item(item.stamp_ns, item.topic, make(copy(item.message), held))
             found.append(item)
         return tuple(found)
 
