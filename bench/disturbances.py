@@ -156,10 +156,20 @@ def inertial(at: float, make: Made) -> Change:
     return replaced(IMU, at, make)
 
 
-def frozen_sensor(message: Any, held: Any) -> Any:
-    """A sensor that repeats what it said at first."""
-    message.voltage, message.current = held.voltage, held.current
-    return message
+def repeating(*fields: str) -> Made:
+    """A sensor's driver that goes on with the last reading."""
+
+    def make(message: Any, held: Any) -> Any:
+        for field in fields:
+            setattr(message, field, getattr(held, field))
+        return message
+
+    return make
+
+
+FROZEN_SENSOR = repeating("voltage", "current")
+REPEATING_GYRO = repeating("angular_velocity")
+REPEATING_IMU = repeating("angular_velocity", "linear_acceleration")
 
 
 def absurd(message: Any, _: Any) -> Any:
@@ -207,19 +217,6 @@ def begun_anew_each_turn() -> Change:
         return tuple(found)
 
     return change
-
-
-def repeating_imu(message: Any, held: Any) -> Any:
-    """A driver that goes on with the last reading."""
-    message.angular_velocity = held.angular_velocity
-    message.linear_acceleration = held.linear_acceleration
-    return message
-
-
-def repeating_gyro(message: Any, held: Any) -> Any:
-    """The same of the gyro alone."""
-    message.angular_velocity = held.angular_velocity
-    return message
 
 
 def zeros_of_imu(message: Any, _: Any) -> Any:

@@ -30,7 +30,7 @@ from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.model.ticks import to_ns
-from tomr_power_model.robot import WHEELS, Robot, shipped_robot
+from tomr_power_model.robot import WHEELS, shipped_robot
 from tomr_sim_bridge.plant.samples import command_sample
 from tomr_sim_bridge.plant.simulation import Simulation
 
@@ -61,10 +61,6 @@ class Ending:
     leap: float = 0.0  # of all stamps in the middle of the fault
 
 
-def _robot() -> Robot:
-    return shipped_robot("reference")
-
-
 def random_ending(fault: str, seed: int, leap: float = 0.0) -> Ending:
     """A fault's end at a moment that depends on the seed alone."""
     random = np.random.default_rng(seed)
@@ -76,7 +72,7 @@ def random_ending(fault: str, seed: int, leap: float = 0.0) -> Ending:
 
 def said_of(ending: Ending) -> tuple[Said, list[ResidualFrame]]:
     """What each decision of a drive with a fault says, and what all are made of."""
-    robot = _robot()
+    robot = shipped_robot("reference")
     simulation = Simulation(robot, ending.seed, start_ns=ending.begin_ns)
     pipeline = Pipeline(robot, DiagnosisSettings.of({}, ""))
     topics = {item.topic for item in pipeline.inputs}
@@ -112,7 +108,8 @@ def said_of(ending: Ending) -> tuple[Said, list[ResidualFrame]]:
 
 def accusing(frames: Sequence[ResidualFrame], begin_ns: int) -> bool:
     """Whether a classifier that begins at a stamp names a fault."""
-    classifier = FaultClassifier.of(DiagnosisSettings.of({}, "").classifier, _robot())
+    settings = DiagnosisSettings.of({}, "").classifier
+    classifier = FaultClassifier.of(settings, shipped_robot("reference"))
     found = [classifier.classify(frame) for frame in frames if frame.stamp_ns >= begin_ns]
     return any(d.state.name not in FAULTLESS for d in found if d is not None)
 

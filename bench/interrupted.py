@@ -25,7 +25,10 @@ from typing import Any
 import numpy as np
 from attrs import frozen
 from disturbances import (
+    FROZEN_SENSOR,
     IMU,
+    REPEATING_GYRO,
+    REPEATING_IMU,
     START_NS,
     STREAMS,
     Change,
@@ -36,14 +39,11 @@ from disturbances import (
     both,
     dead,
     disobeyed,
-    frozen_sensor,
     inertial,
     leap,
     loss,
     pause,
     power,
-    repeating_gyro,
-    repeating_imu,
     scatter,
     unplugged,
     unseen,
@@ -133,7 +133,7 @@ def cases(placements: int) -> Iterator[Case]:
         yield Case("2 % lost, 5 ms, 1 s without power", worn, seed=seed)
     for at in places[::3]:
         for wheel in range(3):
-            yield Case("power frozen", power(wheel, at, frozen_sensor), true=POWER_SENSOR[wheel])
+            yield Case("power frozen", power(wheel, at, FROZEN_SENSOR), true=POWER_SENSOR[wheel])
             yield Case("power reads zero", power(wheel, at, dead), true=POWER_SENSOR[wheel])
             yield Case("one sample of 1e30 V", power(wheel, at, absurd, 0.015))
             yield Case("1e30 V for good", power(wheel, at, absurd), true=POWER_SENSOR[wheel])
@@ -143,8 +143,8 @@ def cases(placements: int) -> Iterator[Case]:
 def of_imu(places: Sequence[float]) -> Iterator[Case]:
     """An IMU that dies at some times [s]."""
     kinds = {
-        "IMU repeats itself": repeating_imu,
-        "gyro repeats itself": repeating_gyro,
+        "IMU repeats itself": REPEATING_IMU,
+        "gyro repeats itself": REPEATING_GYRO,
         "IMU reads zero": zeros_of_imu,
     }
     for kind, make in kinds.items():

@@ -17,6 +17,8 @@ sys.path.append(str(ROOT / "bench"))
 
 import disturbances
 from disturbances import (
+    REPEATING_GYRO,
+    REPEATING_IMU,
     START_NS,
     STREAMS,
     Change,
@@ -32,8 +34,6 @@ from disturbances import (
     loss,
     pause,
     power,
-    repeating_gyro,
-    repeating_imu,
     scatter,
     unseen,
     zeros_of_imu,
@@ -104,7 +104,7 @@ def test_angles_that_begin_anew_each_turn_make_no_difference() -> None:
     assert [d.state for d in states(turned)] == [d.state for d in states(square)]
 
 
-@pytest.mark.parametrize("make", [repeating_imu, repeating_gyro, zeros_of_imu])
+@pytest.mark.parametrize("make", [REPEATING_IMU, REPEATING_GYRO, zeros_of_imu])
 def test_an_imu_that_dies_accuses_nobody(make: Callable[[Any, Any], Any]) -> None:
     """While the robot winds, so that what a dead one says soon is wrong."""
     winds = (item for item in recorded(WINDING, 100, True) if item.stamp_ns < START_NS + 14e9)

@@ -150,6 +150,16 @@ def test_one_that_repeats_itself_while_wheels_speed_up_and_slow_down_is_not_beli
     assert not any(pair[0].missing for at, pair in found.items() if 200 < at < 4000 or at > 5500)
 
 
+def test_readings_of_before_a_leap_hide_no_repeats() -> None:
+    watch = AccelerometerWatch(50 * MS, 3)
+    watch.add(60_000 * MS, (0.1, 0.2, GRAVITY))
+    watch.clear()
+    for at_ms in range(50, 4000, 50):
+        watch.add(at_ms * MS, (0.1, 0.2, GRAVITY))
+        x, _ = watch.residuals(at_ms * MS, twist(1e-3 * at_ms), BANDS, is_well=True)
+    assert x.missing == IMU_REPEATS
+
+
 def test_an_accelerometer_without_noise_repeats_itself_as_the_motion_does() -> None:
     def straight(time: float) -> np.ndarray:
         return twist(time) * [1.0, 0.0, 0.0]

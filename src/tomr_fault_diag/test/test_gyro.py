@@ -222,6 +222,17 @@ def test_readings_of_before_a_leap_hide_no_repeats() -> None:
     assert last.missing == IMU_REPEATS
 
 
+def test_a_gyro_that_died_while_the_robot_stood_is_found_once_it_moves() -> None:
+    watch, random, found = GyroWatch(50 * MS, 3), np.random.default_rng(1), {}
+    for at_ms in range(0, 4000, 10):
+        watch.add(BASE + at_ms * MS, 0.01 if at_ms > 2000 else random.normal(0.0, 0.01))
+        wheels = max(0.0, 1e-3 * at_ms - 3.0)
+        tick, moves = BASE + at_ms * MS, wheels > 0.0
+        found[at_ms] = watch.residual(tick, wheels, BandSettings(), moves=moves).missing
+    assert IMU_REPEATS not in {why for at_ms, why in found.items() if at_ms < 3000}
+    assert {why for at_ms, why in found.items() if at_ms > 3500} == {IMU_REPEATS}
+
+
 def test_a_bus_that_answers_with_zeros_measures_nothing() -> None:
     """And says so."""
     stage, reading = ResidualStage(ROBOT, ResidualSettings()), SupplyReading.rounded(24.0, 0.4)

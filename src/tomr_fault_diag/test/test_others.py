@@ -17,6 +17,9 @@ WORKING = IDLE + np.array([3.0, -2.0, 0.0])  # W
 FAR = np.array([2.0, -2.0, 0.1])  # rad/s
 
 
+Part = tuple[int, np.ndarray, np.ndarray, np.ndarray]
+
+
 def frame(at: int, off: np.ndarray, drawn: np.ndarray, beside: np.ndarray) -> ResidualFrame:
     """A tick: speeds off [rad/s], power drawn [W], and what it is off that of the encoders [W]."""
     motors = [Residual(value, 2.0, 0.0) for value in drawn.tolist()]
@@ -25,13 +28,14 @@ def frame(at: int, off: np.ndarray, drawn: np.ndarray, beside: np.ndarray) -> Re
     return ResidualFrame(10**18 + at * TICK, (Residual(0.0, 2.0, 20.0), *motors, *speeds, *derived))
 
 
-def found(
-    *parts: tuple[int, np.ndarray, np.ndarray, np.ndarray], watch: OthersWatch | None = None
-) -> list[int]:
-    """Ticks at which others are obeyed, of some like each part."""
-    watch = watch or OthersWatch(IDLE.tolist())
-    ticks = [part[1:] for part in parts for _ in range(part[0])]
-    return [at for at, (off, *rest) in enumerate(ticks) if watch.take(frame(at, off, *rest))]
+def found(*parts: Part) -> list[int]:
+    """Ticks at which others are obeyed, of so many like each part."""
+    watch, said = OthersWatch(), []
+    for off, drawn, beside in (part[1:] for part in parts for _ in range(part[0])):
+        derived = [Residual(value, BAND, 0.0) for value in beside.tolist()]
+        now = 10**18 + len(said) * TICK
+        said.append(watch.take(now, np.abs(off) > 0.6, drawn - IDLE, derived))
+    return [at for at, is_said in enumerate(said) if is_said]
 
 
 FITS = np.array([0.5, -0.5, 0.0])
@@ -70,6 +74,11 @@ def test_a_wheel_that_turns_as_asked_by_chance_is_no_end() -> None:
 def test_a_motor_that_worked_is_remembered_for_a_moment() -> None:
     """Its power passes that of an idle one where the wheel turns round: 0.7 s, and the pause."""
     assert found((6, FAR, WORKING, FITS), (30, FAR, IDLE, FITS)) == list(range(10, 23))
+
+
+def test_one_that_worked_otherwise_than_its_wheel_shows_is_not() -> None:
+    off = np.array([0.5, 1.1, 0.0])
+    assert found((1, FAR, WORKING, off), (12, FAR, IDLE, FITS)) == []
 
 
 def test_the_robot_is_said_not_to_follow() -> None:

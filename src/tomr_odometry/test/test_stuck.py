@@ -3,8 +3,10 @@
 import math
 
 import numpy as np
+import pytest
 
 from tomr_odometry.stuck import StuckImu
+from tomr_power_model.messages.intake import Triple
 
 MS = 1_000_000
 SPEED = np.array([0.2, -0.1, -0.1])  # m/s, of the rims
@@ -20,11 +22,13 @@ def test_one_that_reads_zero_says_nothing() -> None:
     assert not watch().take(MS, (math.nan, math.nan, 0.0, 0.0, 0.0, 0.0))
 
 
-def test_one_that_repeats_itself_does_once_the_wheels_twist_has_changed() -> None:
+@pytest.mark.parametrize("force", [(0.0, 0.0, 9.8), (math.nan,) * 3], ids=["", "gyro alone"])
+def test_one_that_repeats_itself_does_once_the_wheels_twist_has_changed(force: Triple) -> None:
     imu = watch()
     found = []
     for at in range(0, 1000, 10):
-        said = imu.take(at * MS, (0.0, 0.0, 0.1, 0.0, 0.0, 9.8))
+        values = [0.0 + value for value in force]  # NaN, but never the same
+        said = imu.take(at * MS, (0.0, 0.0, 0.1, *values))
         now = imu.look(at * MS, SPEED * (1.0 + 0.002 * at))
         found.append((at, said, now))
     at = next(at for at, _, now in found if now)

@@ -24,7 +24,7 @@ class StuckImu:
     def __init__(self, to_twist: NDArray[np.float64]) -> None:
         """`to_twist`: (3, n), from the rims' speeds to the body's twist."""
         self._to_twist = to_twist
-        self._watch = RepeatWatch(_REPEATS, is_inertial=True)
+        self._watch = RepeatWatch(_REPEATS)
         self._looked = 0  # ns
         self._is_stuck = False
 

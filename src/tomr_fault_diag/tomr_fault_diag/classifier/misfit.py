@@ -4,6 +4,7 @@ The classifier weighs known states against each other, so something else can loo
 These rules ask nothing but the residuals themselves.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,6 +13,7 @@ from attrs import frozen
 from tomr_fault_diag.classifier.braking import BrakingWatch
 from tomr_fault_diag.classifier.others import OthersWatch
 from tomr_fault_diag.residuals.frame import (
+    ENCODERS,
     MOTORS,
     RESIDUALS,
     SPEEDS,
@@ -21,6 +23,7 @@ from tomr_fault_diag.residuals.frame import (
     measured_speed,
 )
 from tomr_power_model.model.ticks import to_ns
+from tomr_power_model.robot import WHEELS
 
 _TURNING = 0.5  # rad/s: a wheel that is expected to turn
 _STANDING = 0.2  # of the expected speed: a slower wheel does not follow
@@ -58,17 +61,16 @@ class MisfitWatch:
     def __init__(self, idle: Sequence[float] = (), braking: BrakingWatch | None = None) -> None:
         """`idle`: what each motor draws that is not driven, in the unit of its residual; without
         `braking` a robot that ignores its commands is known once it stands."""
-        self._idle = tuple(idle)
+        self._idle = np.array(idle or [math.nan] * WHEELS)
         self._braking = braking
-        self._others = OthersWatch(self._idle) if self._idle else None
+        self._others = OthersWatch()
         self.clear()
 
     def clear(self) -> None:
         """Forget what was seen."""
         if self._braking is not None:
             self._braking.clear()
-        if self._others is not None:
-            self._others.clear()
+        self._others.clear()
         self._halting_since: int | None = None
         self._unpowered_since: int | None = None
         self._far_since: dict[int, int] = {}
@@ -92,42 +94,40 @@ class MisfitWatch:
         self._far_since = {index: self._far_since.get(index, now) for index in far}
         is_low = frame.supply < low_supply + (_MORE if self._low_since is not None else 0.0)
         self._low_since = _since(self._low_since, now, holds=is_low)  # not where it is not known
-        # Drivers that lack voltage do not drive, either.
-        unpowered = not is_low and self._is_unpowered(frame, speeds)
-        self._unpowered_since = _since(self._unpowered_since, now, holds=unpowered)
+        strays = self._strays(frame, speeds, is_low=is_low)
         far_since = min(self._far_since.values(), default=now)
         stands = ignores and _lasts(self._halting_since, now, _IGNORED_FOR)
-        brakes, obeys_others = self._brakes(now, speeds), self._obeys_others(frame)
         return Misfit(
             ignores,
-            stands or brakes or obeys_others or _lasts(self._unpowered_since, now, _IGNORED_FOR),
+            stands or strays,
             now - far_since >= _FAR_FOR,
             now - far_since >= _FAR_LONG,
             _lasts(self._low_since, now, _LOW_FOR),
         )
 
-    def _brakes(self, now: int, speeds: list[Residual]) -> bool:
-        """Whether it brakes to a halt that it is not asked for."""
+    def _strays(self, frame: ResidualFrame, speeds: list[Residual], *, is_low: bool) -> bool:
+        """Whether it brakes unasked, has not been driven for long, or obeys others."""
+        now, motors = frame.stamp_ns, [frame.residuals[index] for index in MOTORS]
+        astray = np.array([is_far(item) for item in speeds])
+        far = int(np.count_nonzero(astray))
+        beyond = np.array([item.modelled + item.residual for item in motors]) - self._idle
+        bands = np.array([item.band for item in motors])
+        is_idle = bool((np.abs(beyond) < _IDLE * bands).all())  # false where anything is NaN
+        # Drivers that lack voltage do not drive, either.
+        unpowered = is_idle and not is_low and far >= _AT_LEAST
+        self._unpowered_since = _since(self._unpowered_since, now, holds=unpowered)
+        is_unpowered = _lasts(self._unpowered_since, now, _IGNORED_FOR)
+        brakes = self._brakes(now, speeds, far)
+        derived = [frame.residuals[index] for index in ENCODERS]
+        return self._others.take(now, astray, beyond, derived) or brakes or is_unpowered
+
+    def _brakes(self, now: int, speeds: list[Residual], far: int) -> bool:
+        """Whether it brakes to a halt that it is not asked for; `far`: wheels that are far off."""
         if self._braking is None:
             return False
         measured = np.array([measured_speed(item) for item in speeds])
         expected = np.array([item.modelled for item in speeds])
-        far = sum(is_far(item) for item in speeds)
         return self._braking.take(now, measured, expected, far)
-
-    def _obeys_others(self, frame: ResidualFrame) -> bool:
-        """Whether it does what is asked of it by commands that are not known."""
-        return self._others is not None and self._others.take(frame)
-
-    def _is_unpowered(self, frame: ResidualFrame, speeds: list[Residual]) -> bool:
-        """Whether no motor is driven, and wheels therefore turn otherwise than they should."""
-        motors = [frame.residuals[index] for index in MOTORS]
-        drawn = [item.modelled + item.residual for item in motors]
-        is_idle = len(self._idle) == len(motors) and all(
-            abs(power - idle) < _IDLE * item.band  # false where anything is NaN
-            for power, idle, item in zip(drawn, self._idle, motors, strict=True)
-        )
-        return is_idle and sum(is_far(item) for item in speeds) >= _AT_LEAST
 
 
 def _since(before: int | None, now: int, *, holds: bool) -> int | None:

@@ -12,21 +12,22 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, ResidualFrame
+from tomr_fault_diag.residuals.frame import Residual
 from tomr_power_model.model.ticks import NEVER, to_ns
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 @frozen
 class OthersSettings:
-    """When commands count as another's. A band is what the residual of a healthy robot leaves
-    open."""
+    """When commands count as another's. A band is what the power of a healthy motor beside its
+    encoder leaves open."""
 
-    far: float = 3.0  # bands, by which a speed is off
-    fits: float = 1.0  # band, within which power goes with the encoders
-    works: float = 1.0  # bands of that, by which a motor draws otherwise than one that is idle, ...
-    seen: int = 1  # ... of so many wheels, of ...
-    wheels: int = 2  # ... so many that are far off
-    lately: int = to_ns(0.7)  # within which a motor was seen to work
+    wheels: int = 2  # that turn far otherwise than asked
+    fits: float = 1.0  # band, within which power goes with the encoders, ...
+    works: float = 1.0  # ... and by which such a wheel's motor draws otherwise than an idle one
+    lately: int = to_ns(0.7)  # within which one was seen to
     pauses: int = to_ns(0.15)  # that say nothing: where a wheel turns as asked by chance
     lasts: int = to_ns(0.5)
 
@@ -34,37 +35,31 @@ class OthersSettings:
 class OthersWatch:
     """Looks at one tick after the other."""
 
-    def __init__(self, idle: Sequence[float], settings: OthersSettings | None = None) -> None:
-        """`idle`: what each motor draws that is not driven, in the unit of its residual."""
-        self._idle = np.array(idle)
+    def __init__(self, settings: OthersSettings | None = None) -> None:
         self.settings = settings or OthersSettings()
         self.clear()
 
     def clear(self) -> None:
         """Forget what was seen."""
-        self._worked = np.full(len(self._idle), NEVER)  # ns, when each was last seen to
-        self._since, self._held = NEVER, NEVER  # ns
+        # When a motor was last seen to work, since when others are obeyed, and until when [ns].
+        self._worked = self._since = self._held = NEVER
 
-    def take(self, frame: ResidualFrame) -> bool:
-        """Whether the newest tick and those before show that others are obeyed."""
-        now, s = frame.stamp_ns, self.settings
-        speeds, bands, _ = _of(frame, SPEEDS)
-        is_far = np.abs(speeds) > s.far * bands  # false where either is NaN
-        off, widths, _ = _of(frame, ENCODERS)
-        drawn = np.sum(_of(frame, MOTORS)[::2], axis=0)
-        fits = bool((np.abs(off) < s.fits * widths).all())
-        works = is_far & (np.abs(drawn - self._idle) > s.works * widths)
-        self._worked[works & fits] = now
-        seen = np.count_nonzero(self._worked >= now - s.lately)
-        if fits and np.count_nonzero(is_far) >= s.wheels and seen >= s.seen:
+    def take(self, now: int, astray: Flags, beyond: Array, derived: Sequence[Residual]) -> bool:
+        """Whether a tick [ns] and those before show that others are obeyed.
+
+        `astray`: wheels that turn far otherwise than asked; `beyond`: what their motors draw beyond
+        an idle one's, (3,) each; `derived`: of the power beside the encoders', in the same unit.
+        """
+        s = self.settings
+        bands = np.array([item.band for item in derived])
+        off = np.array([item.residual for item in derived])
+        fits = bool((np.abs(off) < s.fits * bands).all())  # false where anything is NaN
+        if fits and (astray & (np.abs(beyond) > s.works * bands)).any():
+            self._worked = now
+        is_seen = self._worked >= now - s.lately
+        if fits and is_seen and np.count_nonzero(astray) >= s.wheels:
             self._since = now if self._since == NEVER else self._since
             self._held = now
         elif now - self._held > s.pauses:
             self._since = NEVER
         return self._since != NEVER and now - self._since >= s.lasts
-
-
-def _of(frame: ResidualFrame, channels: Sequence[int]) -> NDArray[np.float64]:
-    """Residuals, bands and what is modelled, (3, n)."""
-    rows = [frame.residuals[index] for index in channels]
-    return np.array([[row.residual, row.band, row.modelled] for row in rows]).T

@@ -58,7 +58,7 @@ class AccelerometerWatch:
         self._samples: deque[tuple[int, Force]] = deque(maxlen=_KEPT)
         self._twists: deque[tuple[int, Array]] = deque(maxlen=1 + self._window // period_ns)
         self._recent: deque[Array] = deque(maxlen=lately)
-        self._repeats = RepeatWatch(_REPEATS, is_inertial=True)
+        self._repeats = RepeatWatch(_REPEATS)
         self._agreed, self._is_doubted = _AGREED, False  # ns so far, and whether it ever ran out
         self._bias, self._count = np.zeros(2), 0.0  # m/s^2, ticks
         self.clear()

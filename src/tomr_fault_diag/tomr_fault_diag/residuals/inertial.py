@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomr_fault_diag.residuals.accelerometer import AccelerometerWatch, Force, Pair
-from tomr_fault_diag.residuals.frame import IMU_REPEATS, Residual
+from tomr_fault_diag.residuals.frame import IMU_REPEATS, Residual, ResidualFrame
 from tomr_fault_diag.residuals.gyro import GyroWatch
 from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.model.continuity import POWER_TOLERANCE, Continuity
@@ -22,7 +22,6 @@ class InertialWatch:
         self._gyro = GyroWatch(period_ns, lately)
         self._accelerometer = AccelerometerWatch(period_ns, lately)
         self._flow = Continuity(POWER_TOLERANCE)
-        self._ailment = ""
 
     def leap(self) -> None:
         """Forget all samples where the stamps leap."""
@@ -54,11 +53,11 @@ class InertialWatch:
         show, (3,); `moves`: whether any turns, `is_well`: whether all is within the bands."""
         yaw = self._gyro.residual(tick_ns, float(twist[2]), bands, moves=moves)
         along = self._accelerometer.residuals(tick_ns, twist, bands, is_well=is_well)
-        repeats = IMU_REPEATS in (yaw.missing, along[0].missing)
-        self._ailment = IMU_REPEATS.removeprefix(f"{IMU} ") if repeats else ""
         return yaw, along
 
-    def states(self, tick_ns: int) -> list[InputState]:
-        """What is to be said of the stream, if there was one: a robot need not have an IMU."""
-        has_one = self._flow.last(tick_ns) > 0
-        return [InputState(IMU, self._flow, self._ailment)] if has_one else []
+    def states(self, tick_ns: int, frame: ResidualFrame) -> list[InputState]:
+        """What is to be said of the stream at a tick, if there was one: a robot need not have an
+        IMU."""
+        repeats = IMU_REPEATS in (frame.yaw.missing, frame.along[0].missing)
+        ailment = IMU_REPEATS.removeprefix(f"{IMU} ") if repeats else ""
+        return [InputState(IMU, self._flow, ailment)] if self._flow.last(tick_ns) else []

@@ -212,7 +212,7 @@ class ResidualStage:
                 found.append(InputState(f"{topic}/power", self._flows[wheel], ailment))
         if self._robot.measurement.total == TOTAL_TOPIC:
             found.append(InputState(TOTAL_TOPIC, self._flows[TOTAL]))
-        found += self._inertial.states(tick)
+        found += self._inertial.states(tick, frame)
         return found
 
     def _arrive(self, stream: str, stamp_ns: int) -> Arrival:
