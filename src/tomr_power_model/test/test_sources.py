@@ -59,6 +59,24 @@ def test_a_battery_state_has_power_only_with_its_own_voltage(
     assert same(found, 1, 7, power, 0.5, voltage)
 
 
+@pytest.mark.parametrize("reading", [0.5, -0.5])
+def test_a_magnitude_may_have_either_sign(reading: float) -> None:
+    def unsigned(source: str, quantity: str = "power") -> Robot:
+        given = robot(source, quantity)
+        return evolve(given, measurement=evolve(given.measurement, signed=False))
+
+    (found,) = motor_topics(unsigned("battery_state"))[1].read(battery(24.0, reading), 9)
+    assert same(found, 1, 7, 12.0, 0.5, 24.0)
+    array = bag_message(MULTI_ARRAY, data=[reading, 0.0, 0.0])
+    (powers,) = motor_topics(unsigned("multi_array"))
+    assert same(next(powers.read(array, 9)), 0, 9, 0.5, NAN, NAN)
+    efforts = bag_message(
+        JOINT_STATE, header=bag_header(7), name=REFERENCE.wheel_names, effort=[reading, NAN, NAN]
+    )
+    (currents,) = motor_topics(unsigned("joint_effort", "motor_current"))
+    assert same(next(currents.read(efforts, 9)), 0, 7, NAN, 0.5, NAN)
+
+
 def test_an_array_holds_powers_or_currents() -> None:
     message = bag_message(MULTI_ARRAY, data=[1.0, -2.0, 3.0, 99.0])
     (powers,) = motor_topics(robot("multi_array"))

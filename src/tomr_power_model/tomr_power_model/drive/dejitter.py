@@ -14,9 +14,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_FEWEST = 10  # stamps
+_FEWEST = 10  # stamps, in all and for each phase
 _SCATTER = 0.35  # of a period: stamps that scatter wider have no grid
+_MOST = 0.95  # of the stamps scatter no wider; the others are late
 _GAP = 5.5  # periods: after a longer silence the driver may have started afresh
+UNSETTLED = 2  # late stamps in a row that shift no phase: of the newest it does not show yet
+_SHIFT = 4.0  # standard deviations of the stamps that a phase shifts by at least
+_LEAST_SHIFT = 0.02  # of a period
+_NORMAL = 1.4826  # standard deviation over median magnitude
 _MOVING = 0.3  # rad/s: the single counts of a slower wheel show nothing
 _ENOUGH = 30  # samples in motion that it takes to decide
 _HALF = 0.5  # between stamps that are right (0) and a grid that is (1)
@@ -29,20 +34,19 @@ class Grid:
 
     times: Array  # (n,)
     period: float
+    reach: float  # s: a stamp farther off the grid is late, or the phase has shifted
 
     def nearest(self, stamp: float) -> float:
-        """The grid's time for a further stamp near its end; the stamp if it is not of this grid."""
-        since = stamp - float(self.times[-1])
-        number = round(since / self.period)
-        if abs(since - number * self.period) > _SCATTER * self.period:
-            return stamp
-        return float(self.times[-1]) + number * self.period
+        """The grid's time for a further stamp near its end."""
+        last = float(self.times[-1])
+        return last + round((stamp - last) / self.period) * self.period
 
 
 def grid_of(stamps: Array) -> Grid | None:
     """The grid around which stamps scatter; None if there is none.
 
-    One period for all of them; after each gap a phase of its own.
+    One period for all of them; a phase of its own after each gap, and after each shift that lasts:
+    a loop that sleeps for its period goes on later once it has been late.
 
     Args:
         stamps: rising [s], (n,).
@@ -51,10 +55,13 @@ def grid_of(stamps: Array) -> Grid | None:
         return None
     steps = np.diff(stamps)
     period = float(np.median(steps))
-    segment = np.concatenate([[0], np.cumsum(steps > _GAP * period)])
+    reach = _reach(steps / period)
+    segment = np.concatenate([[0], np.cumsum(_is_shift(steps / period, reach))])
+    if _FEWEST * (segment[-1] + 1) > len(stamps):
+        return None
     count = np.bincount(segment)
     for _ in range(2):
-        forward = np.where(np.diff(segment) > 0, 0.0, np.maximum(np.round(steps / period), 1.0))
+        forward = np.where(np.diff(segment) > 0, 0.0, _forward(steps / period, reach))
         number = np.concatenate([[0.0], np.cumsum(forward)])
         middle, mean = (
             (np.bincount(segment, weights=values) / count)[segment] for values in (number, stamps)
@@ -64,9 +71,29 @@ def grid_of(stamps: Array) -> Grid | None:
             return None
         period = float(((number - middle) * (stamps - mean)).sum()) / spread
     times = mean + period * (number - middle)
-    if float(np.quantile(np.abs(stamps - times), 0.99)) > _SCATTER * period:
+    if float(np.quantile(np.abs(stamps - times), _MOST)) > _SCATTER * period:
         return None
-    return Grid(times, period)
+    return Grid(times, period, reach * period)
+
+
+def _reach(steps: Array) -> float:
+    """How far stamps scatter at most [periods], from their steps [periods]."""
+    off = np.abs(steps - np.maximum(np.round(steps), 1.0))
+    deviation = _NORMAL * float(np.median(off)) / np.sqrt(2.0)
+    return float(np.clip(_SHIFT * deviation, _LEAST_SHIFT, _SCATTER))
+
+
+def _forward(steps: Array, reach: float) -> Array:
+    """Whole periods between samples, from their stamps' steps [periods]: stamps come late."""
+    return np.asarray(np.maximum(np.floor(steps + reach), 1.0))
+
+
+def _is_shift(steps: Array, reach: float) -> NDArray[np.bool_]:
+    """Whether another phase begins with the stamp after each step [periods]."""
+    phase = np.concatenate([[0.0], np.cumsum(steps - _forward(steps, reach))])
+    padded = np.pad(phase, UNSETTLED, mode="reflect")
+    lasting = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * UNSETTLED + 1), axis=1)
+    return np.asarray((np.abs(np.diff(lasting)) > reach) | (steps > _GAP))
 
 
 def even(stamps: Array) -> Array:

@@ -289,7 +289,8 @@ def _wrong_sign(item: Drive, robot: Robot) -> Iterator[Finding]:
                 float(time[0]),
                 float(time[-1]),
                 f"it draws {np.median(power[moving]):.2f} while it turns",
-                "BatteryState.current must be negative while power is drawn; mend the driver",
+                "BatteryState.current must be negative while power is drawn; mend the driver, "
+                "or set measurement.signed: false if the sensor gives magnitudes",
             )
 
 

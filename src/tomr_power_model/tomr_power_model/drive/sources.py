@@ -87,16 +87,26 @@ def total_topics(robot: Robot) -> tuple[PowerTopic, ...]:
     return (PowerTopic(TOTAL_TOPIC, BATTERY, read),)
 
 
+def _as_given(value: float) -> float:
+    return value
+
+
+def _way_of(robot: Robot) -> Callable[[float], float]:
+    """What a motor draws, from a reading; of a sensor that gives magnitudes with either sign."""
+    return _as_given if robot.measurement.signed else abs
+
+
 @source("battery_state")
 def battery_states(robot: Robot) -> tuple[PowerTopic, ...]:
     """One BatteryState per motor on `<wheel>/power`."""
-    is_power = robot.measurement.quantity == "power"
+    is_power, way = robot.measurement.quantity == "power", _way_of(robot)
 
     def reader(wheel: int) -> Callable[[Any, int], Iterator[PowerReading]]:
         def read(message: Any, receive_ns: int) -> Iterator[PowerReading]:
             voltage, current = battery_of(message)
-            power = -voltage * current if is_power else NAN
-            yield PowerReading(wheel, stamp_of(message, receive_ns), power, -current, voltage)
+            drawn = way(-current)
+            power = voltage * drawn if is_power else NAN
+            yield PowerReading(wheel, stamp_of(message, receive_ns), power, drawn, voltage)
 
         return read
 
@@ -109,11 +119,11 @@ def battery_states(robot: Robot) -> tuple[PowerTopic, ...]:
 @source("multi_array")
 def multi_array(robot: Robot) -> tuple[PowerTopic, ...]:
     """One Float64MultiArray: motor powers [W] drawn, or currents [A] if so compared."""
-    is_power = robot.measurement.quantity == "power"
+    is_power, way = robot.measurement.quantity == "power", _way_of(robot)
 
     def read(message: Any, receive_ns: int) -> Iterator[PowerReading]:
         for wheel, value in enumerate(numbers_of(message, WHEELS)[:WHEELS]):
-            power, current = (value, NAN) if is_power else (NAN, value)
+            power, current = (way(value), NAN) if is_power else (NAN, way(value))
             yield PowerReading(wheel, receive_ns, power, current, NAN)
 
     return (PowerTopic(ARRAY_TOPIC, MULTI_ARRAY, read),)
@@ -122,13 +132,13 @@ def multi_array(robot: Robot) -> tuple[PowerTopic, ...]:
 @source("joint_effort")
 def joint_effort(robot: Robot) -> tuple[PowerTopic, ...]:
     """`JointState.effort` of the wheels as motor current [A], with the encoders."""
-    wheels = WheelFinder(robot.wheel_names)
+    wheels, way = WheelFinder(robot.wheel_names), _way_of(robot)
 
     def read(message: Any, receive_ns: int) -> Iterator[PowerReading]:
         stamp = stamp_of(message, receive_ns)
         for wheel, current in enumerate(wheels.read(message).effort):
             if current == current:  # not NaN
-                yield PowerReading(wheel, stamp, NAN, current, NAN)
+                yield PowerReading(wheel, stamp, NAN, way(current), NAN)
 
     return (PowerTopic(ENCODER_TOPIC, JOINT_STATE, read),)
 

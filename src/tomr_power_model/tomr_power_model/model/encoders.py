@@ -11,7 +11,7 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.drive.dejitter import Grid, grid_of, is_jitter
+from tomr_power_model.drive.dejitter import UNSETTLED, Grid, grid_of, is_jitter
 from tomr_power_model.model.continuity import ENCODER_TOLERANCE, Continuity
 
 Array = NDArray[np.float64]
@@ -21,6 +21,7 @@ _LEAST = 50
 _EVERY = 25  # samples: how often
 LONG_S = 0.2  # of the fit beside a simulation
 _FIT = 5  # samples that it takes
+_STEADY = 4  # samples before a new one that show how fast the wheels turn
 _PART = 50_000_000  # ns of a window for which a fit stands
 _ALONE = 3.0  # times as far as the others' does the angle of one wheel scatter that is at fault
 _FREE = 2  # more samples than unknowns, to show how they scatter
@@ -75,6 +76,8 @@ class RecentStamps:
         self._jitter = False
         self._grid: Grid | None = None
         self._origin = 0  # of the grid [ns]
+        self._shift = 0  # of the phase since the grid was fitted [ns]
+        self._times: dict[int, int] = {}  # of the samples [ns], where stamps jitter
         self.resolution = 0.0  # of the angles, as they show it [rad]; 0 where they have not moved
 
     def add(self, stamp_ns: int, position: Triple) -> None:
@@ -83,26 +86,62 @@ class RecentStamps:
         self._count += 1
         if self._count % _EVERY == 0 and len(self._samples) >= _LEAST:
             self._look()
+        elif self._grid is not None:
+            self._times[stamp_ns] = self._time(self._grid, -1)
 
     def times(self, stamps_ns: list[int]) -> list[int]:
         """When samples with such stamps were taken [ns]: the stamps, where they can be trusted."""
-        if self._grid is None:
-            return stamps_ns
-        seconds = [1e-9 * (stamp - self._origin) for stamp in stamps_ns]
-        times = [self._origin + round(1e9 * self._grid.nearest(stamp)) for stamp in seconds]
+        times = [self._times.get(stamp, stamp) for stamp in stamps_ns]
         return times if len(set(times)) == len(times) else stamps_ns
+
+    def _time(self, grid: Grid, number: int) -> int:
+        """When one of the newest samples was taken [ns]: on the grid, or that has shifted.
+
+        A stamp off the grid is late, or right; how far the wheels have turned tells which.
+        """
+        stamp = self._samples[number][0]
+        origin = self._origin + self._shift
+        nearest = origin + round(1e9 * grid.nearest(1e-9 * (stamp - origin)))
+        if abs(stamp - nearest) <= 1e9 * grid.reach:
+            return nearest
+        before = nearest - round(1e9 * grid.period)
+        last = self._samples[number - 1][0]
+        possible = [time for time in (nearest, before) if time > self._times.get(last, last)]
+        time = min((stamp, *possible), key=lambda time: self._off_steady(number, time))
+        if time == stamp:
+            self._shift += stamp - nearest
+        return time
+
+    def _off_steady(self, number: int, time_ns: int) -> float:
+        """How far the angles of a sample, if taken at a time, are off a steady motion [rad^2]."""
+        first, last, new = (self._samples[number - back] for back in (_STEADY, 1, 0))
+        since, until = self.times([first[0], last[0]])
+        share = (time_ns - until) / (until - since)
+        off = (
+            end - middle - share * (middle - start)
+            for start, middle, end in zip(first[1], last[1], new[1], strict=True)
+        )
+        return sum(angle * angle for angle in off if angle == angle)  # not NaN
 
     def _look(self) -> None:
         positions = np.array([position for _, position in self._samples])
         self._look_at_steps(positions)
-        self._origin = self._samples[0][0]
-        stamps = 1e-9 * np.array([stamp - self._origin for stamp, _ in self._samples])
+        stamps_ns = [stamp for stamp, _ in self._samples]
+        self._origin, self._shift = stamps_ns[0], 0
+        stamps = 1e-9 * (np.array(stamps_ns) - self._origin)
         grid = grid_of(stamps)
         if grid is not None:
             found = is_jitter(stamps, grid, positions)
             # At rest nothing can be seen: what was known stays.
             self._jitter = self._jitter if found is None else found
         self._grid = grid if self._jitter else None
+        self._times = {}
+        if self._grid is None:
+            return
+        times = (self._origin + np.round(1e9 * self._grid.times).astype(np.int64)).tolist()
+        self._times = dict(zip(stamps_ns[:-UNSETTLED], times[:-UNSETTLED], strict=True))
+        for number in range(-UNSETTLED, 0):
+            self._times[stamps_ns[number]] = self._time(self._grid, number)
 
     def _look_at_steps(self, positions: Array) -> None:
         """Whole counts: what steps differ by is one of them at least."""
