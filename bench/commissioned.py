@@ -1,15 +1,16 @@
 """Commissioned robots in MuJoCo whose descriptions lack physics: false alarms, faults, delays.
 
     .venv/bin/python bench/commissioned.py --out DIR [--robots 0 1 2 3] [--hours 1] [--drives 96]
-        [--ramps] [--without-imu]
+        [--ramps] [--without-imu] [--rates 50 10]
 
 Each robot is drawn from three families, every value up to 5 % off its robot.yaml, which besides
 lacks three effects of the vocabulary. It drives the plan of `tomr_commission` twice and a tour that
 is held out, is commissioned on these, and then drives tours with payloads, floors and bumps as in
 bench/diagnosis.py, healthy or with one of the six states' faults, of seeds that nothing else uses.
 With --ramps the healthy tours lead over slopes of up to five degrees most of the time. Robots have
-an IMU unless --without-imu is given, in which case DIR has to be another one. Scored as there, with
-commissioned.yaml. What is done is kept in DIR and not done again.
+an IMU unless --without-imu is given, encoders at 100 Hz and power at 50 Hz unless --rates says
+otherwise; each needs a DIR of its own. Scored as there, with commissioned.yaml. What is done is
+kept in DIR and not done again.
 """
 
 import argparse
@@ -64,6 +65,7 @@ _TOP_SPEED = 0.6  # m/s
 _DRIVE_SECONDS = 18.0  # mean length of a drive, at least
 IMU_TOPIC = "imu/data"
 _NODES = ("power_model", "power_residuals", "fault_classifier")
+Rates = tuple[()] | tuple[float, float]  # of encoders and motor power [Hz]; empty: as usual
 
 
 @frozen
@@ -75,8 +77,8 @@ class Made:
     effects: tuple[str, ...]
 
 
-def made(number: int, folder: Path) -> Made:
-    """Robot `number`; it depends on nothing else."""
+def made(number: int, folder: Path, rates: Rates = ()) -> Made:
+    """Robot `number`; but for what it measures how often, it depends on nothing else."""
     random = np.random.default_rng(seed_of(number, 0))
     drawn = random.choice(len(_HIDDEN), _CONCEALED, replace=False)
     case = Case(f"robot_{number}", "named", tuple(_HIDDEN[k] for k in drawn))
@@ -87,12 +89,18 @@ def made(number: int, folder: Path) -> Made:
     described = folder / "robot.yaml"
     described.write_text(description_text(case, nominal), encoding="utf-8")
     off = every_value(real, lambda value: float(value * random.uniform(1.0 - _OFF, 1.0 + _OFF)))
+    if rates:
+        encoder_rate, power_rate = rates
+        sensors = evolve(off.sensors, encoder_rate=encoder_rate, power_rate=power_rate)
+        off = evolve(off, sensors=sensors)
     return Made(off, described, tuple(item.effect for item in case.effects))
 
 
-def commissioned(number: int, folder: Path, without: tuple[str, ...] = ()) -> dict[str, object]:
+def commissioned(
+    number: int, folder: Path, without: tuple[str, ...] = (), rates: Rates = ()
+) -> dict[str, object]:
     """Record what a commissioning asks for, without some topics, and commission."""
-    robot = made(number, folder)
+    robot = made(number, folder, rates)
     believed = load_robot(robot.described)
     plan = parse_mission(mission_text(believed, _TOP_SPEED), "plan")
     mission = evolve(plan, stamp_jitter=0.0005, floor_friction=0.8)
@@ -140,9 +148,9 @@ def commissioned_kind(folder: Path) -> tuple[Kind, Robot]:
     return Kind(settings.classifier, settings.residuals.bands), load_robot(source)
 
 
-def tour(number: int, folder: Path, seed: int, fault: str | None) -> Drive:
+def tour(number: int, folder: Path, seed: int, fault: str | None, rates: Rates = ()) -> Drive:
     """A drive with bumps of robot `number`, commissioned in a folder; `fault` as another_drive."""
-    real, (_, believed) = made(number, folder).real, commissioned_kind(folder)
+    real, (_, believed) = made(number, folder, rates).real, commissioned_kind(folder)
     chosen = another_drive(Drive(seed, real, believed, load_mission("square")), seed, fault)
     random = np.random.default_rng([seed, 5])
     count = int(random.integers(0, 4))
@@ -164,12 +172,13 @@ class Task:
     folder: Path
     ramps: bool = False
     without: tuple[str, ...] = ()  # topics
+    rates: Rates = ()
 
 
 def scored(task: Task) -> Outcome:
     """How it is diagnosed."""
     kind, believed = commissioned_kind(task.folder)
-    chosen = tour(task.number, task.folder, task.seed, task.fault)
+    chosen = tour(task.number, task.folder, task.seed, task.fault, task.rates)
     if task.ramps:
         chosen = over_ramps(chosen)
     labelled = simulated_drive(chosen, task.without)
@@ -196,13 +205,21 @@ def _main(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--skip", type=int, default=0, help="of each robot's drives with a fault")
     parser.add_argument("--ramps", action="store_true", help="healthy tours lead over ramps")
     parser.add_argument("--without-imu", action="store_true", help="robots that have none")
+    parser.add_argument(
+        "--rates",
+        type=float,
+        nargs=2,
+        default=(),
+        metavar=("ENCODERS", "POWER"),
+        help="messages per second [Hz]",
+    )
     parser.add_argument("--json", type=Path, help="write the report to this file as well")
     options = parser.parse_args(arguments)
-    without = (IMU_TOPIC,) if options.without_imu else ()
+    without, rates = (IMU_TOPIC,) if options.without_imu else (), tuple(options.rates)
     folders = {number: options.out / f"robot_{number}" for number in options.robots}
     robots = []
     for number, folder in folders.items():
-        robots.append(commissioned(number, folder, without))
+        robots.append(commissioned(number, folder, without, rates))
         print(json.dumps(robots[-1]), flush=True)
 
     def tasks(count: int, first: int, fault: str | None, ramps: bool = False) -> list[Task]:
@@ -210,7 +227,7 @@ def _main(arguments: Sequence[str] | None) -> int:
         for index in range(count):
             number, k = options.robots[index % len(folders)], index // len(folders)
             seed = seed_of(number, first + k)
-            found.append(Task(number, seed, fault, folders[number], ramps, without))
+            found.append(Task(number, seed, fault, folders[number], ramps, without, rates))
         return found
 
     healthy = math.ceil(options.hours * 3600.0 / _DRIVE_SECONDS)

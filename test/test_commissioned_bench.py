@@ -36,9 +36,12 @@ def test_a_recording_may_lack_a_topic(tmp_path: Path) -> None:
     assert topics["with"] - topics["without"] == set(IMU)
 
 
-@pytest.mark.parametrize(("given", "without"), [([], ()), (["--without-imu"], IMU)])
+@pytest.mark.parametrize(
+    ("given", "without", "rates"),
+    [([], (), ()), (["--without-imu"], IMU, ()), (["--rates", "50", "10"], (), (50.0, 10.0))],
+)
 def test_robots_are_commissioned_and_driven_alike(
-    tmp_path: Path, given: list[str], without: tuple[str, ...]
+    tmp_path: Path, given: list[str], without: tuple[str, ...], rates: tuple[float, ...]
 ) -> None:
     options = ["--out", str(tmp_path), "--robots", "4", "--drives", "1", "--hours", "0.005", *given]
     with (
@@ -46,7 +49,7 @@ def test_robots_are_commissioned_and_driven_alike(
         patch("commissioned._outcomes", return_value=[]) as outcomes,
     ):
         commissioned._main(options)
-    assert commission.call_args.args[2] == without
+    assert commission.call_args.args[2:] == (without, rates)
     tasks = [task for call in outcomes.call_args_list for task in call.args[1]]
     assert len(tasks) == 2
     kind = (Mock(), shipped_robot("reference"))
@@ -57,7 +60,10 @@ def test_robots_are_commissioned_and_driven_alike(
             pytest.raises(Simulated),
         ):
             commissioned.scored(task)
-        assert simulate.call_args.args[1] == without
+        drive, left_out = simulate.call_args.args
+        assert left_out == without
+        measured = drive.plant.sensors.encoder_rate, drive.plant.sensors.power_rate
+        assert not rates or measured == rates
 
 
 @pytest.mark.parametrize(("given", "without"), [([], ()), (["--without-imu"], IMU)])
