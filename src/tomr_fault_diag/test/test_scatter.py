@@ -74,6 +74,20 @@ def test_a_speed_that_no_wheel_reaches_is_disorder_until_others_outweigh_it() ->
     assert not watch.is_disorder
 
 
+def test_slow_encoders_do_not_stay_in_disorder() -> None:
+    """At 30 Hz a window holds three samples, whose scatter does not show."""
+    watch = ScatterWatch(fastest=40.0)
+    glitch = WheelEstimate(np.array([0.0, -41.0, 1.0]), np.zeros(3))
+    watch.take(glitch)
+    watch.take(WheelEstimate(np.zeros(3), np.zeros(3)))
+    assert watch.is_disorder  # at rest nothing shows
+    watch.take(WheelEstimate(np.full(3, 8.0), np.zeros(3)))
+    assert not watch.is_disorder
+    watch.take(WheelEstimate(np.full(3, 8.0), np.zeros(3)))
+    watch.take(glitch)
+    assert watch.is_disorder
+
+
 def _noisy(angles: tuple[float, float, float], stamps: float = 0.0) -> ScatterWatch:
     """Wheels at 8, -4 and -4 rad/s whose angles scatter by so much [rad], and all stamps [s]."""
     dice = random.Random(4)

@@ -13,6 +13,7 @@ _TICKS = 20  # that moved, looked at
 # another order than they were taken in: no stamp can be trusted, neither those of powers.
 _DISORDER = 0.015  # s
 _DISORDER_ANGLE = 0.15  # rad
+_MOVING = 1.0  # rad/s of the fastest wheel: speeds that can be true show that stamps are in order
 _ROUNDED = 1.0 / math.sqrt(12.0)  # standard deviation of what is rounded, in counts
 
 
@@ -31,13 +32,20 @@ class ScatterWatch:
         self._angles.clear()
 
     def take(self, estimate: WheelEstimate) -> None:
-        """Take the estimate of a tick; one whose scatter does not show changes nothing."""
+        """Take the estimate of a tick.
+
+        One whose scatter does not show, for encoders may give too few samples in a window, only
+        outweighs one that was too fast, and at rest changes nothing.
+        """
         if np.any(np.abs(estimate.speed) > self._fastest):
             self._seconds.append(math.inf)
             self._angles.append(math.inf)
         elif estimate.scatter == estimate.scatter:  # not NaN
             self._seconds.append(estimate.scatter)
             self._angles.append(estimate.scatter * float(np.linalg.norm(estimate.speed)))
+        elif math.inf in self._seconds and np.any(np.abs(estimate.speed) > _MOVING):
+            number = self._seconds.index(math.inf)
+            del self._seconds[number], self._angles[number]
 
     @property
     def seconds(self) -> float:

@@ -21,7 +21,7 @@ _LEAST = 50
 _EVERY = 25  # samples: how often
 LONG_S = 0.2  # of the fit beside a simulation
 _FIT = 5  # samples that it takes
-_STEADY = 4  # samples before a new one that show how fast the wheels turn
+_STEADY = 0.04  # s before a sample that show how fast the wheels turn, at least one period
 _PART = 50_000_000  # ns of a window for which a fit stands
 _ALONE = 3.0  # times as far as the others' does the angle of one wheel scatter that is at fault
 _FREE = 2  # more samples than unknowns, to show how they scatter
@@ -77,6 +77,7 @@ class RecentStamps:
         self._grid: Grid | None = None
         self._origin = 0  # of the grid [ns]
         self._shift = 0  # of the phase since the grid was fitted [ns]
+        self._late = 0  # newest stamps that are taken for late ones
         self._times: dict[int, int] = {}  # of the samples [ns], where stamps jitter
         self.resolution = 0.0  # of the angles, as they show it [rad]; 0 where they have not moved
 
@@ -84,10 +85,12 @@ class RecentStamps:
         """Take a sample newer than those before."""
         self._samples.append((stamp_ns, position))
         self._count += 1
-        if self._count % _EVERY == 0 and len(self._samples) >= _LEAST:
+        if self._grid is not None:
+            time = self._times[stamp_ns] = self._time(self._grid, -1)
+            self._late = self._late + 1 if stamp_ns - time > 1e9 * self._grid.reach else 0
+        is_shifted = self._late > UNSETTLED  # so many in a row are not late
+        if is_shifted or (self._count % _EVERY == 0 and len(self._samples) >= _LEAST):
             self._look()
-        elif self._grid is not None:
-            self._times[stamp_ns] = self._time(self._grid, -1)
 
     def times(self, stamps_ns: list[int]) -> list[int]:
         """When samples with such stamps were taken [ns]: the stamps, where they can be trusted."""
@@ -107,14 +110,15 @@ class RecentStamps:
         before = nearest - round(1e9 * grid.period)
         last = self._samples[number - 1][0]
         possible = [time for time in (nearest, before) if time > self._times.get(last, last)]
-        time = min((stamp, *possible), key=lambda time: self._off_steady(number, time))
+        first = number - 1 - max(1, round(_STEADY / grid.period))
+        time = min((stamp, *possible), key=lambda time: self._off_steady(first, number, time))
         if time == stamp:
             self._shift += stamp - nearest
         return time
 
-    def _off_steady(self, number: int, time_ns: int) -> float:
+    def _off_steady(self, start: int, number: int, time_ns: int) -> float:
         """How far the angles of a sample, if taken at a time, are off a steady motion [rad^2]."""
-        first, last, new = (self._samples[number - back] for back in (_STEADY, 1, 0))
+        first, last, new = (self._samples[index] for index in (start, number - 1, number))
         since, until = self.times([first[0], last[0]])
         share = (time_ns - until) / (until - since)
         off = (
@@ -127,7 +131,7 @@ class RecentStamps:
         positions = np.array([position for _, position in self._samples])
         self._look_at_steps(positions)
         stamps_ns = [stamp for stamp, _ in self._samples]
-        self._origin, self._shift = stamps_ns[0], 0
+        self._origin, self._shift, self._late = stamps_ns[0], 0, 0
         stamps = 1e-9 * (np.array(stamps_ns) - self._origin)
         grid = grid_of(stamps)
         if grid is not None:
