@@ -1,5 +1,8 @@
 """Stamps that jitter although the samples do not, and stamps that are to be trusted."""
 
+import itertools
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -203,44 +206,140 @@ def test_twenty_pieces_have_a_grid_each(rate: float) -> None:
     assert np.abs(np.diff(times) - np.diff(taken)).max() < 5e-4
 
 
-def _as_taken(taken: np.ndarray, late: np.ndarray) -> tuple[float, float]:
-    """Errors of speeds [share], and of times [s] once all is known: 99 and 98 % are less.
+Motion = Callable[[np.ndarray], np.ndarray]  # angles (n, 3) [rad] at times [s]
 
-    Of stamps that jitter by 0.5 ms, besides.
-    """
-    stamps = np.round(1e9 * (taken + late)).astype(np.int64) + _jitter(len(taken))
-    angles = _angles(taken)
+
+def _swinging(seconds: np.ndarray) -> np.ndarray:
+    """Wheels that speed up and slow down by up to 20 rad/s^2."""
+    return np.outer(seconds + 0.2 * np.sin(4.0 * seconds), SPEED)
+
+
+def _stamps(taken: np.ndarray, late: np.ndarray) -> np.ndarray:
+    """Of samples, jittered by 0.5 ms [ns]."""
+    return np.round(1e9 * (taken + late)).astype(np.int64) + _jitter(len(taken))
+
+
+def _live(taken: np.ndarray, late: np.ndarray, motion: Motion = _angles) -> float:
+    """Errors of speeds while samples come in [rad/s]: 99 % are less."""
+    stamps, angles = _stamps(taken, late), motion(taken)
     window, errors, fed = _window(stamps[:0], angles[:0]), [], 0
     for tick in range(2500, int(1e3 * taken[-1]), 50):
         while stamps[fed] <= tick * MS:
             window.add(EncoderSample(BASE + int(stamps[fed]), tuple(angles[fed]), NOTHING))
             fed += 1
+        moved = motion(1e-3 * np.array([tick - 26.0, tick - 24.0]))
         found = window.at(BASE + tick * MS).speed
-        errors.append(np.abs(found / _speeds(1e-3 * (tick - 25)) - 1.0).max())
-    times, jitters = dejitter(1e-9 * stamps, angles)
+        errors.append(np.abs(found - (moved[1] - moved[0]) / 2e-3).max())
+    return float(np.quantile(errors, 0.99))
+
+
+def _recorded(taken: np.ndarray, late: np.ndarray, motion: Motion = _angles) -> float:
+    """Errors of times in a recording [s]: 99 % are less."""
+    times, jitters = dejitter(1e-9 * _stamps(taken, late), motion(taken))
     assert jitters
-    return float(np.quantile(errors, 0.99)), float(np.quantile(np.abs(times - taken), 0.98))
+    return float(np.quantile(np.abs(times - taken), 0.99))
 
 
-@pytest.mark.parametrize("rate", [33.0, 100.0])
-def test_a_loop_that_was_late_goes_on_with_another_phase(rate: float) -> None:
+@pytest.mark.parametrize(
+    ("rate", "motion", "most"),
+    [(33.0, _angles, 0.35), (33.0, _swinging, 0.8), (100.0, _angles, 0.35)],
+)
+def test_a_loop_that_was_late_goes_on_with_another_phase(
+    rate: float, motion: Motion, most: float
+) -> None:
     """One that sleeps for its period: all samples that follow are taken later by as much."""
-    count = round(12.0 * rate)
+    count = round(24.0 * rate)
     shifts = np.zeros(count)
-    shifts[round(3.3 * rate) :: round(1.7 * rate)] = 0.4 / rate
-    speed, time = _as_taken(np.arange(count) / rate + np.cumsum(shifts), np.zeros(count))
-    assert speed < 0.02  # a third of all that turns where the phase was taken for jitter
-    assert time < 1e-3
+    shifts[round(3.3 * rate) :: round(0.9 * rate)] = 0.37 / rate
+    taken = np.arange(count) / rate + np.cumsum(shifts)
+    # Where the phase is taken for jitter, a third of 6 or 11 rad/s.
+    assert _live(taken, np.zeros(count), motion) < most
+    assert _recorded(taken, np.zeros(count), motion) < 5e-4
 
 
-@pytest.mark.parametrize("late", [0.35, 0.7])
-def test_a_stamp_that_comes_late_shifts_no_phase(late: float) -> None:
-    """A busy driver's: by so much of a period."""
+@pytest.mark.parametrize(("late", "row"), [(0.35, 1), (0.35, 2), (0.7, 1)])
+def test_stamps_that_come_late_shift_no_phase(late: float, row: int) -> None:
+    """A busy driver's: by so much of a period, one or two in a row."""
+    taken, behind = 0.01 * np.arange(1200), np.zeros(1200)
+    for first in range(260, 260 + row):
+        behind[first::37] = late * 0.01
+    assert _live(taken, behind) < 0.2
+    assert _recorded(taken, behind) < 4e-4
+
+
+@pytest.mark.parametrize(("rate", "most"), [(100.0, 1.5), (33.0, 4.0)])
+def test_a_stamp_that_is_a_period_late_leaves_speeds_known(rate: float, most: float) -> None:
+    """It falls on the next one's place: none of both is moved there."""
     behind = np.zeros(1200)
-    behind[260::37] = late * 0.01
-    speed, time = _as_taken(0.01 * np.arange(1200), behind)
-    assert speed < 0.01
-    assert time < 4e-4
+    behind[260::37] = 0.98 / rate
+    assert _live(np.arange(1200) / rate, behind) < most
+
+
+def test_the_last_stamp_may_be_late() -> None:
+    grid = 0.01 * np.arange(300)
+    noisy = grid + 1e-9 * _jitter(300)
+    noisy[-1] += 0.004
+    assert np.abs(even(noisy) - grid).max() < 2e-4
+
+
+def test_stamps_that_do_not_scatter_reach_a_fiftieth_of_their_period() -> None:
+    grid = grid_of(0.01 * np.arange(300))
+    assert grid is not None
+    assert grid.reach == pytest.approx(2e-4)
+
+
+def test_three_late_stamps_in_a_row_are_another_phase() -> None:
+    watched, _ = _watched()
+    stamps = [(10 * number + 4) * MS for number in range(120, 124)]
+    for number, stamp in enumerate(stamps, start=120):
+        watched.add(stamp, tuple(_angles(np.array([0.01 * number]))[0].tolist()))
+    np.testing.assert_allclose(watched.times(stamps), stamps, rtol=0.0, atol=0.2 * MS)
+
+
+def test_of_slow_wheels_two_samples_never_fall_on_one_place() -> None:
+    watched, _ = _watched()
+    still = tuple(_angles(np.array([1.19]))[0].tolist())
+    stamps = [1200 * MS, 1210 * MS, int(1229.8 * MS), 1230 * MS]
+    for stamp in stamps:
+        watched.add(stamp, still)
+    times = watched.times(stamps)
+    assert all(later > earlier for earlier, later in itertools.pairwise(times))
+
+
+def test_lost_messages_of_slow_coarse_encoders_move_none() -> None:
+    """Angles of few counts do not say that what follows is late."""
+    count, random = 2.0 * np.pi / (64 * 15), np.random.default_rng(9)
+    taken = 0.01 * np.flatnonzero(random.random(2000) > 0.1)
+    stamps = _stamps(taken, np.zeros(len(taken)))
+    turned = np.outer(taken, [0.6, -0.2, -0.4])
+    watched, off = RecentStamps(), []
+    moved = np.floor(_angles(taken[:300]) / count), np.floor(turned[300:] / count)
+    for stamp, angle in zip(stamps.tolist(), count * np.concatenate(moved), strict=True):
+        watched.add(stamp, tuple(angle.tolist()))
+        off.append(watched.times([stamp])[0])
+    error = 1e-9 * np.array(off) - taken
+    assert np.abs(error[400:]).max() < 0.005
+
+
+@pytest.mark.parametrize("rate", [5_000, 1_000_000_000])
+def test_encoders_may_be_fast(rate: int) -> None:
+    watched, step = RecentStamps(), 1_000_000_000 // rate
+    dice = np.random.default_rng(5).integers(0, max(step // 2, 1), 400)
+    for number in range(400):
+        turned = 6.0 * number / rate
+        late = step if number % 50 == 49 else 0
+        watched.add(2 * number * step + int(dice[number]) + late, (turned, -turned, 0.0))
+    assert len(watched.times([798 * step, 799 * step])) == 2
+
+
+def test_a_wheel_that_says_nothing_hides_no_late_stamp() -> None:
+    watched, _ = _watched()
+    angles = _angles(1e-2 * np.arange(130.0))
+    angles[:, 1] = np.nan
+    for number in range(120, 124):
+        late = 4 * MS if number == 123 else 0
+        watched.add(10 * number * MS + late, tuple(angles[number].tolist()))
+    assert watched.times([1234 * MS]) == pytest.approx([1230 * MS], abs=0.2 * MS)
 
 
 def test_a_stray_stamp_does_not_tilt_the_grid() -> None:

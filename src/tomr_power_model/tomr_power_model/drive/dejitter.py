@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_FEWEST = 10  # stamps, in all and for each phase
+_FEWEST = 10  # stamps
 _SCATTER = 0.35  # of a period: stamps that scatter wider have no grid
 _MOST = 0.95  # of the stamps scatter no wider; the others are late
 _GAP = 5.5  # periods: after a longer silence the driver may have started afresh
 UNSETTLED = 2  # late stamps in a row that shift no phase: of the newest it does not show yet
+_FEW = 2 * UNSETTLED + 1  # stamps that have a median phase
 _SHIFT = 4.0  # standard deviations of the stamps that a phase shifts by at least
 _LEAST_SHIFT = 0.02  # of a period
 _NORMAL = 1.4826  # standard deviation over median magnitude
@@ -57,8 +58,6 @@ def grid_of(stamps: Array) -> Grid | None:
     period = float(np.median(steps))
     reach = _reach(steps / period)
     segment = np.concatenate([[0], np.cumsum(_is_shift(steps / period, reach))])
-    if _FEWEST * (segment[-1] + 1) > len(stamps):
-        return None
     count = np.bincount(segment)
     for _ in range(2):
         forward = np.where(np.diff(segment) > 0, 0.0, _forward(steps / period, reach))
@@ -89,11 +88,22 @@ def _forward(steps: Array, reach: float) -> Array:
 
 
 def _is_shift(steps: Array, reach: float) -> NDArray[np.bool_]:
-    """Whether another phase begins with the stamp after each step [periods]."""
-    phase = np.concatenate([[0.0], np.cumsum(steps - _forward(steps, reach))])
-    padded = np.pad(phase, UNSETTLED, mode="reflect")
-    lasting = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * UNSETTLED + 1), axis=1)
-    return np.asarray((np.abs(np.diff(lasting)) > reach) | (steps > _GAP))
+    """Whether another phase begins with the stamp after each step [periods].
+
+    It does where the median phase of the next few stamps is not that of the last few, after those
+    steps around there that are off by so much.
+    """
+    off = steps - _forward(steps, reach)
+    phase = np.concatenate([[0.0], np.cumsum(off)])
+    padded = np.pad(phase, _FEW - 1, mode="reflect")
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(padded, _FEW), axis=1)
+    differ = np.flatnonzero(np.abs(medians[_FEW:] - medians[:-_FEW]) > reach)
+    found = steps > _GAP
+    if len(differ):
+        for around in np.split(differ, np.flatnonzero(np.diff(differ) > 1) + 1):
+            by = np.abs(off[around])
+            found[around[by >= min(reach, by.max())]] = True
+    return np.asarray(found)
 
 
 def even(stamps: Array) -> Array:

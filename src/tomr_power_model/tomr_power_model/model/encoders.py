@@ -22,6 +22,7 @@ _EVERY = 25  # samples: how often
 LONG_S = 0.2  # of the fit beside a simulation
 _FIT = 5  # samples that it takes
 _STEADY = 0.04  # s before a sample that show how fast the wheels turn, at least one period
+_CLEARLY = 0.05  # squared distances
 _PART = 50_000_000  # ns of a window for which a fit stands
 _ALONE = 3.0  # times as far as the others' does the angle of one wheel scatter that is at fault
 _FREE = 2  # more samples than unknowns, to show how they scatter
@@ -102,19 +103,22 @@ class RecentStamps:
 
         A stamp off the grid is late, or right; how far the wheels have turned tells which.
         """
-        stamp = self._samples[number][0]
-        origin = self._origin + self._shift
+        stamp, last = self._samples[number][0], self._samples[number - 1][0]
+        origin, period = self._origin + self._shift, max(round(1e9 * grid.period), 1)
         nearest = origin + round(1e9 * grid.nearest(1e-9 * (stamp - origin)))
-        if abs(stamp - nearest) <= 1e9 * grid.reach:
+        is_off = abs(stamp - nearest) > 1e9 * grid.reach
+        # Where one seems to be missing, this one may be as late as a period.
+        is_missing = round((nearest - self._times.get(last, last)) / period) == 2
+        if not is_off and not is_missing:
             return nearest
-        before = nearest - round(1e9 * grid.period)
-        last = self._samples[number - 1][0]
-        possible = [time for time in (nearest, before) if time > self._times.get(last, last)]
-        first = number - 1 - max(1, round(_STEADY / grid.period))
-        time = min((stamp, *possible), key=lambda time: self._off_steady(first, number, time))
-        if time == stamp:
+        first = number - 1 - min(max(round(_STEADY / grid.period), 1), _LEAST // 2)
+        off = [self._off_steady(first, number, time) for time in (nearest, nearest - period, stamp)]
+        if not is_off:
+            return nearest - period if off[1] < _CLEARLY * off[0] else nearest
+        if off[2] <= min(off[:2]):
             self._shift += stamp - nearest
-        return time
+            return stamp
+        return nearest if off[0] < off[1] else nearest - period
 
     def _off_steady(self, start: int, number: int, time_ns: int) -> float:
         """How far the angles of a sample, if taken at a time, are off a steady motion [rad^2]."""
@@ -131,7 +135,7 @@ class RecentStamps:
         positions = np.array([position for _, position in self._samples])
         self._look_at_steps(positions)
         stamps_ns = [stamp for stamp, _ in self._samples]
-        self._origin, self._shift, self._late = stamps_ns[0], 0, 0
+        self._origin, self._shift = stamps_ns[0], 0
         stamps = 1e-9 * (np.array(stamps_ns) - self._origin)
         grid = grid_of(stamps)
         if grid is not None:
