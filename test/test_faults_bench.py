@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "bench"))
 
-from faults.cli import main
+from faults.cli import _SENSORS, main
 from faults.closed_loop import MotorPower, Prediction, closed_loop
 from faults.diagnose import diagnose
 from faults.explain import measured
@@ -21,6 +21,7 @@ from faults.play import Played, changes_of, play, scored_name
 from faults.power import PATHS, compared
 from faults.recordings import Recordings
 from faults.regimes import AT_REST, noise_of, regimes_of, rms, tick_means, tick_speeds, undisturbed
+from faults.sensors import SENSORS, Message
 from faults.truth import missed, ratios, true_value
 
 from tomr_fault_diag.classifier.stage import Diagnosis
@@ -34,6 +35,8 @@ from tomr_fault_diag.classifier.states import (
 )
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_power_model.cli import EXIT_BAD_INPUT, run_main
+from tomr_power_model.messages.bag import bag_message
+from tomr_power_model.messages.types import BATTERY, JOINT_STATE
 
 PERIOD = 0.05
 PERIOD_NS = 50_000_000
@@ -267,3 +270,38 @@ def test_absent_recordings_are_one_line(
     printed = capsys.readouterr().err
     assert printed.count("\n") == 1
     assert "is absent: set TOMR_RECORDINGS" in printed
+
+
+@pytest.mark.parametrize(
+    ("kind", "current"),
+    [
+        ("slow", -0.51),
+        ("coarse-currents", -0.5),
+        ("coarse-encoders", -0.51),
+        ("currents-alone", -0.51),
+        ("magnitudes", 0.51),
+    ],
+)
+def test_other_sensors_say_less(kind: str, current: float) -> None:
+    assert tuple(SENSORS) == _SENSORS
+    random = np.random.default_rng(1)
+    for topic, number in (("/joint_states", 10), ("/wheel_1/power", 10), ("/cmd_vel", 10)):
+        found = []
+        for index in range(number):
+            content = bag_message(BATTERY, voltage=24.04, current=-0.51)
+            if topic == "/joint_states":
+                content = bag_message(JOINT_STATE, position=np.full(3, 0.1), velocity=np.ones(3))
+            if SENSORS[kind](Message(topic, content, index), random):
+                found.append(content)
+        if topic == "/wheel_1/power":
+            assert len(found) == (2 if kind == "slow" else 10)
+            assert abs(found[0].current - current) < (0.11 if kind == "coarse-currents" else 1e-6)
+            assert np.isnan(found[0].voltage) == (kind == "currents-alone")
+        elif topic == "/joint_states":
+            assert len(found) == (4 if kind == "slow" else 10)
+            step = 2.0 * np.pi / 256
+            coarse = kind == "coarse-encoders"
+            assert found[0].position[0] == pytest.approx(4.0 * step if coarse else 0.1)
+            assert len(found[0].velocity) == (0 if coarse else 3)
+        else:
+            assert len(found) == 10

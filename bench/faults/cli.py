@@ -19,6 +19,7 @@ examples:
   faults_practice.py commission
   faults_practice.py diagnose --robot build/faults_practice/commissioned/commissioned.yaml
   faults_practice.py power --robot build/faults_practice/explained/robot_explained.yaml
+  faults_practice.py sensors slow --out slow && TOMR_RECORDINGS=slow faults_practice.py commission
 
 exit codes: 0 done, 2 bad input, or the recordings are absent"""
 
@@ -27,6 +28,7 @@ _FITTING = {
     "commission": "run tomr_commission on the healthy drives: cost, verdict, floors",
     "calibrate": "run tomr_calibrate on the same: cost, values over the truth, or why it refused",
 }
+_SENSORS = ("slow", "coarse-currents", "coarse-encoders", "currents-alone", "magnitudes")
 _SCORING = {
     "diagnose": "diagnose all drives with a description and score that",
     "power": "compare power residuals of the nodes with those of tomr_gap's simulation, by regime",
@@ -65,6 +67,10 @@ def _parser() -> argparse.ArgumentParser:
             command.add_argument(
                 "--tolerance", metavar="REL", help="how far stated values may be off, for tomr_gap"
             )
+    summary = "write the set as other sensors would have recorded it"
+    sensors = commands.add_parser("sensors", help=summary, description=summary)
+    sensors.add_argument("kind", choices=_SENSORS, metavar="KIND", help=", ".join(_SENSORS))
+    sensors.add_argument("--out", type=Path, required=True, metavar="DIR", help="it goes here")
     return parser
 
 
@@ -76,6 +82,7 @@ def main(arguments: Sequence[str] | None) -> int:
     from faults.explain import calibrate, commission, explain
     from faults.power import power
     from faults.recordings import Recordings
+    from faults.sensors import record
 
     recordings = Recordings.find()
     console = Console(width=160, highlight=False)
@@ -84,6 +91,8 @@ def main(arguments: Sequence[str] | None) -> int:
         explain(recordings, options.out / "explained", options.fit, more, console)
     elif options.command == "commission":
         commission(recordings, options.out / "commissioned", console)
+    elif options.command == "sensors":
+        console.print(f"written: TOMR_RECORDINGS={record(recordings, options.kind, options.out)}")
     elif options.command == "calibrate":
         calibrate(recordings, options.out / "calibrated", options.fit, console)
     else:
