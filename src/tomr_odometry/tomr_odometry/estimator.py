@@ -22,7 +22,7 @@ from tomr_odometry.unaided import FEWEST_POWERS, Unaided
 from tomr_power_model.drive.sources import PowerReading
 from tomr_power_model.geometry.poses import moved
 from tomr_power_model.model.encoder_flaws import EncoderFlaws
-from tomr_power_model.model.encoders import RecentStamps
+from tomr_power_model.model.stamps import RecentStamps
 from tomr_power_model.model.ticks import Arrival, TickClock, to_ns
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_power_model.slides.body import body_of

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from tomr_power_model.drive.dejitter import dejitter, even, grid_of, is_jitter
-from tomr_power_model.model.encoders import EncoderSample, EncoderWindow, RecentStamps
+from tomr_power_model.model.encoders import EncoderSample, EncoderWindow
+from tomr_power_model.model.stamps import RecentStamps
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS

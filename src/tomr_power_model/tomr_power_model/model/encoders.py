@@ -11,25 +11,19 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
-from tomr_power_model.drive.dejitter import UNSETTLED, Grid, grid_of, is_jitter
 from tomr_power_model.model.continuity import ENCODER_TOLERANCE, Continuity
+from tomr_power_model.model.stamps import RecentStamps
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
-_KEPT = 200  # samples whose stamps are looked at
-_LEAST = 50
-_EVERY = 25  # samples: how often
 LONG_S = 0.2  # of the fit beside a simulation
 _FIT = 5  # samples that it takes
-_STEADY = 0.04  # s before a sample that show how fast the wheels turn, at least one period
-_CLEARLY = 0.05  # squared distances
 _PART = 50_000_000  # ns of a window for which a fit stands
 _ALONE = 3.0  # times as far as the others' does the angle of one wheel scatter that is at fault
 _FREE = 2  # more samples than unknowns, to show how they scatter
 _MOVING = 1.0  # rad/s of the fastest wheel, likewise
 _LEEWAY = 0.05  # s that a stamp may be late: angles that no motor reaches till then are bad
 _NEW_ZERO = 3  # such angles in a row are those of an encoder that counts from elsewhere
-_SAME = 1e-6  # rad: two steps that differ by less are alike
 UNKNOWN: Triple = (float("nan"), float("nan"), float("nan"))
 
 
@@ -66,97 +60,6 @@ class Reference(Protocol):
         mean speed and acceleration in that window, (3,) each.
         """
         ...
-
-
-class RecentStamps:
-    """The stamps of the last moments, dejittered; driven by samples alone."""
-
-    def __init__(self) -> None:
-        self._samples: deque[tuple[int, Triple]] = deque(maxlen=_KEPT)
-        self._count = 0
-        self._jitter = False
-        self._grid: Grid | None = None
-        self._origin = 0  # of the grid [ns]
-        self._shift = 0  # of the phase since the grid was fitted [ns]
-        self._late = 0  # newest stamps that are taken for late ones
-        self._times: dict[int, int] = {}  # of the samples [ns], where stamps jitter
-        self.resolution = 0.0  # of the angles, as they show it [rad]; 0 where they have not moved
-
-    def add(self, stamp_ns: int, position: Triple) -> None:
-        """Take a sample newer than those before."""
-        self._samples.append((stamp_ns, position))
-        self._count += 1
-        if self._grid is not None:
-            time = self._times[stamp_ns] = self._time(self._grid, -1)
-            self._late = self._late + 1 if stamp_ns - time > 1e9 * self._grid.reach else 0
-        is_shifted = self._late > UNSETTLED  # so many in a row are not late
-        if is_shifted or (self._count % _EVERY == 0 and len(self._samples) >= _LEAST):
-            self._look()
-
-    def times(self, stamps_ns: list[int]) -> list[int]:
-        """When samples with such stamps were taken [ns]: the stamps, where they can be trusted."""
-        times = [self._times.get(stamp, stamp) for stamp in stamps_ns]
-        return times if len(set(times)) == len(times) else stamps_ns
-
-    def _time(self, grid: Grid, number: int) -> int:
-        """When one of the newest samples was taken [ns]: on the grid, or that has shifted.
-
-        A stamp off the grid is late, or right; how far the wheels have turned tells which.
-        """
-        stamp, last = self._samples[number][0], self._samples[number - 1][0]
-        origin, period = self._origin + self._shift, max(round(1e9 * grid.period), 1)
-        nearest = origin + round(1e9 * grid.nearest(1e-9 * (stamp - origin)))
-        is_off = abs(stamp - nearest) > 1e9 * grid.reach
-        # Where one seems to be missing, this one may be as late as a period.
-        is_missing = round((nearest - self._times.get(last, last)) / period) == 2
-        if not is_off and not is_missing:
-            return nearest
-        first = number - 1 - min(max(round(_STEADY / grid.period), 1), _LEAST // 2)
-        off = [self._off_steady(first, number, time) for time in (nearest, nearest - period, stamp)]
-        if not is_off:
-            return nearest - period if off[1] < _CLEARLY * off[0] else nearest
-        if off[2] <= min(off[:2]):
-            self._shift += stamp - nearest
-            return stamp
-        return nearest if off[0] < off[1] else nearest - period
-
-    def _off_steady(self, start: int, number: int, time_ns: int) -> float:
-        """How far the angles of a sample, if taken at a time, are off a steady motion [rad^2]."""
-        first, last, new = (self._samples[index] for index in (start, number - 1, number))
-        since, until = self.times([first[0], last[0]])
-        share = (time_ns - until) / (until - since)
-        off = (
-            end - middle - share * (middle - start)
-            for start, middle, end in zip(first[1], last[1], new[1], strict=True)
-        )
-        return sum(angle * angle for angle in off if angle == angle)  # not NaN
-
-    def _look(self) -> None:
-        positions = np.array([position for _, position in self._samples])
-        self._look_at_steps(positions)
-        stamps_ns = [stamp for stamp, _ in self._samples]
-        self._origin, self._shift = stamps_ns[0], 0
-        stamps = 1e-9 * (np.array(stamps_ns) - self._origin)
-        grid = grid_of(stamps)
-        if grid is not None:
-            found = is_jitter(stamps, grid, positions)
-            # At rest nothing can be seen: what was known stays.
-            self._jitter = self._jitter if found is None else found
-        self._grid = grid if self._jitter else None
-        self._times = {}
-        if self._grid is None:
-            return
-        times = (self._origin + np.round(1e9 * self._grid.times).astype(np.int64)).tolist()
-        self._times = dict(zip(stamps_ns[:-UNSETTLED], times[:-UNSETTLED], strict=True))
-        for number in range(-UNSETTLED, 0):
-            self._times[stamps_ns[number]] = self._time(self._grid, number)
-
-    def _look_at_steps(self, positions: Array) -> None:
-        """Whole counts: what steps differ by is one of them at least."""
-        uneven = np.abs(np.diff(positions, n=2, axis=0))
-        differing = uneven[uneven > _SAME]
-        if len(differing):
-            self.resolution = float(differing.min())
 
 
 class EncoderWindow:
