@@ -8,7 +8,7 @@ from tomr_fault_diag.classifier.braking import BrakingWatch
 from tomr_fault_diag.classifier.contacts import NOTHING, Contacts
 from tomr_fault_diag.classifier.evidence import ALONE, Beside
 from tomr_fault_diag.classifier.judges import Opinion
-from tomr_fault_diag.classifier.misfit import MisfitWatch
+from tomr_fault_diag.classifier.misfit import Misfit, MisfitWatch
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.classifier.observability import Unseen
 from tomr_fault_diag.classifier.outside import Outside, OutsideWatch
@@ -193,6 +193,25 @@ def test_drivers_that_lack_voltage_are_not_off() -> None:
 
 def test_what_a_motor_draws_that_is_not_driven_may_be_unknown() -> None:
     assert watched([undriven(t, COASTING, 0.0) for t in range(0, 1000, 50)]) == []
+
+
+class Others(MisfitWatch):
+    """From the first second on others' commands are obeyed."""
+
+    def take(self, frame: ResidualFrame, low_supply: float) -> Misfit:
+        return Misfit(obeys_others=frame.stamp_ns >= BASE + 1000 * MS)
+
+
+@pytest.mark.parametrize(
+    ("judge", "state"), [(NORMAL, DISOBEYS.name), (CONTROL, "control system fault")]
+)
+def test_beside_a_fault_nothing_is_said_of_others_commands(judge: int, state: str) -> None:
+    """Its wheel strays, and what the body then does makes a second one stray."""
+    classifier = FaultClassifier(Sure(judge), misfits=Others())
+    for at_ms in range(50, 2000, 50):
+        classifier.classify(frame(at_ms, TURNING, TURNING))
+    assert classifier._state is not None
+    assert classifier._state.name == state
 
 
 def test_no_wheel_is_accused_meanwhile() -> None:

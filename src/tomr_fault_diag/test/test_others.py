@@ -41,8 +41,8 @@ def found(*parts: Part) -> list[int]:
 FITS = np.array([0.5, -0.5, 0.0])
 
 
-def test_where_motors_draw_what_their_wheels_show_others_are_obeyed_after_half_a_second() -> None:
-    assert found((15, FAR, WORKING, FITS)) == list(range(10, 15))
+def test_where_motors_draw_what_their_wheels_show_others_are_obeyed_after_a_second() -> None:
+    assert found((25, FAR, WORKING, FITS)) == list(range(20, 25))
 
 
 @pytest.mark.parametrize(
@@ -67,13 +67,20 @@ def test_a_motor_that_no_longer_draws_what_its_wheel_shows_has_a_fault_of_its_ow
 def test_a_wheel_that_turns_as_asked_by_chance_is_no_end() -> None:
     """For 0.15 s."""
     far, one = (FAR, WORKING, FITS), (np.array([2.0, 0.0, 0.1]), WORKING, FITS)
-    assert found((7, *far), (3, *one), (12, *far))[0] == 10
-    assert found((7, *far), (4, *one), (12, *far))[0] == 21
+    assert found((7, *far), (3, *one), (22, *far))[0] == 20
+    assert found((7, *far), (4, *one), (22, *far))[0] == 31
+
+
+def test_where_data_are_missing_nothing_is_concluded() -> None:
+    """Of what was seen before neither: commands that are lost are no other's."""
+    far, missing = (FAR, WORKING, FITS), (FAR, WORKING, FITS * np.nan)
+    assert found((19, *far), (1, *missing), (20, *far)) == []
+    assert found((19, *far), (1, FAR, WORKING * np.nan, FITS), (21, *far)) == [40]
 
 
 def test_a_motor_that_worked_is_remembered_for_a_moment() -> None:
     """Its power passes that of an idle one where the wheel turns round: 0.7 s, and the pause."""
-    assert found((6, FAR, WORKING, FITS), (30, FAR, IDLE, FITS)) == list(range(10, 23))
+    assert found((16, FAR, WORKING, FITS), (30, FAR, IDLE, FITS)) == list(range(20, 33))
 
 
 def test_one_that_worked_otherwise_than_its_wheel_shows_is_not() -> None:
@@ -83,7 +90,7 @@ def test_one_that_worked_otherwise_than_its_wheel_shows_is_not() -> None:
 
 def test_the_robot_is_said_not_to_follow() -> None:
     watch = MisfitWatch(IDLE.tolist())
-    said = [watch.take(frame(at, FAR, WORKING, FITS), 0.5).disobeys for at in range(12)]
-    assert said == [False] * 10 + [True] * 2
+    said = [watch.take(frame(at, FAR, WORKING, FITS), 0.5).obeys_others for at in range(22)]
+    assert said == [False] * 20 + [True] * 2
     watch.clear()
-    assert not watch.take(frame(12, FAR, WORKING, FITS), 0.5).disobeys
+    assert not watch.take(frame(22, FAR, WORKING, FITS), 0.5).obeys_others

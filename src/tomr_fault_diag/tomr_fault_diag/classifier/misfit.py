@@ -46,9 +46,9 @@ class Misfit:
     """What a frame shows beside the classifier's states."""
 
     ignores_commands: bool = False  # for a moment already: wheels stand that should turn
-    # And for long enough to be named; or it brakes unasked, obeys others, or no motor has been
-    # driven for long.
+    # And for long enough to be named; or it brakes unasked, or no motor has been driven for long.
     disobeys: bool = False
+    obeys_others: bool = False  # than the commands that are known, as far as no fault explains it
     unexplained: bool = False  # some residual has been far out of its band for long
     stays_so: bool = False  # for so long that even a push or a slope is known by then
     low_supply: bool = False  # its voltage has been too low for long
@@ -94,19 +94,22 @@ class MisfitWatch:
         self._far_since = {index: self._far_since.get(index, now) for index in far}
         is_low = frame.supply < low_supply + (_MORE if self._low_since is not None else 0.0)
         self._low_since = _since(self._low_since, now, holds=is_low)  # not where it is not known
-        strays = self._strays(frame, speeds, is_low=is_low)
+        strays, obeys_others = self._strays(frame, speeds, is_low=is_low)
         far_since = min(self._far_since.values(), default=now)
         stands = ignores and _lasts(self._halting_since, now, _IGNORED_FOR)
         return Misfit(
             ignores,
             stands or strays,
+            obeys_others,
             now - far_since >= _FAR_FOR,
             now - far_since >= _FAR_LONG,
             _lasts(self._low_since, now, _LOW_FOR),
         )
 
-    def _strays(self, frame: ResidualFrame, speeds: list[Residual], *, is_low: bool) -> bool:
-        """Whether it brakes unasked, has not been driven for long, or obeys others."""
+    def _strays(
+        self, frame: ResidualFrame, speeds: list[Residual], *, is_low: bool
+    ) -> tuple[bool, bool]:
+        """Whether it brakes unasked or has long not been driven, and whether it obeys others."""
         now, motors = frame.stamp_ns, [frame.residuals[index] for index in MOTORS]
         astray = np.array([is_far(item) for item in speeds])
         far = int(np.count_nonzero(astray))
@@ -119,7 +122,7 @@ class MisfitWatch:
         is_unpowered = _lasts(self._unpowered_since, now, _IGNORED_FOR)
         brakes = self._brakes(now, speeds, far)
         derived = [frame.residuals[index] for index in ENCODERS]
-        return self._others.take(now, astray, beyond, derived) or brakes or is_unpowered
+        return brakes or is_unpowered, self._others.take(now, astray, beyond, derived)
 
     def _brakes(self, now: int, speeds: list[Residual], far: int) -> bool:
         """Whether it brakes to a halt that it is not asked for; `far`: wheels that are far off."""

@@ -29,7 +29,7 @@ class OthersSettings:
     works: float = 1.0  # ... and by which such a wheel's motor draws otherwise than an idle one
     lately: int = to_ns(0.7)  # within which one was seen to
     pauses: int = to_ns(0.15)  # that say nothing: where a wheel turns as asked by chance
-    lasts: int = to_ns(0.5)
+    lasts: int = to_ns(1.0)
 
 
 class OthersWatch:
@@ -57,7 +57,9 @@ class OthersWatch:
         if fits and (astray & (np.abs(beyond) > s.works * bands)).any():
             self._worked = now
         is_seen = self._worked >= now - s.lately
-        if fits and is_seen and np.count_nonzero(astray) >= s.wheels:
+        if np.isnan(off + beyond).any():
+            self._since = NEVER  # of what is missing nothing is concluded
+        elif fits and is_seen and np.count_nonzero(astray) >= s.wheels:
             self._since = now if self._since == NEVER else self._since
             self._held = now
         elif now - self._held > s.pauses:

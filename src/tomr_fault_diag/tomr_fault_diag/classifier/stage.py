@@ -61,6 +61,8 @@ _WELL = (STATES[NORMAL], PUSHED)
 # What shows only now and then, as when a wheel has to push.
 _ELUSIVE = (STATES[SLIP], BURDENED, UNKNOWN)
 _QUIET = (None, WAITING, STALE, NOT_ENOUGH, NOT_OBSERVABLE, *_WELL, *POWER_SENSOR)
+# Where commands that are another's may be told: beside a fault of a motor its wheel strays anyway.
+_WITHOUT_FAULT = (*_QUIET, DISOBEYS, UNKNOWN)
 
 
 class FaultClassifier:
@@ -232,7 +234,8 @@ class FaultClassifier:
         if not data.joined:
             self._judge.interrupt()
             self._candidate_since = frame.stamp_ns
-        if misfit.disobeys and data.enough:
+        obeys_others = misfit.obeys_others and self._state in _WITHOUT_FAULT
+        if (misfit.disobeys or obeys_others) and data.enough:
             # No fault of one wheel looks like this; what the judge makes of it says nothing.
             self._judge.clear()
             self._opinion = None
