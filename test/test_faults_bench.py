@@ -21,7 +21,7 @@ from faults.play import Played, changes_of, play, scored_name
 from faults.power import PATHS, compared
 from faults.recordings import Recordings
 from faults.regimes import AT_REST, noise_of, regimes_of, rms, tick_means, tick_speeds, undisturbed
-from faults.sensors import SENSORS, Message
+from faults.sensors import SENSORS, Message, record
 from faults.truth import missed, ratios, true_value
 
 from tomr_fault_diag.classifier.stage import Diagnosis
@@ -37,6 +37,8 @@ from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_power_model.cli import EXIT_BAD_INPUT, run_main
 from tomr_power_model.messages.bag import bag_message
 from tomr_power_model.messages.types import BATTERY, JOINT_STATE
+from tomr_power_model.recordings import open_recording
+from tomr_power_model.robot import load_robot
 
 PERIOD = 0.05
 PERIOD_NS = 50_000_000
@@ -238,16 +240,21 @@ def test_the_closed_loop_predicts_the_power_of_a_recording() -> None:
         assert rms(motor.residual) < 0.1 * rms(motor.measured)
 
 
-def test_a_set_of_recordings_is_diagnosed_and_scored_by_its_own_program(tmp_path: Path) -> None:
-    drives = tmp_path / "faults" / "practice" / "drives"
-    truth = tmp_path / "faults_truth"
-    for folder in (drives, drives.parent / "healthy_long", truth / "practice"):
-        folder.mkdir(parents=True)
+def _set(folder: Path) -> Recordings:
+    """Of a single drive."""
+    drives, truth = folder / "faults" / "practice" / "drives", folder / "faults_truth"
+    kinds = drives.parent / "healthy", drives.parent / "healthy_long"
+    for each in (drives, *kinds, truth / "practice"):
+        each.mkdir(parents=True)
     (drives / "one").symlink_to(ROOT / "bags" / "square")
     labels = {"onset": None, "extended": "battery", "t0_ns": 7 * 10**9, "bumps": [{"t": 0.5}]}
     (truth / "practice" / "one.json").write_text(json.dumps(labels))
-    (tmp_path / "score_faults.py").write_text("import sys; print(*sys.argv[1:])")
-    recordings = Recordings(tmp_path, "practice")
+    (folder / "score_faults.py").write_text("import sys; print(*sys.argv[1:])")
+    return Recordings(folder, "practice")
+
+
+def test_a_set_of_recordings_is_diagnosed_and_scored_by_its_own_program(tmp_path: Path) -> None:
+    recordings, truth = _set(tmp_path), tmp_path / "faults_truth"
     (drive,) = recordings.drives("drives")
     assert (drive.identity, drive.is_normal) == ("one", False)  # something else goes wrong in it
     assert drive.bumps_ns == (7_500_000_000,)
@@ -305,3 +312,25 @@ def test_other_sensors_say_less(kind: str, current: float) -> None:
             assert len(found[0].velocity) == (0 if coarse else 3)
         else:
             assert len(found) == 10
+
+
+def _currents(bag: Path) -> list[float]:
+    with open_recording(bag) as recording:
+        return [item.current for _, _, item, _ in recording.messages(["wheel_1/power"])]
+
+
+def test_a_set_as_other_sensors_record_it_is_a_set(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recordings = _set(tmp_path / "faults_practice")
+    description = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml")
+    recordings.description.write_text(description.read_text())
+    monkeypatch.setenv("TOMR_RECORDINGS", str(record(recordings, "magnitudes", tmp_path / "new")))
+    found = Recordings.find()
+    assert not load_robot(found.description).measurement.signed
+    assert found.scorer.exists()
+    (drive,) = found.drives("drives")
+    (before,) = recordings.drives("drives")
+    signed, magnitudes = _currents(before.bag), _currents(drive.bag)
+    assert min(signed) < 0.0
+    assert magnitudes == [abs(current) for current in signed]

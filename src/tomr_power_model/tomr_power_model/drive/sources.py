@@ -87,24 +87,20 @@ def total_topics(robot: Robot) -> tuple[PowerTopic, ...]:
     return (PowerTopic(TOTAL_TOPIC, BATTERY, read),)
 
 
-def _as_given(value: float) -> float:
-    return value
-
-
-def _way_of(robot: Robot) -> Callable[[float], float]:
-    """What a motor draws, from a reading; of a sensor that gives magnitudes with either sign."""
-    return _as_given if robot.measurement.signed else abs
+def _drawing(robot: Robot) -> Callable[[float], float]:
+    """What a motor draws, from a reading: magnitudes may come with either sign."""
+    return float if robot.measurement.signed else abs
 
 
 @source("battery_state")
 def battery_states(robot: Robot) -> tuple[PowerTopic, ...]:
     """One BatteryState per motor on `<wheel>/power`."""
-    is_power, way = robot.measurement.quantity == "power", _way_of(robot)
+    is_power, drawing = robot.measurement.quantity == "power", _drawing(robot)
 
     def reader(wheel: int) -> Callable[[Any, int], Iterator[PowerReading]]:
         def read(message: Any, receive_ns: int) -> Iterator[PowerReading]:
             voltage, current = battery_of(message)
-            drawn = way(-current)
+            drawn = drawing(-current)
             power = voltage * drawn if is_power else NAN
             yield PowerReading(wheel, stamp_of(message, receive_ns), power, drawn, voltage)
 
@@ -119,11 +115,11 @@ def battery_states(robot: Robot) -> tuple[PowerTopic, ...]:
 @source("multi_array")
 def multi_array(robot: Robot) -> tuple[PowerTopic, ...]:
     """One Float64MultiArray: motor powers [W] drawn, or currents [A] if so compared."""
-    is_power, way = robot.measurement.quantity == "power", _way_of(robot)
+    is_power, drawing = robot.measurement.quantity == "power", _drawing(robot)
 
     def read(message: Any, receive_ns: int) -> Iterator[PowerReading]:
         for wheel, value in enumerate(numbers_of(message, WHEELS)[:WHEELS]):
-            power, current = (way(value), NAN) if is_power else (NAN, way(value))
+            power, current = (drawing(value), NAN) if is_power else (NAN, drawing(value))
             yield PowerReading(wheel, receive_ns, power, current, NAN)
 
     return (PowerTopic(ARRAY_TOPIC, MULTI_ARRAY, read),)
@@ -132,13 +128,13 @@ def multi_array(robot: Robot) -> tuple[PowerTopic, ...]:
 @source("joint_effort")
 def joint_effort(robot: Robot) -> tuple[PowerTopic, ...]:
     """`JointState.effort` of the wheels as motor current [A], with the encoders."""
-    wheels, way = WheelFinder(robot.wheel_names), _way_of(robot)
+    wheels, drawing = WheelFinder(robot.wheel_names), _drawing(robot)
 
     def read(message: Any, receive_ns: int) -> Iterator[PowerReading]:
         stamp = stamp_of(message, receive_ns)
         for wheel, current in enumerate(wheels.read(message).effort):
             if current == current:  # not NaN
-                yield PowerReading(wheel, stamp, NAN, way(current), NAN)
+                yield PowerReading(wheel, stamp, NAN, drawing(current), NAN)
 
     return (PowerTopic(ENCODER_TOPIC, JOINT_STATE, read),)
 
