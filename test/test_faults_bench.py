@@ -282,11 +282,11 @@ def test_absent_recordings_are_one_line(
 @pytest.mark.parametrize(
     ("kind", "current"),
     [
-        ("slow", -0.51),
-        ("coarse-currents", -0.5),
-        ("coarse-encoders", -0.51),
-        ("currents-alone", -0.51),
-        ("magnitudes", 0.51),
+        ("slow", -0.55),
+        ("coarse-currents", -0.55),
+        ("coarse-encoders", -0.55),
+        ("currents-alone", -0.55),
+        ("magnitudes", 0.55),
     ],
 )
 def test_other_sensors_say_less(kind: str, current: float) -> None:
@@ -295,7 +295,7 @@ def test_other_sensors_say_less(kind: str, current: float) -> None:
     for topic, number in (("/joint_states", 10), ("/wheel_1/power", 10), ("/cmd_vel", 10)):
         found = []
         for index in range(number):
-            content = bag_message(BATTERY, voltage=24.04, current=-0.51)
+            content = bag_message(BATTERY, voltage=24.04, current=-0.55)
             if topic == "/joint_states":
                 content = bag_message(JOINT_STATE, position=np.full(3, 0.1), velocity=np.ones(3))
             if SENSORS[kind](Message(topic, content, index), random):
@@ -303,6 +303,8 @@ def test_other_sensors_say_less(kind: str, current: float) -> None:
         if topic == "/wheel_1/power":
             assert len(found) == (2 if kind == "slow" else 10)
             assert abs(found[0].current - current) < (0.11 if kind == "coarse-currents" else 1e-6)
+            shown = {item.current for item in found}
+            assert len(shown) == (2 if kind == "coarse-currents" else 1)  # between two steps
             assert np.isnan(found[0].voltage) == (kind == "currents-alone")
         elif topic == "/joint_states":
             assert len(found) == (4 if kind == "slow" else 10)
@@ -331,6 +333,10 @@ def test_a_set_as_other_sensors_record_it_is_a_set(
     assert found.scorer.exists()
     (drive,) = found.drives("drives")
     (before,) = recordings.drives("drives")
+    (slow,) = Recordings(
+        record(recordings, "slow", tmp_path / "slow") / "faults_practice", "practice"
+    ).drives("drives")
+    assert _currents(slow.bag) == _currents(before.bag)[::5]
     signed, magnitudes = _currents(before.bag), _currents(drive.bag)
     assert min(signed) < 0.0
     assert magnitudes == [abs(current) for current in signed]

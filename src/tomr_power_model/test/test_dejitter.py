@@ -258,6 +258,15 @@ def test_a_loop_that_was_late_goes_on_with_another_phase(
     assert _recorded(taken, np.zeros(count), motion) < 5e-4
 
 
+@pytest.mark.parametrize("apart", [1, 3])
+def test_two_shifts_may_be_close_together(apart: int) -> None:
+    shifts = np.zeros(800)
+    shifts[[400, 400 + apart]] = 0.01
+    taken = 0.03 * np.arange(800) + np.cumsum(shifts)
+    stamps = taken + 1e-9 * _jitter(800)
+    assert np.abs(even(stamps) - taken)[400 - 20 : 400 + 20].max() < 2e-3
+
+
 @pytest.mark.parametrize(("late", "row"), [(0.35, 1), (0.35, 2), (0.7, 1)])
 def test_stamps_that_come_late_shift_no_phase(late: float, row: int) -> None:
     """A busy driver's: by so much of a period, one or two in a row."""
@@ -322,7 +331,7 @@ def test_lost_messages_of_slow_coarse_encoders_move_none() -> None:
     assert np.abs(error[400:]).max() < 0.005
 
 
-@pytest.mark.parametrize("rate", [5_000, 1_000_000_000])
+@pytest.mark.parametrize("rate", [5_000, 500_000_000, 1_000_000_000])
 def test_encoders_may_be_fast(rate: int) -> None:
     watched, step = RecentStamps(), 1_000_000_000 // rate
     dice = np.random.default_rng(5).integers(0, max(step // 2, 1), 400)

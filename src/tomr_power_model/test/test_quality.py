@@ -66,7 +66,7 @@ def reverse(drive: Drive) -> Drive:
         (lose_drive, 2, "does not follow its command", "--skip tour="),
         (stick, 1, "power sensor repeats 0.25", "--skip tour=9."),
         (saturate, 2, "power sensor is saturated", "record it again"),
-        (reverse, 3, "it draws -", "must be negative while power is drawn"),
+        (reverse, 3, "it draws -", "or set measurement.signed: false"),
     ],
 )
 def test_faults_are_refused_with_wheel_interval_and_remedy(

@@ -53,7 +53,7 @@ class RecentStamps:
         A stamp off the grid is late, or right; how far the wheels have turned tells which.
         """
         stamp, last = self._samples[number][0], self._samples[number - 1][0]
-        origin, period = self._origin + self._shift, max(round(1e9 * grid.period), 1)
+        origin, period = self._origin + self._shift, round(1e9 * grid.period)
         nearest = origin + round(1e9 * grid.nearest(1e-9 * (stamp - origin)))
         is_off = abs(stamp - nearest) > 1e9 * grid.reach
         # Where one seems to be missing, this one may be as late as a period.
