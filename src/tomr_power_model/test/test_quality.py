@@ -7,6 +7,7 @@ import pytest
 from attrs import evolve
 
 from tomr_power_model.calibration.following import lost_wheels
+from tomr_power_model.drive.cut import measured_when, without
 from tomr_power_model.drive.excitation import check_excitation
 from tomr_power_model.drive.quality import Finding, not_following, refuse, sensor_faults
 from tomr_power_model.drive.record import Drive
@@ -171,3 +172,26 @@ def test_wheels_are_held_against_any_expectation(make_drive: MakeDrive) -> None:
     (every,) = not_following(drive, ROBOT, time, 0.2 * expected)
     assert every.where == "all wheels"
     assert "controller.proportional" in every.remedy
+
+
+def test_readings_alike_on_either_side_of_a_gap_are_no_stuck_sensor(make_drive: MakeDrive) -> None:
+    """What `--skip` and lost commands leave out ends at one reading and goes on with the same."""
+    drive = make_drive(ROBOT, 1)
+    left = without(drive, [(12.0, 14.0)])
+    reading = left.reading.copy()
+    after = int(np.searchsorted(left.power_time, 13.0))
+    reading[after - 1 : after + 1] = 0.25
+    assert left.power_time[after] - left.power_time[after - 1] > 1.9
+    assert faults(evolve(left, reading=reading)) == []
+
+
+def test_a_slow_sensor_that_reads_the_same_twice_is_not_stuck(make_drive: MakeDrive) -> None:
+    """One of 1 Hz: two readings are a second apart."""
+    drive = make_drive(ROBOT, 1)
+    slow = measured_when(drive, lambda time: np.isin(time, drive.power_time[::50]))
+    reading = slow.reading.copy()
+    reading[10:12, 0] = 0.25
+    assert np.diff(slow.power_time)[10] >= 1.0
+    assert faults(evolve(slow, reading=reading)) == []
+    reading[10:16, 0] = 0.25
+    assert any("repeats 0.25" in str(found) for found in faults(evolve(slow, reading=reading)))

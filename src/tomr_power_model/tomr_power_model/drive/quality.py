@@ -3,6 +3,7 @@
 Each check looks at one recording and returns what it found, where, and what to do about it.
 """
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from tomr_power_model.drive.motion import measured_speed, wheel_motion
+from tomr_power_model.drive.quantum import quantum_of
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
 from tomr_power_model.geometry.kinematics import twist_to_wheels
@@ -20,7 +22,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _MOVING = 0.3  # rad/s of a wheel
-_STUCK = 1.0  # s with the very same reading
+_STUCK, _STUCK_COUNT = 1.0, 5  # s with the very same reading, and how often it is read
+_GAP = 5.0  # usual periods between two samples
 _CLIPPED_RUN, _CLIPPED_COUNT = 3, 6  # readings at one and the same peak
 _HIDDEN = 2.0  # quanta by which readings would pass the peak, were it no limit
 _FROZEN = 0.4  # s
@@ -51,15 +54,31 @@ class Finding:
         )
 
 
-def runs(mask: Mask, time: Array, least: float, bridge: float = 0.0) -> Iterator[tuple[int, int]]:
-    """First and last index of each run of True that lasts `least` [s]; short holes are bridged."""
+def runs(
+    mask: Mask, time: Array, least: float, *, bridge: float = 0.0, gap: float = math.inf
+) -> Iterator[tuple[int, int]]:
+    """First and last index of each run of True that lasts `least` [s].
+
+    Args:
+        mask: of samples, (n,).
+        time: of each [s], (n,).
+        least: s.
+        bridge: holes in a run that are as short are bridged [s].
+        gap: samples that are further apart are of two runs [s].
+    """
     index = np.flatnonzero(mask)
     if not len(index):
         return
-    breaks = (np.diff(index) > 1) & (np.diff(time[index]) > bridge)
+    apart = np.diff(time[index])
+    breaks = ((np.diff(index) > 1) & (apart > bridge)) | (apart > gap)
     for run in np.split(index, np.flatnonzero(breaks) + 1):
         if time[run[-1]] - time[run[0]] >= least:
             yield int(run[0]), int(run[-1])
+
+
+def _gap(time: Array) -> float:
+    """From which on nothing is known of what was between two samples [s]."""
+    return _GAP * float(np.median(np.diff(time)))
 
 
 def refuse(findings: Iterable[Finding]) -> None:
@@ -184,7 +203,7 @@ def _frozen_encoder(item: Drive, robot: Robot) -> Iterator[Finding]:
         working = np.interp(time, item.power_time[known], power)
         idle, usual = np.percentile(power, 5), np.percentile(power, 90)
         still = np.concatenate([[False], np.diff(angle) == 0.0])
-        for first, last in runs(still, time, _FROZEN):
+        for first, last in runs(still, time, _FROZEN, gap=_gap(time)):
             rows = slice(first, last + 1)
             drawn = float(np.median(working[rows]))
             if np.median(asked[rows, wheel]) < _NOTABLE:
@@ -205,13 +224,13 @@ def _stuck_power(item: Drive, robot: Robot) -> Iterator[Finding]:
         repeats = np.concatenate([[False], same]) | np.concatenate([same, [False]])
         moving = np.abs(speed) > _MOVING
         usual = float(np.mean(repeats[moving])) if moving.any() else 1.0
-        for first, last in runs(repeats, time, _STUCK):
+        for first, last in runs(repeats, time, _STUCK, gap=_gap(time)):
             rows = slice(first, last + 1)
             equal = reading[rows] == reading[first]
             changes = np.ptp(speed[rows]) > 0.2 * np.abs(speed).max() + _MOVING
             changes = changes and _changes(time, reading, speed, repeats, rows)
             noisy = usual < 0.5 and np.median(np.abs(speed[rows])) > _MOVING
-            if equal.all() and (changes or noisy):
+            if last - first + 1 >= _STUCK_COUNT and equal.all() and (changes or noisy):
                 seen = f"its power sensor repeats {reading[first]:.3g} while the wheel turns"
                 yield _found(item, name, rows, time, seen)
 
@@ -248,13 +267,13 @@ def _passes(time: Array, reading: Array, speed: Array, at_top: Mask, way: float)
         return bool(np.ptp(speed[at_top]) > 0.1 * np.abs(speed).max())
     rest = float(np.std((reading - expected)[~at_top]))
     beyond = float(np.percentile(way * (expected - reading)[at_top], 75))
-    return beyond > max(_HIDDEN * _quantum(reading), rest)
+    return beyond > max(_HIDDEN * quantum_of(reading), rest)
 
 
 def _changes(time: Array, reading: Array, speed: Array, repeats: Mask, rows: slice) -> bool:
     """Whether by the wheel's motion readings would change by more than a coarse sensor's quanta."""
     expected = _by_motion(time, reading, speed, ~repeats)
-    return expected is None or float(np.ptp(expected[rows])) > _HIDDEN * _quantum(reading)
+    return expected is None or float(np.ptp(expected[rows])) > _HIDDEN * quantum_of(reading)
 
 
 def _by_motion(time: Array, reading: Array, speed: Array, fitted: Mask) -> Array | None:
@@ -267,12 +286,6 @@ def _by_motion(time: Array, reading: Array, speed: Array, fitted: Mask) -> Array
         return None
     shape, *_ = np.linalg.lstsq(features[fitted], reading[fitted], rcond=None)
     return np.asarray(features @ shape)
-
-
-def _quantum(reading: Array) -> float:
-    """Usual step between the levels that a sensor reads."""
-    steps = np.diff(np.unique(reading))
-    return float(np.median(steps)) if len(steps) else 0.0
 
 
 def _wrong_sign(item: Drive, robot: Robot) -> Iterator[Finding]:
