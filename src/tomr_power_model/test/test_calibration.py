@@ -221,6 +221,21 @@ def test_motor_currents_without_sign_and_total_power_alone(make_drive: MakeDrive
         )
 
 
+def test_magnitudes_of_power_are_no_driving_where_a_motor_brakes(make_drive: MakeDrive) -> None:
+    """With the signs left out, what flows back is neither lost nor driven with."""
+    drive = make_drive(ROBOT, 2, noise=0.0)
+    assert drive.power.min() < -0.5
+    keys = (*FRICTION[:2], "robot.mass", "motor.torque_constant")
+    unsigned = {**VALUES, "measurement.signed": False, "robot.mass": 16.0}
+    magnitudes = evolve(
+        drive, power=np.abs(drive.power), total=drive.total[:0], total_time=drive.total_time[:0]
+    )
+    robot = robot_from_parameters(unsigned, "test")
+    choice = Choice(keys=keys, shared=("all",))
+    found = calibrate(unsigned, "test", align([magnitudes], robot, TIMING), (), choice=choice)
+    assert found.fitted.numbers == pytest.approx([VALUES[key] for key in keys], rel=0.01)
+
+
 def test_power_is_an_average_over_the_described_window(make_drive: MakeDrive) -> None:
     wide = evolve(ROBOT, sensors=evolve(ROBOT.sensors, power_window=0.02))
     described, given = (samples_of(make_drive(ROBOT, 1), wide, 0.05, w) for w in (None, 0.03))

@@ -44,9 +44,7 @@ def shown(
     return np.asarray(next(predict([Variant(laid_out(vehicle), 0, later)], excitation(), readout)))
 
 
-@pytest.mark.parametrize(
-    "kind", ["SPEED", "POWER", "TOTAL", "SUPPLY_VOLTAGE", "YAW", "CURRENT", "MAGNITUDE"]
-)
+@pytest.mark.parametrize("kind", ["SPEED", "POWER", "TOTAL", "SUPPLY_VOLTAGE", "YAW", "CURRENT"])
 def test_spans_are_means_over_whole_steps(make_vehicle: MakeVehicle, kind: str) -> None:
     vehicle = make_vehicle(further={"electrical.supply_sag": {"resistance": 0.2}})
     steps = drive(Variant(laid_out(vehicle)), excitation())
@@ -57,7 +55,6 @@ def test_spans_are_means_over_whole_steps(make_vehicle: MakeVehicle, kind: str) 
         "SUPPLY_VOLTAGE": steps.voltage,
         "YAW": steps.yaw_rate,
         "CURRENT": steps.current[:, 1],
-        "MAGNITUDE": np.abs(steps.current[:, 1]),
     }[kind]
     time = np.array([0.3, 0.6, 1.1, 1.5])
     found = shown(vehicle, getattr(batch, kind), time, 0.1)[0]
@@ -77,6 +74,19 @@ def test_power_rises_within_a_step_as_the_simulation_says(make_vehicle: MakeVehi
     half = shown(make_vehicle(), batch.POWER, np.array([0.1525]), 0.0025)[0]
     assert abs(steps.tilt[30, 1]) > 0.04
     np.testing.assert_allclose(half, steps.power[30, 1] - 0.25 * steps.tilt[30, 1], rtol=1e-9)
+
+
+def test_a_magnitude_is_that_of_the_mean_while_a_motor_brakes(make_vehicle: MakeVehicle) -> None:
+    """Of a sensor that lags, too: it averages before it forgets the sign."""
+    vehicle = make_vehicle(further={"sensor.power_lag": {"time_constant": 0.05}})
+    time = np.linspace(0.12, 1.2, 50)
+    for sign, magnitude in (
+        (batch.POWER, batch.POWER_MAGNITUDE),
+        (batch.CURRENT, batch.CURRENT_MAGNITUDE),
+    ):
+        drawn = shown(vehicle, sign, time, 0.1)[0]
+        assert drawn.min() < -0.01 < 0.01 < drawn.max()
+        np.testing.assert_allclose(shown(vehicle, magnitude, time, 0.1)[0], np.abs(drawn))
 
 
 def test_an_instant_is_read_as_a_mean_around_it(make_vehicle: MakeVehicle) -> None:

@@ -26,6 +26,8 @@ def modelled_power(robot: Robot, motion: WheelMotion, parts: int = 1) -> Array:
     power = drives.power
     if robot.measurement.quantity == "motor_current":
         power = motor_power(robot, drives.current, motion.speed)
+    elif not robot.measurement.signed:
+        power = np.abs(power)
     rows = np.empty((len(power), CHANNELS))
     rows[:, :WHEELS] = power
     rows[:, TOTAL] = drives.power.sum(axis=1) + robot.supply.auxiliary_power

@@ -31,7 +31,8 @@ from tomr_power_model.dynamics.start import begin
 from tomr_power_model.dynamics.step import advance
 
 # Kinds of channels, as numbers that compiled code can hold.
-SPEED, POWER, TOTAL, SUPPLY_VOLTAGE, YAW, CURRENT, MAGNITUDE = range(7)
+SPEED, POWER, TOTAL, SUPPLY_VOLTAGE, YAW, CURRENT = range(6)
+POWER_MAGNITUDE, CURRENT_MAGNITUDE = range(6, 8)  # of sensors that see no sign
 
 
 def run(
@@ -79,7 +80,7 @@ def series(p: Numbers, steps: Any, kind: int, wheel: int, value: Any, tilt: Any,
         tilt[k] = 0.0
         if kind == SPEED:
             value[k] = steps[k, own + OUT_SHOWN]
-        elif kind == POWER:
+        elif kind in (POWER, POWER_MAGNITUDE):
             value[k], tilt[k] = steps[k, own + OUT_POWER], steps[k, own + OUT_TILT]
         elif kind == TOTAL:
             total, change = p[AUXILIARY], 0.0
@@ -91,10 +92,8 @@ def series(p: Numbers, steps: Any, kind: int, wheel: int, value: Any, tilt: Any,
             value[k] = steps[k, OUT_VOLTAGE]
         elif kind == YAW:
             value[k] = steps[k, OUT_YAW]
-        elif kind == CURRENT:
-            value[k] = steps[k, own + OUT_CURRENT]
         else:
-            value[k] = abs(steps[k, own + OUT_CURRENT])
+            value[k] = steps[k, own + OUT_CURRENT]
 
 
 def follow(value: Any, tilt: Any, share: float) -> None:
@@ -151,7 +150,7 @@ def read(
         kind, wheel = channels[c, 0], channels[c, 1]
         series(p, steps, kind, wheel, value, tilt, n)
         shift, scale, bias = later, 1.0, 0.0
-        if kind == POWER:
+        if kind in (POWER, POWER_MAGNITUDE):
             w = HEADER + wheel * stride
             shift += p[w + POWER_DELAY]
             scale, bias = p[w + POWER_SCALE], p[w + POWER_BIAS]
@@ -168,7 +167,9 @@ def read(
             end = time[row] - shift - start + (0.0 if span[row] > 0.0 else 0.5 * step)
             change = integral_at(value, tilt, total, step, end)
             change -= integral_at(value, tilt, total, step, end - wide)
-            found[row] = scale * change / wide + bias
+            mean = scale * change / wide
+            # The sensor averages before it forgets the sign.
+            found[row] = (mean if kind < POWER_MAGNITUDE else abs(mean)) + bias
 
 
 def predict(

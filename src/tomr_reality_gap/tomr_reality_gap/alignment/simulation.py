@@ -36,6 +36,10 @@ _KINDS: dict[Kind, int] = {
     "yaw": batch.YAW,
     "current": batch.CURRENT,
 }
+_MAGNITUDES: dict[Kind, int] = {
+    "power": batch.POWER_MAGNITUDE,
+    "current": batch.CURRENT_MAGNITUDE,
+}
 
 
 @frozen
@@ -133,8 +137,8 @@ class RecordingSimulation:
         rows, first = [], 0
         for channel in self.channels:
             kind = _KINDS[channel.kind]
-            if channel.kind == "current" and not self.robot.measurement.signed:
-                kind = batch.MAGNITUDE
+            if not self.robot.measurement.signed:
+                kind = _MAGNITUDES.get(channel.kind, kind)
             last = first + len(channel.time)
             rows.append((kind, channel.wheel or 0, first, last))
             first = last
