@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import attrs
+from other_sensors import SENSORS
 from rich.console import Console
 
 from concealed import tables
@@ -14,6 +15,7 @@ from concealed.claims import read_truths
 from concealed.make import chosen, make_all
 from concealed.run import read_times, run_all, tool
 from concealed.score import by_group, confusion, score_all, sightings, totals
+from concealed.sensors import record
 from concealed.unnamed import figures, met_all
 from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK
 from tomr_power_model.errors import InputError
@@ -27,6 +29,9 @@ _RUN = """\
 Runs `tomr_gap explain` on every folder of CASES that has no report in REPORTS yet, as a process of
 its own, and keeps its report as REPORTS/<id>.json and the seconds it took. A case on which it fails
 is named with its last line. Works on the recordings `concealed` as well."""
+_SENSORS = """\
+Writes the cases of a folder as other sensors would have recorded them, their simulations as they
+are, into DIR/cases; the truth stays what it is. Works on the recordings `concealed` as well."""
 _SCORE = """\
 Scores a folder of reports against a folder of truths; a missing report is a miss. exact: effect and
 place, with confidence of at least 0.5. class: the effect, or one that data cannot distinguish from
@@ -164,8 +169,23 @@ def _run(options: argparse.Namespace) -> int:
     return EXIT_MISMATCH if failed else EXIT_OK
 
 
+def _sensors_parser(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("kind", choices=SENSORS, metavar="KIND", help="%(choices)s")
+    parser.add_argument("cases", type=Path, metavar="CASES", help="folder of <id>/robot.yaml, ...")
+    parser.add_argument("--out", type=Path, metavar="DIR", required=True, help="cases go here")
+    parser.set_defaults(command=_sensors)
+
+
+def _sensors(options: argparse.Namespace) -> int:
+    if not options.cases.is_dir():
+        raise InputError(f"{options.cases}: is no folder: give one of cases")
+    record(options.cases, options.kind, options.out)
+    return EXIT_OK
+
+
 _COMMANDS: dict[str, tuple[Callable[[argparse.ArgumentParser], None], str, str]] = {
     "make": (_make_parser, "conceal physics in simulated robots and record them", _MAKE),
+    "sensors": (_sensors_parser, "record cases with other sensors", _SENSORS),
     "run": (_run_parser, "let the tool explain a folder of cases", _RUN),
     "score": (_score_parser, "hold reports against the truth", _SCORE),
 }

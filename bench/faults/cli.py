@@ -28,7 +28,15 @@ _FITTING = {
     "commission": "run tomr_commission on the healthy drives: cost, verdict, floors",
     "calibrate": "run tomr_calibrate on the same: cost, values over the truth, or why it refused",
 }
-_SENSORS = ("slow", "coarse-currents", "coarse-encoders", "currents-alone", "magnitudes")
+_SENSORS = (
+    "slow",
+    "coarse-currents",
+    "coarse-everywhere",
+    "coarse-encoders",
+    "currents-alone",
+    "magnitudes",
+    "lost",
+)
 _SCORING = {
     "diagnose": "diagnose all drives with a description and score that",
     "power": "compare power residuals of the nodes with those of tomr_gap's simulation, by regime",

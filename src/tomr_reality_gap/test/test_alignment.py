@@ -81,6 +81,29 @@ def test_a_few_values_make_no_channel() -> None:
     assert lost == {"battery_state", "battery_state voltage"}
 
 
+def test_a_coarse_current_makes_a_channel_of_coarse_power() -> None:
+    """Steps of 0.1 A are 2.4 W at 24 V, of each motor and of the whole robot."""
+    robot = shipped_robot("reference")
+    recorded = _recorded(robot)
+    count = len(recorded.power_time)
+    current = 0.1 * np.random.default_rng(3).integers(0, 9, (count, 3))
+    noise = np.random.default_rng(4).normal(0.0, 0.001, count)
+    shown = evolve(
+        recorded,
+        reading=current,
+        power=current * 24.0,
+        total=(current[:, 0] + noise) * 24.0,
+        total_voltage=np.full(count, 24.0),
+    )
+    power, *_, total, _ = channels_of(shown, robot)[:5]
+    assert power.quantum == pytest.approx(2.4)
+    assert total.quantum < 0.01
+    assert power.rounding(np.array([4.8, 6.0, 5.4])) == pytest.approx((0.0 + 1.44 + 0.36) / 3.0)
+    (total, _) = channels_of(evolve(shown, total=current[:, 0] * 24.0), robot)[3:5]
+    assert total.quantum == pytest.approx(2.4)
+    assert channels_of(recorded, robot)[0].quantum == 0.0
+
+
 def test_ten_minutes_are_predicted_as_well_at_the_end_as_at_the_beginning() -> None:
     """By a description that is wrong by a little, of a robot that stops and stands in between."""
     robot = shipped_robot("reference")
@@ -153,6 +176,8 @@ def test_a_recording_that_begins_in_motion_goes_on_from_its_earlier_commands(
         velocity=drive.velocity[later],
         power_time=drive.power_time[powers] - begin,
         power=drive.power[powers],
+        reading=drive.reading[powers],
+        voltage=drive.voltage[powers],
         command_time=drive.command_time - begin,
         total_time=np.empty(0),
         total=np.empty(0),

@@ -22,7 +22,7 @@ COUNT = 3000
 def _channel(before: float, after: float, is_drawn: bool = True) -> Residuals:
     """White noise of 0.1 about offsets."""
     noise = 0.1 * np.random.default_rng(1).standard_normal(COUNT)
-    return Residuals(before + noise, after + noise, 1.0, 0.0, is_drawn)
+    return Residuals(before + noise, after + noise, 1.0, is_drawn)
 
 
 def test_an_interval_holds_noise_simulator_and_what_the_simulation_shows() -> None:
@@ -100,3 +100,15 @@ def test_speeds_count_for_the_share_only() -> None:
     share, size = unexplained([_channel(1.0, 0.0), _channel(1.0, 1.0, is_drawn=False)])
     assert share == pytest.approx(0.5, abs=0.02)
     assert size < 0.1
+
+
+@pytest.mark.parametrize("value", [1.2, 3.4, 5.0])
+def test_what_a_coarse_sensor_rounds_off_is_nothing_that_is_left(value: float) -> None:
+    """Levels 2.4 apart, without and with some noise: a value between two stays with one of them."""
+    random = np.random.default_rng(2)
+    for noise in (0.0, 0.7):
+        shown = 2.4 * np.round((value + noise * random.standard_normal(COUNT)) / 2.4)
+        off = (value - 2.4 * round(value / 2.4)) ** 2
+        left = shown - value
+        assert unexplained([Residuals(left, left, 3.0, True, 2.4, off)])[1] < 0.5
+        assert unexplained([Residuals(left + 6.0, left + 6.0, 3.0, True, 2.4, off)])[1] > 4.0

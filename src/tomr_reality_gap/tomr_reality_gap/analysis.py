@@ -85,8 +85,9 @@ def residuals_of(dataset: Dataset, before: Array, after: Array) -> list[Residual
             channel.value - before[part],
             channel.value - after[part],
             float(np.std(channel.value)),
-            channel.quantum,
             channel.kind in DRAWN_KINDS,
+            channel.quantum,
+            channel.rounding(after[part]),
         )
         for channel, part in zip(dataset.channels, rows_of(dataset.channels), strict=True)
         if channel.kind in (*DRAWN_KINDS, "speed")

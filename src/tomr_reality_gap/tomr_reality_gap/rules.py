@@ -32,8 +32,9 @@ class Residuals:
     before: Array  # measured - simulated as described, (n,)
     after: Array  # measured - simulated as explained, (n,)
     std: float  # of what was measured
-    quantum: float
     is_drawn: bool  # power or current drawn, not a speed
+    quantum: float = 0.0
+    rounding: float = 0.0  # mean square by which a coarse sensor's levels are off
 
 
 def estimate_of(
@@ -114,10 +115,12 @@ def unexplained(channels: Sequence[Residuals]) -> tuple[float, float]:
     first, left, drawn = 0.0, 0.0, []
     for item in channels:
         steps = np.abs(np.diff(item.after))
+        # Most steps of a coarse sensor may be none at all, the others one of its quanta.
+        usual = max(float(np.median(steps)), 0.5 * item.quantum)
         noise = max(
             0.5 * robust_scale(steps) ** 2,
-            0.5 * float(np.mean(np.minimum(steps, 5.0 * np.median(steps)) ** 2)),
-            item.quantum**2 / 12.0,
+            0.5 * float(np.mean(np.minimum(steps, 5.0 * usual) ** 2)),
+            item.rounding,
         )
         known = noise + (SIMULATOR.power * item.std) ** 2
         first += max(float(np.mean(item.before**2)) - known, 0.0) / known

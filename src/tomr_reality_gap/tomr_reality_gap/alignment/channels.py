@@ -6,6 +6,7 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.drive.quantum import quantum_of
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.robot import Robot
 
@@ -38,6 +39,15 @@ class Channel:
         """Some of its values."""
         return evolve(self, time=self.time[rows], span=self.span[rows], value=self.value[rows])
 
+    def rounding(self, value: Array) -> float:
+        """Mean square by which the nearest levels of a coarse sensor are off true values, (n,).
+
+        Values that hardly change lie anywhere between two levels, and stay there.
+        """
+        if not self.quantum:
+            return 0.0
+        return float(np.mean((value - self.quantum * np.round(value / self.quantum)) ** 2))
+
 
 def channels_of(recorded: Drive, robot: Robot) -> tuple[Channel, ...]:
     """All channels of a recording that hold enough to determine their noise."""
@@ -50,23 +60,38 @@ def channels_of(recorded: Drive, robot: Robot) -> tuple[Channel, ...]:
 
 def _powers(recorded: Drive, robot: Robot) -> list[Channel]:
     kind: Kind = "power"
-    unit, quantum = "W", 0.0
+    unit, least = "W", 0.0
     if robot.measurement.quantity == "motor_current":
-        kind, unit, quantum = "current", "A", robot.sensors.current_resolution
+        kind, unit, least = "current", "A", robot.sensors.current_resolution
     window = robot.sensors.power_window
     time, total = recorded.power_time, recorded.total_time
     span, total_span = np.full(len(time), window), np.full(len(total), window)
     volts = recorded.total_voltage
+    motors = [
+        Channel(f"{topic}/{kind}", kind, wheel, unit, time, span, power, max(least, quantum))
+        for wheel, (topic, power, quantum) in enumerate(
+            zip(robot.wheel_topics, recorded.power.T, _quanta(recorded), strict=True)
+        )
+    ]
+    coarse = _quantum(recorded.total / np.where(volts > 0.0, volts, np.nan), recorded.total)
     return [
-        *(
-            Channel(f"{topic}/{kind}", kind, wheel, unit, time, span, power, quantum)
-            for wheel, (topic, power) in enumerate(
-                zip(robot.wheel_topics, recorded.power.T, strict=True)
-            )
-        ),
-        Channel("battery_state", "total", None, "W", total, total_span, recorded.total),
+        *motors,
+        Channel("battery_state", "total", None, "W", total, total_span, recorded.total, coarse),
         Channel("battery_state voltage", "voltage", None, "V", total, total_span, volts),
     ]
+
+
+def _quanta(recorded: Drive) -> list[float]:
+    """Of the motors' power or current."""
+    pairs = zip(recorded.reading.T, recorded.power.T, strict=True)
+    return [_quantum(reading, power) for reading, power in pairs]
+
+
+def _quantum(reading: Array, drawn: Array) -> float:
+    """Of what is drawn, from readings of a current, or of that itself."""
+    per_reading = np.abs(drawn[reading != 0.0] / reading[reading != 0.0])
+    known = per_reading[np.isfinite(per_reading)]
+    return quantum_of(reading) * float(np.median(known)) if len(known) else 0.0
 
 
 def _blocks(recorded: Drive) -> Channel:

@@ -39,7 +39,8 @@ class Remainder:
         residual = dataset.value - value
         weight = np.empty_like(residual)
         for channel, part in zip(dataset.channels, rows_of(dataset.channels), strict=True):
-            weight[part] = 1.0 / _scatter(channel.value, residual[part], channel.quantum)
+            rounding = channel.rounding(value[part])
+            weight[part] = 1.0 / _scatter(channel.value, residual[part], rounding)
         gram = Gram.of(columns, residual, weight)
         values, vectors = np.linalg.eigh(gram.matrix)
         shown = (columns @ vectors[:, values > _SHOWS]) * weight[:, None]
@@ -61,11 +62,11 @@ class Remainder:
         return np.concatenate(stretch), np.concatenate(moment)
 
 
-def _scatter(value: Array, residual: Array, quantum: float) -> float:
+def _scatter(value: Array, residual: Array, rounding: float) -> float:
     """Noise of a channel from one sample to the next, and what no simulator reproduces of it."""
     steps = np.abs(np.diff(residual))
     noise = max(0.5 * robust_scale(steps) ** 2, 0.5 * float(np.mean(steps**2)) / 4.0)
-    return float(np.sqrt(max(noise, quantum**2 / 12.0) + (_INEXACT * np.std(value)) ** 2)) + 1e-12
+    return float(np.sqrt(max(noise, rounding) + (_INEXACT * np.std(value)) ** 2)) + 1e-12
 
 
 def whitened(columns: Matrix, weight: Array) -> NDArray[np.float32]:
