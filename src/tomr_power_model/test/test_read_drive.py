@@ -154,3 +154,13 @@ def test_malformed_messages_are_left_out_and_counted(
     found = read_drive(bag, ROBOT)
     assert len(found.command_time) == len(whole.command_time) - 2
     assert any("no number" in note for note in found.notes)
+
+
+def test_power_of_a_whole_robot_without_its_voltage_is_refused_in_these_words(
+    tmp_path: Path, make_drive: MakeDrive, write_bag: WriteBag
+) -> None:
+    drive = make_drive(ROBOT, 1, seconds=12.0)
+    alone = evolve(ROBOT, measurement=evolve(ROBOT.measurement, source="total_only"))
+    bag = write_bag(drive, tmp_path / "tour", voltage=float("nan"))
+    with pytest.raises(InputError, match=r"battery_state: the voltage of the whole supply is miss"):
+        read_drive(bag, alone)

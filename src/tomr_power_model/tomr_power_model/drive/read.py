@@ -164,7 +164,7 @@ def read_drive(path: Path, robot: Robot, namespace: str | None = None) -> Drive:
     command_time, command = _in_force(*collector.commands.since(start), encoder_time[-1])
     yaw_time, yaw_rate = collector.gyro.since(start)
     if not len(power_time) and not len(times[TOTAL]):
-        raise InputError(f"{path}: no power was measured: record the power topics too")
+        raise InputError(_no_power(path, collector))
     return Drive(
         name=path.name or str(path),
         encoder_time=encoder_time,
@@ -211,6 +211,13 @@ def _no_encoders(recording: Recording, robot: Robot, collector: _Collector) -> s
         f"{recording.path}: no encoder sample of {', '.join(robot.wheel_names)} ({seen}): "
         "this robot.yaml belongs to another robot, or set robot.wheel_names"
     )
+
+
+def _no_power(path: Path, collector: _Collector) -> str:
+    seen = next(iter(collector.complaints), None)
+    if seen is None:
+        return f"{path}: no power was measured: record the power topics too"
+    return f"{path}: no power was measured: {seen}: mend its driver, and record again"
 
 
 def _notes(path: Path, collector: _Collector) -> list[str]:
