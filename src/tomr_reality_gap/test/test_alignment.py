@@ -130,6 +130,24 @@ def test_ten_minutes_are_predicted_as_well_at_the_end_as_at_the_beginning() -> N
     assert by_tour[-1] == pytest.approx(by_tour[1], rel=0.05)
 
 
+def test_sensors_without_sign_show_the_magnitude_of_what_motors_draw_in_all(
+    simulation: RecordingSimulation,
+) -> None:
+    """Terms that are drawn besides included; the whole robot's sensor knows its sign."""
+    robot = simulation.robot
+    unsigned = evolve(robot, measurement=evolve(robot.measurement, signed=False))
+    drawn = np.full(simulation.size, 0.8)
+    signed = evolve(simulation, drawn=drawn)
+    found = evolve(signed, robot=unsigned).predict([unsigned])[0]
+    expected = signed.predict([robot])[0]
+    motors = np.concatenate(
+        [np.full(len(item.time), item.kind == "power") for item in simulation.channels]
+    )
+    assert expected[motors].min() < -0.5
+    assert expected[~motors].min() < -0.5  # speeds, at least
+    np.testing.assert_allclose(found, np.where(motors, np.abs(expected), expected))
+
+
 def test_drivers_go_on_believing_the_description(simulation: RecordingSimulation) -> None:
     """A robot that is wider than stated turns more slowly, its wheels do not."""
     wider = evolve(simulation.robot, robot_radius=1.1 * simulation.robot.robot_radius)

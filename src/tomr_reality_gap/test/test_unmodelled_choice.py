@@ -97,6 +97,7 @@ def test_where_something_is_there_for_sure_little_is_named_as_well(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert _chosen(monkeypatch, {SPEED: 0.1}, is_sure=True) == SPEED
+    assert _chosen(monkeypatch, {TIME: 0.05}, is_sure=True) is None
     assert _chosen(monkeypatch, {}, is_sure=True) is None
 
 

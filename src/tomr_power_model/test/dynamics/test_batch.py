@@ -76,19 +76,6 @@ def test_power_rises_within_a_step_as_the_simulation_says(make_vehicle: MakeVehi
     np.testing.assert_allclose(half, steps.power[30, 1] - 0.25 * steps.tilt[30, 1], rtol=1e-9)
 
 
-def test_a_magnitude_is_that_of_the_mean_while_a_motor_brakes(make_vehicle: MakeVehicle) -> None:
-    """Of a sensor that lags, too: it averages before it forgets the sign."""
-    vehicle = make_vehicle(further={"sensor.power_lag": {"time_constant": 0.05}})
-    time = np.linspace(0.12, 1.2, 50)
-    for sign, magnitude in (
-        (batch.POWER, batch.POWER_MAGNITUDE),
-        (batch.CURRENT, batch.CURRENT_MAGNITUDE),
-    ):
-        drawn = shown(vehicle, sign, time, 0.1)[0]
-        assert drawn.min() < -0.01 < 0.01 < drawn.max()
-        np.testing.assert_allclose(shown(vehicle, magnitude, time, 0.1)[0], np.abs(drawn))
-
-
 def test_an_instant_is_read_as_a_mean_around_it(make_vehicle: MakeVehicle) -> None:
     steps = drive(Variant(laid_out(make_vehicle())), excitation())
     found = shown(make_vehicle(), batch.SPEED, np.array([0.1525, 0.155]), 0.0)[0]

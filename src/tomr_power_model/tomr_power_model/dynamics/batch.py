@@ -32,7 +32,6 @@ from tomr_power_model.dynamics.step import advance
 
 # Kinds of channels, as numbers that compiled code can hold.
 SPEED, POWER, TOTAL, SUPPLY_VOLTAGE, YAW, CURRENT = range(6)
-POWER_MAGNITUDE, CURRENT_MAGNITUDE = range(6, 8)  # of sensors that see no sign
 
 
 def run(
@@ -80,7 +79,7 @@ def series(p: Numbers, steps: Any, kind: int, wheel: int, value: Any, tilt: Any,
         tilt[k] = 0.0
         if kind == SPEED:
             value[k] = steps[k, own + OUT_SHOWN]
-        elif kind in (POWER, POWER_MAGNITUDE):
+        elif kind == POWER:
             value[k], tilt[k] = steps[k, own + OUT_POWER], steps[k, own + OUT_TILT]
         elif kind == TOTAL:
             total, change = p[AUXILIARY], 0.0
@@ -150,7 +149,7 @@ def read(
         kind, wheel = channels[c, 0], channels[c, 1]
         series(p, steps, kind, wheel, value, tilt, n)
         shift, scale, bias = later, 1.0, 0.0
-        if kind in (POWER, POWER_MAGNITUDE):
+        if kind == POWER:
             w = HEADER + wheel * stride
             shift += p[w + POWER_DELAY]
             scale, bias = p[w + POWER_SCALE], p[w + POWER_BIAS]
@@ -167,9 +166,7 @@ def read(
             end = time[row] - shift - start + (0.0 if span[row] > 0.0 else 0.5 * step)
             change = integral_at(value, tilt, total, step, end)
             change -= integral_at(value, tilt, total, step, end - wide)
-            mean = scale * change / wide
-            # The sensor averages before it forgets the sign.
-            found[row] = (mean if kind < POWER_MAGNITUDE else abs(mean)) + bias
+            found[row] = scale * change / wide + bias
 
 
 def predict(

@@ -22,7 +22,7 @@ from tomr_power_model.dynamics.simulation import Excitation, Readout, Variant, d
 from tomr_power_model.dynamics.vehicle import vehicle_of
 from tomr_power_model.geometry.kinematics import wheels_to_twist
 from tomr_power_model.robot import WHEELS, Robot
-from tomr_reality_gap.alignment.channels import Channel, Kind
+from tomr_reality_gap.alignment.channels import MOTOR_KINDS, Channel, Kind
 
 Array = NDArray[np.float64]
 Tick = Callable[[int], None]
@@ -35,10 +35,6 @@ _KINDS: dict[Kind, int] = {
     "voltage": batch.SUPPLY_VOLTAGE,
     "yaw": batch.YAW,
     "current": batch.CURRENT,
-}
-_MAGNITUDES: dict[Kind, int] = {
-    "power": batch.POWER_MAGNITUDE,
-    "current": batch.CURRENT_MAGNITUDE,
 }
 
 
@@ -136,11 +132,8 @@ class RecordingSimulation:
         """What the channels show, and when."""
         rows, first = [], 0
         for channel in self.channels:
-            kind = _KINDS[channel.kind]
-            if not self.robot.measurement.signed:
-                kind = _MAGNITUDES.get(channel.kind, kind)
             last = first + len(channel.time)
-            rows.append((kind, channel.wheel or 0, first, last))
+            rows.append((_KINDS[channel.kind], channel.wheel or 0, first, last))
             first = last
         return Readout(
             np.array(rows, dtype=np.int64).reshape(-1, 4),
@@ -208,9 +201,19 @@ class RecordingSimulation:
         for found in predict(variants, self.excitation, self.readout, WHEELS, tick):
             if self.drawn is not None:
                 found += self.drawn
+            # A sensor averages before it forgets the sign.
+            np.abs(found, out=found, where=self._unsigned)
             rest.extend(found[1:])
             yield found[0]
         yield from rest
+
+    @cached_property
+    def _unsigned(self) -> NDArray[np.bool_]:
+        """Values of sensors that see no sign, (rows,)."""
+        kinds = () if self.robot.measurement.signed else MOTOR_KINDS
+        sizes = [len(channel.time) for channel in self.channels]
+        unsigned = np.array([channel.kind in kinds for channel in self.channels], dtype=bool)
+        return np.repeat(unsigned, sizes)
 
     def _variant(self, robot: Robot, later: Sequence[float] = ()) -> Variant:
         """A robot whose drivers go on believing that it is as described.

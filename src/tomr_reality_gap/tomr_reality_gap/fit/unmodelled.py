@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 _CLEARLY = 0.005  # of the squares that are left, that other wheels must explain
 _WHEEL_SHARE = 0.1  # of the wheel that shows most
 _NAMED = 0.3  # share of what is left that a term must predict
+_LITTLE = 0.1  # the same where something is there for sure: with less it would say nothing
 _SMALL = 0.02  # of a channel's standard deviation: less is not worth a word
 _LAW = 0.8  # of the squares that are left: a law that explains so much is no chance
 _AS_MUCH = 0.95  # of what a wider family predicts
@@ -88,8 +89,8 @@ def unmodelled_effect(
 ) -> Unmodelled | None:
     """The term that predicts most of what is left, if any predicts enough of it.
 
-    `is_sure`: something is there, whatever it is; `is_repeatable`: what another drive would not
-    repeat is not asked for.
+    `is_sure`: something is there, a term that predicts little is taken as well; `is_repeatable`:
+    what another drive would not repeat is not asked for.
     """
     motions = [motion_in(item, robot) for item in rest.dataset.simulations]
     least = -1.0 if is_sure else _HINT
@@ -110,7 +111,7 @@ def unmodelled_effect(
     best = lasting or events
     if lasting and events and lasting.share < max(_EVENT * events.share, _NAMED):
         best = events
-    if best is None or (best.share < _NAMED and not is_sure):
+    if best is None or best.share < (_LITTLE if is_sure else _NAMED):
         return None
     if best is not events:
         alike = [item for item in tried if not item.table.family.is_event and item is not best]
