@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tomr_power_model.drive.quantum import quantum_of
+from tomr_power_model.drive.quantum import count_of, quantum_of
 
 
 def test_a_quantum_is_the_distance_to_the_next_level() -> None:
@@ -27,3 +27,12 @@ def test_products_of_one_level_are_one_level() -> None:
 @pytest.mark.parametrize("reading", [[], [np.nan, np.nan], [0.3, 0.3]])
 def test_one_level_tells_no_quantum(reading: list[float]) -> None:
     assert quantum_of(np.array(reading)) == 0.0
+
+
+def test_encoders_go_by_what_their_steps_differ_by() -> None:
+    """Three counts a sample and then five; a lost sample makes a step of two."""
+    counts = np.cumsum([0, 3, 3, 3, 5, 5, 10, 5, 3])
+    position = np.stack([0.01 * counts, np.full(9, 0.4), np.full(9, np.nan)], axis=1)
+    assert count_of(position) == pytest.approx(0.02)
+    assert count_of(position[:, 1:]) == 0.0
+    assert count_of(position[:2]) == 0.0

@@ -96,7 +96,7 @@ def _parser() -> argparse.ArgumentParser:
         type=float,
         metavar="S",
         help="span of the fit to the encoders (default: as robot.yaml gives it to power_model, "
-        "else 0.05; five samples at least)",
+        "else 0.05, up to 0.2 for coarse encoders; five samples at least)",
     )
     add("--squares", action="store_true", help="plain least squares, no robust loss")
     return parser
@@ -125,11 +125,11 @@ def _bar(title: str, total: int | None, unit: str) -> Iterator[Callable[[], None
 def _timing(options: argparse.Namespace) -> Timing:
     span = options.encoder_window
     if span is None:
-        span = read_node_sections(options.robot, ["power_model"]).get("encoder_window", 0.05)
+        span = read_node_sections(options.robot, ["power_model"]).get("encoder_window")
     for name, value in (("--encoder-window", span), ("--power-window", options.power_window)):
         if value is not None and not (isinstance(value, int | float) and 0.0 < value <= 1.0):
             raise InputError(f"{name} {value}: give seconds above 0 and up to 1")
-    return Timing(float(span), options.power_window)
+    return Timing(None if span is None else float(span), options.power_window)
 
 
 def _calibrate(arguments: Sequence[str] | None) -> int:

@@ -13,6 +13,7 @@ from tomr_power_model.calibration.parameters import Choice, choose
 from tomr_power_model.calibration.problem import Problem
 from tomr_power_model.calibration.samples import TOTAL, Samples, samples_of
 from tomr_power_model.calibration.scoring import Scores, score, suspicious
+from tomr_power_model.calibration.span import span_warnings
 from tomr_power_model.calibration.structure import structure_warnings
 from tomr_power_model.drive.clean import cleaned
 from tomr_power_model.drive.cut import Skips, names_of, without
@@ -34,7 +35,7 @@ _ONE_PIECE = 0.4  # of such time
 class Timing:
     """How motion and power are brought to the same instants [s]."""
 
-    span: float = 0.05  # of the fit to the encoders
+    span: float | None = None  # of the fit to the encoders; None: `span_of` a drive
     window: float | None = None  # of the power sensor; None: sensors.power_window
 
 
@@ -129,6 +130,7 @@ def calibrate(
         held_out_scores=score(held_out, robot),
         held_out_scores_before=score(held_out, before),
         warnings=(
+            *span_warnings([item.span for item in (*samples, *held_out)]),
             *structure_warnings((*samples, *held_out), robot),
             *warnings_of(parameters, fitted, robot.wheel_names),
         ),

@@ -50,17 +50,22 @@ def fit(problem: Problem, robust: bool = True, tick: Callable[[], None] = lambda
     """Fit a problem's parameters; `tick` is called at every evaluation of the model."""
     mean = np.array([item.prior_mean for item in problem.parameters])
     std = prior_stds(problem.parameters)
-    lower, upper = ((bound - mean) / std for bound in bounds(problem.parameters))
+    least, most = bounds(problem.parameters)
+    lower, upper = (least - mean) / std, (most - mean) / std
+
+    def numbers_at(units: Array) -> Array:
+        return np.clip(mean + std * units, least, most)  # rounding leads out of them
+
     # Off zero, where some effects have no slope.
     units = np.where(mean == 0.0, _NUDGE, 0.0)
-    residual, converged = problem.residual(mean + std * np.clip(units, lower, upper)), False
+    residual, converged = problem.residual(numbers_at(units)), False
     for _ in range(_ROUNDS):
         scale, weight = _weights(problem, residual)
 
         def evaluate(
             _: Sequence[int], points: Sequence[Array], scale: Array = scale, weight: Array = weight
         ) -> list[Linearisation]:
-            numbers = mean + std * points[0]
+            numbers = numbers_at(points[0])
             root, change = soft_l1(problem.residual(numbers) / scale, robust)
             slope = problem.jacobian(numbers, _STEP * std, tick) * std
             known = np.isfinite(root)
@@ -71,8 +76,8 @@ def fit(problem: Problem, robust: bool = True, tick: Callable[[], None] = lambda
         (found,) = maximise([start], evaluate, _SETTINGS)
         assert found.best is not None
         units, converged = found.best.units, not found.is_open
-        residual = problem.residual(mean + std * units)
-    numbers = mean + std * units
+        residual = problem.residual(numbers_at(units))
+    numbers = numbers_at(units)
     scale, weight = _weights(problem, residual)
     slope = problem.jacobian(numbers, _STEP * std, tick) * std
     uncertainty = block_jackknife(

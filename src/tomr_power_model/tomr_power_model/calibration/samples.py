@@ -3,9 +3,10 @@
 import math
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.calibration.span import LEAST, Span, span_of
 from tomr_power_model.drive.motion import median_period, wheel_motion
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.dynamics.drives import WheelMotion
@@ -28,6 +29,7 @@ class Samples:
     motion: WheelMotion  # at `parts` points of the sensor's window each, (n * parts, 3)
     parts: int
     stretch: NDArray[np.int64]  # number of the uninterrupted stretch, (n,)
+    span: Span = field(factory=lambda: Span(LEAST))  # of the fit to the encoders
 
     @property
     def mean_motion(self) -> WheelMotion:
@@ -41,17 +43,18 @@ class Samples:
     def keep(self, rows: NDArray[np.bool_]) -> "Samples":
         """Some of the instants."""
         points = np.repeat(rows, self.parts)
-        return Samples(
-            self.name,
-            self.time[rows],
-            self.measured[rows],
-            WheelMotion(self.motion.speed[points], self.motion.acceleration[points]),
-            self.parts,
-            self.stretch[rows],
+        return evolve(
+            self,
+            time=self.time[rows],
+            measured=self.measured[rows],
+            motion=WheelMotion(self.motion.speed[points], self.motion.acceleration[points]),
+            stretch=self.stretch[rows],
         )
 
 
-def samples_of(drive: Drive, robot: Robot, span: float, window: float | None = None) -> Samples:
+def samples_of(
+    drive: Drive, robot: Robot, span: float | None = None, window: float | None = None
+) -> Samples:
     """Motion where power was measured.
 
     Instants without a known motion of all wheels are left out.
@@ -59,10 +62,11 @@ def samples_of(drive: Drive, robot: Robot, span: float, window: float | None = N
     Args:
         drive: the recording.
         robot: its description; R and k turn motor currents into power.
-        span: of the fit to the encoders [s].
+        span: of the fit to the encoders [s]; None: as coarse as they are (`span_of`).
         window: over which the power sensor averages before its stamp [s]; None: the robot's.
     """
     window = robot.sensors.power_window if window is None else window
+    fitted = span_of(drive) if span is None else Span(span)
     time = np.union1d(drive.power_time, drive.total_time)
     measured = np.full((len(time), CHANNELS), np.nan)
     rows = np.searchsorted(time, drive.power_time)
@@ -75,13 +79,13 @@ def samples_of(drive: Drive, robot: Robot, span: float, window: float | None = N
         drive.position,
         drive.velocity,
         (time[:, None] - back).ravel(),
-        span,
+        fitted.length,
     )
     if robot.measurement.quantity == "motor_current":
         speed = motion.speed.reshape(-1, parts, WHEELS).mean(axis=1)
         measured[:, :WHEELS] = motor_power(robot, measured[:, :WHEELS], speed)
     stretch = np.concatenate([[0], np.cumsum(np.diff(time) > _STRETCH_GAP)])
-    samples = Samples(drive.name, time, measured, motion, parts, stretch)
+    samples = Samples(drive.name, time, measured, motion, parts, stretch, fitted)
     known = np.isfinite(motion.speed).all(axis=1).reshape(-1, parts).all(axis=1)
     return samples.keep(known & np.isfinite(measured).any(axis=1))
 

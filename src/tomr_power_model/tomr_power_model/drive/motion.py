@@ -11,7 +11,7 @@ Index = NDArray[np.signedinteger]
 Mask = NDArray[np.bool_]
 
 _CHUNK = 20_000  # rows worked out at a time, which bounds the memory
-_LEAST = 5  # encoder periods in a fit: fewer amplify the encoder's quanta too much
+LEAST_PERIODS = 5  # in a fit: fewer amplify the encoder's quanta too much
 _GAP = 3.0  # periods without a sample are a gap; no motion is known next to it
 _SPEED, _ACCELERATION = 1, 2
 
@@ -37,7 +37,7 @@ def wheel_motion(
         at: times asked for [s], (m,).
         span: of the fit [s]; widened to five encoder periods at least.
     """
-    half = 0.5 * max(span, _LEAST * median_period(time))
+    half = 0.5 * max(span, LEAST_PERIODS * median_period(time))
     speed, acceleration = np.full((len(at), 3), np.nan), np.full((len(at), 3), np.nan)
     for wheel in range(3):
         known = ~np.isnan(position[:, wheel])

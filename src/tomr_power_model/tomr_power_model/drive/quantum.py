@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _EXACT = 9  # decimals of a reading: what differs by less is one level
+_SAME = 1e-6  # rad: two steps that differ by less are alike
 
 
 def quantum_of(reading: Array) -> float:
@@ -20,3 +21,13 @@ def quantum_of(reading: Array) -> float:
     steps = np.diff(levels)
     nearest = np.minimum(np.append(steps, np.inf), np.insert(steps, 0, np.inf))
     return float(np.median(nearest[level]))
+
+
+def count_of(position: Array) -> float:
+    """By which the angles of encoders go, as samples show it [rad], (n, m); 0: they do not.
+
+    Whole counts: what steps differ by is one of them at least.
+    """
+    uneven = np.abs(np.diff(position, n=2, axis=0))
+    differing = uneven[uneven > _SAME]
+    return float(differing.min()) if len(differing) else 0.0

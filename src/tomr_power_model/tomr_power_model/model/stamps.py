@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomr_power_model.drive.dejitter import UNSETTLED, Grid, grid_of, is_jitter
+from tomr_power_model.drive.quantum import count_of
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -14,7 +15,6 @@ _LEAST = 50  # before any are
 _EVERY = 25  # samples: how often
 _STEADY = 0.04  # s before a sample that show how fast the wheels turn, at least one period
 _CLEARLY = 0.05  # squared distances: a sample fits one time much better than another
-_SAME = 1e-6  # rad: two steps that differ by less are alike
 
 
 class RecentStamps:
@@ -82,7 +82,7 @@ class RecentStamps:
 
     def _look(self) -> None:
         positions = np.array([position for _, position in self._samples])
-        self._look_at_steps(positions)
+        self.resolution = count_of(positions) or self.resolution
         stamps_ns = [stamp for stamp, _ in self._samples]
         self._origin, self._shift = stamps_ns[0], 0
         stamps = 1e-9 * (np.array(stamps_ns) - self._origin)
@@ -99,10 +99,3 @@ class RecentStamps:
         self._times = dict(zip(stamps_ns[:-UNSETTLED], times[:-UNSETTLED], strict=True))
         for number in range(-UNSETTLED, 0):
             self._times[stamps_ns[number]] = self._time(self._grid, number)
-
-    def _look_at_steps(self, positions: Array) -> None:
-        """Whole counts: what steps differ by is one of them at least."""
-        uneven = np.abs(np.diff(positions, n=2, axis=0))
-        differing = uneven[uneven > _SAME]
-        if len(differing):
-            self.resolution = float(differing.min())
