@@ -161,6 +161,16 @@ def test_missing_physics_is_suspected_where_the_misfit_follows_speed(make_drive:
     assert structure_warnings(samples, real) == []
 
 
+def test_missing_physics_is_suspected_beneath_a_coarse_sensors_noise(make_drive: MakeDrive) -> None:
+    """Friction that is left out, in readings of 2.4 W steps; the steps alone are no physics."""
+    windy = {"friction.quadratic": ({"coefficient": 4e-4},) * 3}
+    real = evolve(ROBOT, physics={**ROBOT.physics, **windy})
+    for seed, robot, expected in ((3, ROBOT, 1), (4, ROBOT, 1), (3, real, 0), (4, real, 0)):
+        drive = make_drive(real, seed, seconds=240.0, noise=0.8)
+        coarse = evolve(drive, power=2.4 * np.round(drive.power / 2.4))
+        assert len(structure_warnings(align([coarse], robot, TIMING), robot)) == expected
+
+
 def test_wheels_at_rest_say_nothing_where_drivers_hold_them(make_drive: MakeDrive) -> None:
     (samples,) = align([make_drive(ROBOT, 1)], ROBOT, TIMING)
     still = np.abs(samples.motion.speed) < 0.15

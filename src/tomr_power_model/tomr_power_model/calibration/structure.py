@@ -1,5 +1,6 @@
 """What a fit leaves, and what it depends on: missing physics biases the values that are fitted."""
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -7,13 +8,15 @@ from numpy.typing import NDArray
 
 from tomr_power_model.calibration.problem import determined, modelled_power
 from tomr_power_model.calibration.samples import Samples
+from tomr_power_model.estimation.statistics import autocorrelation_time
 from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
 
 _BINS = 15
 _SHARE = 0.1  # of the residual's variance
-_NOTABLE = 5e-3  # of the power, rms
+_NOTABLE, _MUCH = 5e-3, 0.015  # of the power, rms
+_SURELY = 5.0  # times the share that noise has by chance
 _LATE = 0.01  # s
 _FEWEST = 50 * _BINS  # samples
 
@@ -35,8 +38,8 @@ def structure_warnings(samples: Sequence[Samples], robot: Robot) -> list[str]:
                 "run tomr_gap explain, which fits sensor.clock_offset"
             )
         for name, values in variables.items():
-            share = _explained(values, residual)
-            if share > _SHARE and share**0.5 * np.std(residual) > _NOTABLE * _rms(power):
+            share, chance = _explained(values, residual)
+            if _is_structure(share, float(np.std(residual)) / _rms(power), chance):
                 found[name] = max(found.get(name, (0.0, "")), (share, robot.wheel_names[wheel]))
     if found:
         name, (share, where) = max(found.items(), key=lambda item: item[1])
@@ -76,13 +79,34 @@ def _of_recording(item: Samples, robot: Robot, wheel: int) -> Iterator[Array]:
         )
 
 
-def _explained(values: Array, residual: Array) -> float:
-    """Share of a residual's variance in its means over quantiles of a variable."""
+def _explained(values: Array, residual: Array) -> tuple[float, float]:
+    """Share of a residual's variance in its means over quantiles of a variable.
+
+    And the share that those of noise would have which is correlated as what is left is.
+    """
     edges = np.quantile(values, np.arange(1, _BINS) / _BINS)
     place = np.digitize(values, edges)
     count = np.maximum(np.bincount(place, minlength=_BINS), 1)
     mean = np.bincount(place, weights=residual, minlength=_BINS) / count
-    return 1.0 - float(np.var(residual - mean[place])) / max(float(np.var(residual)), 1e-12)
+    left = residual - mean[place]
+    share = 1.0 - float(np.var(left)) / max(float(np.var(residual)), 1e-12)
+    return share, _BINS * autocorrelation_time([left]) / len(left)
+
+
+def _is_structure(share: float, residual: float, chance: float) -> bool:
+    """Whether a share of a residual's variance is missing physics.
+
+    Sensors that are noisy or coarse hide in the residual what is much of the power all the same.
+
+    Args:
+        share: of the variance.
+        residual: its standard deviation, of the power's rms.
+        chance: share that means of noise would have.
+    """
+    size = math.sqrt(max(share, 0.0)) * residual
+    if share > _SHARE:
+        return size > _NOTABLE
+    return size > _MUCH and share > _SURELY * chance
 
 
 def _rms(values: Array) -> float:
