@@ -11,7 +11,6 @@ from attrs import frozen
 
 from tomr_power_model.recordings import RecordingWriter, open_recording
 
-_COUNTS = 256
 _LOST = 0.02
 _CURRENT, _NOISE, _VOLTAGE = 0.1, 0.03, 0.1  # A, A, V
 Random = np.random.Generator
@@ -75,10 +74,20 @@ def coarse_everywhere(message: Message, random: Random) -> bool:
 
 
 @_sensors
+def motor_encoders(message: Message, _: Random) -> bool:
+    """Encoders of 64 counts a motor turn at a gear of 15, without speeds."""
+    return _counted(message, 960)
+
+
+@_sensors
 def coarse_encoders(message: Message, _: Random) -> bool:
     """Encoders of 256 counts a wheel turn, without speeds."""
+    return _counted(message, 256)
+
+
+def _counted(message: Message, counts: int) -> bool:
     if message.is_encoder:
-        step = 2.0 * np.pi / _COUNTS
+        step = 2.0 * np.pi / counts
         message.content.position = step * np.floor(np.asarray(message.content.position) / step)
         message.content.velocity = np.zeros(0)
     return True

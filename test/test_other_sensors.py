@@ -24,6 +24,7 @@ from other_sensors import SENSORS, Message  # noqa: E402
         ("slow", -0.55),
         ("coarse-currents", -0.55),
         ("coarse-encoders", -0.55),
+        ("motor-encoders", -0.55),
         ("currents-alone", -0.55),
         ("magnitudes", 0.55),
         ("coarse-everywhere", -0.55),
@@ -48,10 +49,10 @@ def test_other_sensors_say_less(kind: str, current: float) -> None:
             assert np.isnan(found[0].voltage) == (kind == "currents-alone")
         elif topic == "/joint_states":
             assert len(found) == (4 if kind == "slow" else 10)
-            step = 2.0 * np.pi / 256
-            coarse = kind == "coarse-encoders"
-            assert found[0].position[0] == pytest.approx(4.0 * step if coarse else 0.1)
-            assert len(found[0].velocity) == (0 if coarse else 3)
+            counted = {"coarse-encoders": 4.0 / 256, "motor-encoders": 15.0 / 960}.get(kind)
+            position = 0.1 if counted is None else 2.0 * np.pi * counted
+            assert found[0].position[0] == pytest.approx(position)
+            assert len(found[0].velocity) == (3 if counted is None else 0)
         else:
             assert len(found) == 10
 

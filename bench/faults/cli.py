@@ -32,6 +32,7 @@ _SENSORS = (
     "slow",
     "coarse-currents",
     "coarse-everywhere",
+    "motor-encoders",
     "coarse-encoders",
     "currents-alone",
     "magnitudes",
