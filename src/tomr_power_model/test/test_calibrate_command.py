@@ -9,7 +9,7 @@ import pytest
 import yaml
 from attrs import evolve
 
-from tomr_power_model.calibrate_cli import main
+from tomr_power_model.calibrate_cli import _parser, _timing, main
 from tomr_power_model.calibration.calibrate import Timing, align, calibrate
 from tomr_power_model.calibration.parameters import Choice
 from tomr_power_model.drive.record import Drive
@@ -21,6 +21,7 @@ NAME = "<script>\x01 $a_ #: {\ntour"
 MakeDrive = Callable[..., Drive]
 WriteBag = Callable[..., Path]
 ROBOT = shipped_robot("reference")
+REFERENCE = Path(load_robot.__code__.co_filename).parents[1] / "robots" / "reference.yaml"
 FAULTY_BAG = Path(__file__).resolve().parents[3] / "bags" / "circle_encoder_lost"
 
 
@@ -35,6 +36,24 @@ def test_power_unlike_the_rest_is_refused_after_the_fit(make_drive: MakeDrive) -
     samples = align([evolve(drive, power=power)], ROBOT, Timing())
     with pytest.raises(InputError, match=r"wheel_1_joint, (9.9|10.\d) s to 1[56].\d s: it draws"):
         calibrate(read_description("reference"), "test", samples, (), choice=Choice())
+
+
+@pytest.mark.parametrize(
+    ("more", "sections", "expected"),
+    [
+        ([], {}, Timing()),
+        ([], {"power_model": {"ros__parameters": {"encoder_window": 0.09}}}, Timing(span=0.09)),
+        (["--encoder-window", "0.12", "--power-window", "0.02"], {}, Timing(0.12, 0.02)),
+    ],
+)
+def test_the_span_is_that_of_the_encoders_unless_somebody_gives_one(
+    tmp_path: Path, more: list[str], sections: dict[str, object], expected: Timing
+) -> None:
+    robot = tmp_path / "robot.yaml"
+    described = yaml.safe_load(REFERENCE.read_text(encoding="utf-8"))
+    described.pop("power_model", None)
+    robot.write_text(yaml.safe_dump({**described, **sections}))
+    assert _timing(_parser().parse_args(["tour", "--robot", str(robot), *more])) == expected
 
 
 class _Links(HTMLParser):

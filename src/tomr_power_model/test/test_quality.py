@@ -180,7 +180,7 @@ def test_readings_alike_on_either_side_of_a_gap_are_no_stuck_sensor(make_drive: 
     left = without(drive, [(12.0, 14.0)])
     reading = left.reading.copy()
     after = int(np.searchsorted(left.power_time, 13.0))
-    reading[after - 1 : after + 1] = 0.25
+    reading[after - 4 : after + 4] = 0.25
     assert left.power_time[after] - left.power_time[after - 1] > 1.9
     assert faults(evolve(left, reading=reading)) == []
 

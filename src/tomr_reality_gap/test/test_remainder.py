@@ -5,7 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from attrs import evolve
 
+from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.fit.remainder import Remainder, predicted_share
 
 SAMPLES, BLOCKS = 4000, 8
@@ -58,3 +60,14 @@ def test_a_share_is_bounded_either_way() -> None:
     _, column = _made()
     assert _share(2.0 * column, column) == 1.0
     assert _share(2.0 * column, np.where(LABELS == 3, 30.0, 1.0) * column) == -1.0
+
+
+def test_what_a_coarse_sensor_rounds_off_is_noise() -> None:
+    """1.0 W, read as 0 by one of 2.4 W steps: what is left is one of its standard deviations."""
+    time, value = 0.02 * np.arange(200), np.zeros(200)
+    exact = Channel("wheel_1/power", "power", 0, "W", time, time, value)
+    for channel, least in ((exact, 1e9), (evolve(exact, quantum=2.4), 1.0)):
+        dataset = SimpleNamespace(channels=(channel,), value=value)
+        rest = Remainder.of(dataset, np.ones(200), np.zeros((200, 1)))  # type: ignore[arg-type]
+        left = np.abs(rest.residual).max()
+        assert left >= least if channel is exact else left == pytest.approx(least)

@@ -1,10 +1,13 @@
 """The rules of a verdict, on numbers made by hand."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from tomr_reality_gap.alignment.channels import Channel
+from tomr_reality_gap.analysis import residuals_of
 from tomr_reality_gap.rules import (
     Residuals,
     confidence_of,
@@ -112,3 +115,12 @@ def test_what_a_coarse_sensor_rounds_off_is_nothing_that_is_left(value: float) -
         left = shown - value
         assert unexplained([Residuals(left, left, 3.0, True, 2.4, off)])[1] < 0.5
         assert unexplained([Residuals(left + 6.0, left + 6.0, 3.0, True, 2.4, off)])[1] > 4.0
+
+
+def test_what_a_model_leaves_of_a_coarse_channel_knows_how_coarse_it_is() -> None:
+    """1.0 and 1.4 W, shown as 0 and 2.4: by the explained values, not by those as described."""
+    time, value = np.arange(4.0), np.array([0.0, 0.0, 2.4, 2.4])
+    channel = Channel("wheel_1/power", "power", 0, "W", time, time, value, 2.4)
+    after = np.array([1.0, 1.0, 1.4, 1.4])
+    (left,) = residuals_of(SimpleNamespace(channels=(channel,), value=value), 0.0 * after, after)  # type: ignore[arg-type]
+    assert (left.quantum, left.rounding, left.is_drawn) == (2.4, pytest.approx(1.0), True)

@@ -203,7 +203,7 @@ def _frozen_encoder(item: Drive, robot: Robot) -> Iterator[Finding]:
         working = np.interp(time, item.power_time[known], power)
         idle, usual = np.percentile(power, 5), np.percentile(power, 90)
         still = np.concatenate([[False], np.diff(angle) == 0.0])
-        for first, last in runs(still, time, _FROZEN, gap=_gap(time)):
+        for first, last in runs(still, time, _FROZEN):
             rows = slice(first, last + 1)
             drawn = float(np.median(working[rows]))
             if np.median(asked[rows, wheel]) < _NOTABLE:
