@@ -171,6 +171,15 @@ def test_missing_physics_is_suspected_beneath_a_coarse_sensors_noise(make_drive:
         assert len(structure_warnings(align([coarse], robot, TIMING), robot)) == expected
 
 
+def test_a_trace_of_missing_physics_in_a_long_drive_is_none(make_drive: MakeDrive) -> None:
+    """Surely there, but half a percent of the power."""
+    real = evolve(
+        ROBOT, physics={**ROBOT.physics, "friction.quadratic": ({"coefficient": 2e-5},) * 3}
+    )
+    drive = make_drive(real, 3, seconds=240.0, noise=0.05)
+    assert structure_warnings(align([drive], ROBOT, TIMING), ROBOT) == []
+
+
 def test_wheels_at_rest_say_nothing_where_drivers_hold_them(make_drive: MakeDrive) -> None:
     (samples,) = align([make_drive(ROBOT, 1)], ROBOT, TIMING)
     still = np.abs(samples.motion.speed) < 0.15

@@ -9,6 +9,7 @@ from attrs import evolve
 from tomr_power_model.calibration.calibrate import Timing, align, calibrate
 from tomr_power_model.calibration.parameters import Choice
 from tomr_power_model.calibration.span import LEAST, MOST, Span, span_of, span_warnings
+from tomr_power_model.drive.motion import wheel_motion
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.robot import read_description, shipped_robot
 
@@ -42,12 +43,29 @@ def test_coarser_encoders_are_fitted_over_longer_spans(make_drive: MakeDrive) ->
 
 
 def test_rounding_is_what_a_parabola_leaves_of_it(make_drive: MakeDrive) -> None:
-    """Angles that are off by up to half a count at random, over 0.1 s of 100 Hz."""
+    """Angles that are off by up to half a count at random, over 0.1 s of 100 Hz.
+
+    In a drive 0.2 s hold 20 samples of 100 Hz, but of 20 Hz five are 0.25 s.
+    """
     random = np.random.default_rng(3)
     time, half = np.arange(-5.0, 5.0) * 0.01 + 0.005, 0.5 * COUNTS[2]
     fits = [np.polyfit(time, random.uniform(-half, half, 10), 2)[0] for _ in range(4000)]
     expected = COUNTS[2] / np.sqrt(12.0) * np.sqrt(720.0 / 10) / 0.1**2
     assert 2.0 * np.std(fits) == pytest.approx(expected, rel=0.05)
+    drive = counted(make_drive(ROBOT, 1), COUNTS[2])
+    rows = slice(None, None, 5)
+    slow = evolve(
+        drive,
+        encoder_time=drive.encoder_time[rows],
+        position=drive.position[rows],
+        velocity=drive.velocity[rows],
+    )
+    for shown, count, length in ((drive, 20, 0.2), (slow, 5, 0.25)):
+        at = shown.encoder_time[::5]
+        motion = wheel_motion(shown.encoder_time, shown.position, shown.velocity, at, MOST)
+        left = COUNTS[2] * np.sqrt(60.0 / count) / length**2
+        rounding = left / np.nanstd(motion.acceleration)
+        assert span_of(shown).rounding == pytest.approx(rounding, rel=1e-3)
 
 
 def test_a_mass_is_found_with_the_encoder_of_a_motor(make_drive: MakeDrive) -> None:
