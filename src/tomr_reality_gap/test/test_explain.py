@@ -86,3 +86,23 @@ def test_a_described_learnt_term_resists_and_states_what_lies_beyond_its_table(
     (note,) = prepared._beyond((made,))
     assert note.startswith("made: ")
     assert "lies beyond the table of learnt term 1" in note
+
+
+@pytest.mark.parametrize(("quantum", "expected"), [(0.1, 0), (2.4, 1)])
+def test_sensors_that_show_little_but_their_steps_are_noted(
+    simulation: RecordingSimulation,  # noqa: F811
+    quantum: float,
+    expected: int,
+) -> None:
+    """Of three motors the one that varies least; 2.4 W steps are 2.4 times 1 W."""
+    varies = {0: 3.0, 1: 1.0, 2: 3.0}
+    channels = tuple(
+        evolve(
+            item, quantum=quantum, value=varies[item.wheel] * (-1.0) ** np.arange(len(item.time))
+        )
+        for item in simulation.channels
+        if item.kind == "power" and item.wheel is not None
+    )
+    notes = list(prepared._coarse((evolve(simulation, channels=channels),)))
+    assert len(notes) == expected
+    assert all("made: wheel_2/power is read in steps of 2.4 W, 2.4 times" in note for note in notes)

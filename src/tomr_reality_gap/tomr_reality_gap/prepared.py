@@ -31,6 +31,7 @@ from tomr_reality_gap.request import Request
 
 Array = NDArray[np.float64]
 
+_COARSE = 0.5  # of what a power varies by
 _MOSTLY_INSIDE = 0.02  # of a drive beyond a table
 
 
@@ -85,7 +86,12 @@ def prepared(request: Request) -> Prepared:
         simulations=tuple(_with(discrepancy, item, base.robot) for item in simulations),
         runs=runs,
         scales=scales,
-        notes=(*notes, *_sim_notes(simulations, discrepancy), *_beyond((*recordings, *held_out))),
+        notes=(
+            *notes,
+            *_sim_notes(simulations, discrepancy),
+            *_beyond((*recordings, *held_out)),
+            *_coarse((*recordings, *held_out)),
+        ),
     )
 
 
@@ -157,6 +163,20 @@ def _beyond(simulations: Sequence[RecordingSimulation]) -> Iterator[str]:
                     f"{item.recorded.name}: {share:.0%} of it lies beyond the table of learnt term "
                     f"{number} ({term.family.words}), which fades there"
                 )
+
+
+def _coarse(simulations: Sequence[RecordingSimulation]) -> Iterator[str]:
+    """Drives of which a power sensor shows little more than its own steps."""
+    for item in simulations:
+        drawn = [channel for channel in item.channels if channel.kind in DRAWN_KINDS]
+        steps = [channel.quantum / max(float(np.std(channel.value)), 1e-12) for channel in drawn]
+        if steps and max(steps) > _COARSE:
+            worst = drawn[int(np.argmax(steps))]
+            yield (
+                f"{item.recorded.name}: {worst.name} is read in steps of {worst.quantum:.2g} "
+                f"{worst.unit}, {max(steps):.1f} times what it varies by (standard deviation): "
+                "much of its error, as explained too, is these"
+            )
 
 
 def integrator_of(simulation: RecordingSimulation) -> str:
