@@ -16,11 +16,16 @@ from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import Robot, load_robot, read_description
 from tomr_power_model.unmodelled import FAMILIES, LearntTerm
+from tomr_reality_gap.alignment.simulation import RecordingSimulation
+from tomr_reality_gap.analysis import AnalysisResult, spoils
 from tomr_reality_gap.described import described, for_users
+from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 from tomr_reality_gap.verdict import _term_notes
 from tomr_sim_bridge.plant.simulation import Simulation
+
+from .test_alignment import as_recorded, simulation  # noqa: F401 -- the fixture
 
 WHEELS = ("wheel_1_joint", "wheel_2_joint", "wheel_3_joint")
 MODELLED = [effect for effect in MODERATE if effect != "contact.slip"]
@@ -31,6 +36,7 @@ def explained(
     effects: Mapping[str, Mapping[str, float]],
     wheels: int = 3,
     unmodelled: object = None,
+    spoils: bool = False,
 ) -> Robot:
     """The reference robot with effects at its first wheels, through robot_explained.yaml."""
     base = per_wheel(dict(read_description("reference")), WHEELS, "reference")
@@ -44,7 +50,7 @@ def explained(
                 values[f"physics.{effect}.{key}"] = number
     analysis = SimpleNamespace(
         robot=SimpleNamespace(wheel_names=WHEELS, unmodelled=()),
-        unmodelled=unmodelled,
+        term=_term(unmodelled, spoils),
         source="reference",
         dataset=SimpleNamespace(simulations=()),
     )
@@ -55,21 +61,55 @@ def explained(
     return load_robot(path)
 
 
+def _term(effect: object, spoils: bool = False) -> LearntTerm | None:
+    analysis = SimpleNamespace(unmodelled=effect, spoils=spoils)
+    return AnalysisResult.term.fget(analysis)  # type: ignore[attr-defined, no-any-return]
+
+
+def _notes(effect: object, spoils: bool = False) -> tuple[str, ...]:
+    robot = load_robot("reference")
+    best = SimpleNamespace(model=SimpleNamespace(described=SimpleNamespace(robot=robot)))
+    found = SimpleNamespace(best=best)
+    return _term_notes(SimpleNamespace(unmodelled=effect, spoils=spoils, found=found))  # type: ignore[arg-type]
+
+
 def _draws(power: float, is_repeatable: bool) -> SimpleNamespace:
     """A driver that draws so much more at any speed [W]."""
     knots, values = (np.array([0.0, 50.0]),), np.full((1, 2), power)
     term = LearntTerm(FAMILIES["driver.speed"], (1,), knots, values)
-    return SimpleNamespace(term=term, is_repeatable=is_repeatable)
+    return SimpleNamespace(term=term, is_repeatable=is_repeatable, family=term.family)
 
 
-@pytest.mark.parametrize(("is_repeatable", "more"), [(True, 2.0), (False, 0.0)])
+@pytest.mark.parametrize(
+    ("is_repeatable", "spoils", "more"),
+    [(True, False, 2.0), (False, False, 0.0), (True, True, 0.0)],
+)
 def test_nodes_draw_what_was_learnt_if_another_drive_repeats_it(
-    tmp_path: Path, is_repeatable: bool, more: float
+    tmp_path: Path, is_repeatable: bool, spoils: bool, more: float
 ) -> None:
     twist = (0.2, 0.1, 0.3)
     plain = predicted(explained(tmp_path, {}), twist, 2.0)
-    learnt = explained(tmp_path, {}, unmodelled=_draws(2.0, is_repeatable))
+    effect = _draws(2.0, is_repeatable)
+    learnt = explained(tmp_path, {}, unmodelled=effect, spoils=spoils)
     np.testing.assert_allclose(predicted(learnt, twist, 2.0) - plain, [0.0, more, 0.0], atol=1e-3)
+    assert len(_notes(effect, spoils)) == (0 if more else 1)
+
+
+@pytest.mark.parametrize(("there", "expected"), [(1.0, False), (0.6, False), (0.3, True)])
+def test_a_term_with_which_held_out_drives_are_predicted_worse_spoils_them(
+    simulation: RecordingSimulation,  # noqa: F811
+    there: float,
+    expected: bool,
+) -> None:
+    """Of what a driver was learnt to draw a part is there: of less than half nothing is better."""
+    effect, robot = _draws(2.0, is_repeatable=True), simulation.robot
+    shown = with_terms(simulation, robot, (_draws(2.0 * there, is_repeatable=True).term,))
+    held = as_recorded(simulation, shown.predict([robot])[0])
+    best = SimpleNamespace(model=SimpleNamespace(described=SimpleNamespace(robot=robot)))
+    analysis = SimpleNamespace(term=effect.term, found=SimpleNamespace(best=best))
+    assert spoils(analysis, [held]) is expected  # type: ignore[arg-type]
+    assert spoils(analysis, []) is False  # type: ignore[arg-type]
+    assert spoils(SimpleNamespace(term=None), [held]) is False  # type: ignore[arg-type]
 
 
 def test_a_curve_that_no_driver_holds_is_reported_and_not_written(tmp_path: Path) -> None:
@@ -78,13 +118,13 @@ def test_a_curve_that_no_driver_holds_is_reported_and_not_written(tmp_path: Path
     term = LearntTerm(FAMILIES["torque.speed"], (0,), knots, values)
     effect = SimpleNamespace(term=term, is_repeatable=True, family=term.family)
     assert explained(tmp_path, {}, unmodelled=effect).unmodelled == ()
-    (note,) = _term_notes(effect, load_robot("reference"))  # type: ignore[arg-type]
+    (note,) = _notes(effect)
     assert "is not in the explained description: its curve is as steep as 3 N m s/rad" in note
     gentle = SimpleNamespace(
         term=evolve(term, values=0.1 * values), is_repeatable=True, family=term.family
     )
     assert explained(tmp_path, {}, unmodelled=gentle).unmodelled
-    assert _term_notes(gentle, load_robot("reference")) == ()  # type: ignore[arg-type]
+    assert _notes(gentle) == ()
 
 
 def test_a_long_table_is_read_again_as_it_was_written(tmp_path: Path) -> None:
@@ -109,10 +149,10 @@ def predicted(robot: Robot, twist: tuple[float, float, float], until: float) -> 
 
 def simulated(robot: Robot, twist: tuple[float, float, float], until: float) -> np.ndarray:
     """The same, measured in the simulator."""
-    simulation = Simulation(robot, seed=1)
-    simulation.command(*twist)
+    plant = Simulation(robot, seed=1)
+    plant.command(*twist)
     found: dict[str, list[float]] = {topic: [] for topic in robot.wheel_topics}
-    for sample in simulation.step_to(round(until * 1e9)):
+    for sample in plant.step_to(round(until * 1e9)):
         wheel = sample.topic.removesuffix("/power")
         if wheel in found and sample.stamp_ns > (until - 0.5) * 1e9:
             fields = sample.message.fields

@@ -1,6 +1,7 @@
 """All that a verdict rests on, and what it could not have seen."""
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -11,12 +12,14 @@ from tomr_power_model.estimation.linear_gaussian import Gram, solve
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot
 from tomr_power_model.robot import Robot
+from tomr_power_model.unmodelled import LearntTerm
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
-from tomr_reality_gap.alignment.simulation import Run
+from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
 from tomr_reality_gap.fit.basis_responses import BasisResponses
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection, finding_cost
 from tomr_reality_gap.fit.jacobian import Jacobian, linearise
+from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.simulator_baseline import Offsets, SimulatorBaseline
 from tomr_reality_gap.fit.structure import additions_of, structural_shifts
 from tomr_reality_gap.fit.uncertainty import own_sigma
@@ -44,6 +47,13 @@ class AnalysisResult:
     shared: Offsets = ()  # what the user's simulation shows of each finding
     plain: Dataset | None = None  # without the unnamed term; None: there is none
     unmodelled: Unmodelled | None = None
+    spoils: bool = False  # held-out drives are predicted worse with the unnamed term
+
+    @property
+    def term(self) -> LearntTerm | None:
+        """What is unnamed and told of other drives; None: nothing that they are known to repeat."""
+        effect = self.unmodelled
+        return None if effect is None or self.spoils or not effect.is_repeatable else effect.term
 
     @cached_property
     def simulated(self) -> tuple[Array, ...]:
@@ -92,6 +102,24 @@ def residuals_of(dataset: Dataset, before: Array, after: Array) -> list[Residual
         for channel, part in zip(dataset.channels, rows_of(dataset.channels), strict=True)
         if channel.kind in (*DRAWN_KINDS, "speed")
     ]
+
+
+def spoils(analysis: AnalysisResult, held: Sequence[RecordingSimulation]) -> bool:
+    """Whether the unnamed term leaves more of what is drawn in held-out drives than there is.
+
+    A map of the floor knows nothing of places where nobody has been, however smooth it is.
+    """
+    if analysis.term is None:
+        return False
+    robot, left = analysis.found.best.model.described.robot, np.zeros(2)
+    for item in held:
+        for row, terms in enumerate(((), (analysis.term,))):
+            value = with_terms(item, robot, terms).predict([robot])[0]
+            for channel, part in zip(item.channels, rows_of(item.channels), strict=True):
+                if channel.kind in DRAWN_KINDS:
+                    spread = max(float(np.std(channel.value)), 1e-12)
+                    left[row] += float(np.sum(((channel.value - value[part]) / spread) ** 2))
+    return bool(left[1] > left[0])
 
 
 def detection_limits(analysis: AnalysisResult) -> tuple[tuple[str, str, str], ...]:

@@ -24,11 +24,10 @@ def described(analysis: AnalysisResult, model: Model) -> str:
     """Text of robot_explained.yaml: what all wheels share is written once."""
     values = dict(model.described.values)
     wheels = analysis.robot.wheel_names
-    effect = analysis.unmodelled
-    robot = model.described.robot
-    if effect is not None and effect.is_repeatable and not why_not_held(robot, effect.term):
+    term, robot = analysis.term, model.described.robot
+    if term is not None and not why_not_held(robot, term):
         name = f"term_{len(analysis.robot.unmodelled) + 1}"
-        values.update(parameters_of(name, effect.term, wheels, values))
+        values.update(parameters_of(name, term, wheels, values))
     for key in [key for key in values if f".{wheels[0]}." in key]:
         keys = [key.replace(wheels[0], wheel) for wheel in wheels]
         numbers = {values.get(item) for item in keys}

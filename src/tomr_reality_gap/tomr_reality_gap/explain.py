@@ -12,7 +12,7 @@ from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.response import controller_alternatives
 from tomr_reality_gap.alignment.simulation import Run, Tick
-from tomr_reality_gap.analysis import AnalysisResult, residuals_of
+from tomr_reality_gap.analysis import AnalysisResult, residuals_of, spoils
 from tomr_reality_gap.explanation import Explanation
 from tomr_reality_gap.fit.backward_elimination import backward_elimination
 from tomr_reality_gap.fit.basis_responses import basis_responses
@@ -62,6 +62,7 @@ def explain(request: Request, progress: Progress = lambda stage, part: None) -> 
     progress("simulating", 0.05)
     analysis = _analysed(request, ready, progress, is_loop_known=bool(ready.simulations))
     progress("what is left", 0.85)
+    analysis = evolve(analysis, spoils=spoils(analysis, ready.held))
     explanation = explanation_of(analysis, ready.held, ready.notes)
     progress("done", 1.0)
     return evolve(explanation, recordings=(*request.real, *request.holdout))

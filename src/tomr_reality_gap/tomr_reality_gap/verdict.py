@@ -9,7 +9,6 @@ from tomr_power_model.effects import EFFECTS
 from tomr_power_model.estimation.linear_gaussian import Gram, solve, transposed_product
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.statistics import autocorrelation
-from tomr_power_model.robot import Robot
 from tomr_power_model.robot.description import why_not_held
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.analysis import AnalysisResult, detection_limits, residuals_of
@@ -18,7 +17,6 @@ from tomr_reality_gap.explanation import Comparison, Explanation, Finding, Learn
 from tomr_reality_gap.findings import Findings
 from tomr_reality_gap.fit.laws import words_of
 from tomr_reality_gap.fit.learnt import with_terms
-from tomr_reality_gap.fit.unmodelled import Unmodelled
 from tomr_reality_gap.mismatch.compare import comparison, score_of
 from tomr_reality_gap.mismatch.locate import maps_of, variables_at
 from tomr_reality_gap.rules import is_doubted, unexplained
@@ -31,7 +29,7 @@ def explanation_of(
     analysis: AnalysisResult, held: Sequence[RecordingSimulation], notes: tuple[str, ...]
 ) -> Explanation:
     """The whole explanation."""
-    dataset, found, effect = analysis.dataset, analysis.found, analysis.unmodelled
+    dataset, found = analysis.dataset, analysis.found
     before, after = analysis.simulated[0], analysis.simulated[1]
     left, size = unexplained(residuals_of(dataset, before, after))
     model = found.best.model
@@ -59,14 +57,20 @@ def explanation_of(
         score=score_of([item for item in comparisons if item.held_out]),
         explained=described(analysis, for_users(analysis, model)) if findings else "",
         suggested=suggested(findings),
-        notes=(*notes, *_term_notes(effect, model.described.robot)),
+        notes=(*notes, *_term_notes(analysis)),
     )
 
 
-def _term_notes(effect: Unmodelled | None, robot: Robot) -> tuple[str, ...]:
+def _term_notes(analysis: AnalysisResult) -> tuple[str, ...]:
     """What no other drive repeats is named, not predicted; what no driver holds, not written."""
+    effect, robot = analysis.unmodelled, analysis.found.best.model.described.robot
     if effect is None:
         return ()
+    if analysis.spoils:
+        return (
+            f"{effect.family.words} is not in the explained description: held-out drives are "
+            "predicted worse with it. Record drives through what these do, places and speeds",
+        )
     if effect.is_repeatable:
         why = why_not_held(robot, effect.term)
         return (f"{effect.family.words} is not in the explained description: {why}",) if why else ()
@@ -104,12 +108,12 @@ def _comparisons(
 ) -> tuple[Comparison, ...]:
     """All recordings before and after; held-out ones with what they repeat of an unnamed term."""
     described, explained = analysis.base.robot, analysis.found.best.model.described.robot
-    found, at, noise, effect = [], 0, _noise(analysis), analysis.unmodelled
+    found, at, noise = [], 0, _noise(analysis)
     for item, run in zip(analysis.dataset.simulations, analysis.runs, strict=True):
         part = slice(at, at := at + item.size)
         values: Array = np.stack([analysis.simulated[0][part], analysis.simulated[1][part]])
         found.append(comparison(item, values, run, is_held_out=False, noise=noise))
-    terms = (effect.term,) if effect is not None and effect.is_repeatable else ()
+    terms = () if analysis.term is None else (analysis.term,)
     for item in held:
         termed = with_terms(item, explained, terms)
         values = np.concatenate([item.predict([described]), termed.predict([explained])])
