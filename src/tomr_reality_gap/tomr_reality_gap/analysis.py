@@ -51,7 +51,7 @@ class AnalysisResult:
 
     @property
     def term(self) -> LearntTerm | None:
-        """What is unnamed and told of other drives; None: nothing that they are known to repeat."""
+        """What is unnamed and expected of other drives; None: nothing that they repeat."""
         effect = self.unmodelled
         return None if effect is None or self.spoils or not effect.is_repeatable else effect.term
 

@@ -39,7 +39,7 @@ def structure_warnings(samples: Sequence[Samples], robot: Robot) -> list[str]:
             )
         for name, values in variables.items():
             share, chance = _explained(values, residual)
-            if _is_structure(share, float(np.std(residual)) / _rms(power), chance):
+            if _is_structure(share, float(np.std(residual)) / max(_rms(power), 1e-9), chance):
                 found[name] = max(found.get(name, (0.0, "")), (share, robot.wheel_names[wheel]))
     if found:
         name, (share, where) = max(found.items(), key=lambda item: item[1])
