@@ -16,12 +16,15 @@ from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.model.predictor import PowerPredictor
 from tomr_power_model.robot import Robot, load_robot, read_description
 from tomr_power_model.unmodelled import FAMILIES, LearntTerm
+from tomr_reality_gap import explain
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.analysis import AnalysisResult, spoils
 from tomr_reality_gap.described import described, for_users
+from tomr_reality_gap.explanation import Explanation
 from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
+from tomr_reality_gap.request import Request
 from tomr_reality_gap.verdict import _term_notes
 from tomr_sim_bridge.plant.simulation import Simulation
 
@@ -110,6 +113,26 @@ def test_a_term_with_which_held_out_drives_are_predicted_worse_spoils_them(
     assert spoils(analysis, [held]) is expected  # type: ignore[arg-type]
     assert spoils(analysis, []) is False  # type: ignore[arg-type]
     assert spoils(SimpleNamespace(term=None), [held]) is False  # type: ignore[arg-type]
+
+
+def test_held_out_drives_are_asked_about_a_term(
+    monkeypatch: pytest.MonkeyPatch, match: Explanation
+) -> None:
+    """`explain` looks at them before anything is written."""
+    said: list[bool] = []
+    nothing = AnalysisResult(*[None] * 7)  # type: ignore[arg-type]
+    ready = SimpleNamespace(simulations=(), held=("held",), notes=())
+
+    def explained_of(analysis: AnalysisResult, *_: object) -> Explanation:
+        said.append(analysis.spoils)
+        return match
+
+    monkeypatch.setattr(explain, "prepared", lambda _: ready)
+    monkeypatch.setattr(explain, "_analysed", lambda *_, **__: nothing)
+    monkeypatch.setattr(explain, "spoils", lambda _, held: held == ("held",))
+    monkeypatch.setattr(explain, "explanation_of", explained_of)
+    explain.explain(Request("reference", (Path("tour"),)))
+    assert said == [True]
 
 
 def test_a_curve_that_no_driver_holds_is_reported_and_not_written(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from tomr_power_model.drive.motion import LEAST_PERIODS, median_period, wheel_mo
 from tomr_power_model.drive.quantum import count_of
 from tomr_power_model.drive.record import Drive
 
-LEAST, MOST, _STEP = 0.05, 0.2, 0.01  # s
+LEAST, MOST = 0.05, 0.2  # s
 _QUIET = 0.05  # of the accelerations: what rounding may leave unknown of them
 _BIASED = 0.1  # of the accelerations: with so much a mass is a tenth off
 _EVERY = 5  # samples, at which accelerations are looked at
@@ -28,25 +28,19 @@ class Span:
 def span_of(drive: Drive) -> Span:
     """The shortest span in which rounding is little of the accelerations, at most 0.2 s.
 
-    n angles rounded to counts q leave the acceleration of a parabola over a span T unknown to
-    q / sqrt(12) * sqrt(720 / n) / T^2, and what changes within T is smoothed.
+    n angles rounded to counts c leave the acceleration of a parabola over a span T unknown to
+    c sqrt(60 / n) / T^2 (a variance of c^2 / 12), and what changes within T is smoothed.
     """
-    count = count_of(drive.position)
+    count, period = count_of(drive.position), median_period(drive.encoder_time)
     if not count:
         return Span(LEAST)
     at = drive.encoder_time[::_EVERY]
     motion = wheel_motion(drive.encoder_time, drive.position, drive.velocity, at, MOST)
     known = motion.acceleration[np.isfinite(motion.acceleration)]
-    usual = float(np.std(known)) if len(known) else math.inf
-    period, steps = median_period(drive.encoder_time), round((MOST - LEAST) / _STEP)
-    found = Span(LEAST, count, math.inf)
-    for length in np.linspace(LEAST, MOST, steps + 1).tolist():
-        whole = max(length, LEAST_PERIODS * period)
-        left = count / math.sqrt(12.0) * math.sqrt(720.0 * period / whole) / whole**2
-        found = Span(length, count, left / max(usual, 1e-9))
-        if found.rounding < _QUIET:
-            break
-    return found
+    usual = max(float(np.std(known)), 1e-9) if len(known) else math.inf
+    left = count * math.sqrt(60.0 * period) / usual  # times T^-2.5 with n = T / period
+    length = min(max((left / _QUIET) ** 0.4, LEAST), MOST)
+    return Span(length, count, left * max(length, LEAST_PERIODS * period) ** -2.5)
 
 
 def span_warnings(spans: Sequence[Span]) -> list[str]:
