@@ -106,3 +106,8 @@ def test_sensors_that_show_little_but_their_steps_are_noted(
     notes = list(prepared._coarse((evolve(simulation, channels=channels),)))
     assert len(notes) == expected
     assert all("made: wheel_2/power is read in steps of 2.4 W, 2.4 times" in note for note in notes)
+
+
+def test_notes_on_sensors_are_those_of_a_preparation(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(prepared, "_coarse", lambda drives: [f"{len(drives)} looked at"])
+    assert "1 looked at" in prepared.prepared(Request("reference", (SQUARE,))).notes

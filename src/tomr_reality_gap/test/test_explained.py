@@ -25,7 +25,7 @@ from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 from tomr_reality_gap.request import Request
-from tomr_reality_gap.verdict import _term_notes
+from tomr_reality_gap.verdict import _comparisons, _term_notes
 from tomr_sim_bridge.plant.simulation import Simulation
 
 from .test_alignment import as_recorded, simulation  # noqa: F401 -- the fixture
@@ -113,6 +113,30 @@ def test_a_term_with_which_held_out_drives_are_predicted_worse_spoils_them(
     assert spoils(analysis, [held]) is expected  # type: ignore[arg-type]
     assert spoils(analysis, []) is False  # type: ignore[arg-type]
     assert spoils(SimpleNamespace(term=None), [held]) is False  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("spoils_them", [False, True])
+def test_held_out_drives_are_predicted_with_a_term_unless_it_spoils_them(
+    simulation: RecordingSimulation,  # noqa: F811
+    spoils_them: bool,
+) -> None:
+    """2 W more at wheel 2."""
+    robot, effect = simulation.robot, _draws(2.0, is_repeatable=True)
+    model = SimpleNamespace(described=SimpleNamespace(robot=robot))
+    found = SimpleNamespace(
+        best=SimpleNamespace(model=model), noise=SimpleNamespace(sigma=np.empty(0))
+    )
+    analysis = SimpleNamespace(
+        dataset=SimpleNamespace(simulations=(), channels=()),
+        runs=(),
+        base=SimpleNamespace(robot=robot),
+        found=found,
+        term=_term(effect, spoils_them),
+    )
+    (shown,) = _comparisons(analysis, [simulation])  # type: ignore[arg-type]
+    more = [after - before for before, after in zip(shown.before, shown.after, strict=True)]
+    expected = [0.0 if spoils_them or wheel != 1 else 2.0 for wheel in range(3)]
+    assert [np.median(item) for item in more[:3]] == pytest.approx(expected)
 
 
 def test_held_out_drives_are_asked_about_a_term(
