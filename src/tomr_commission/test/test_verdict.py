@@ -63,10 +63,18 @@ def test_another_floor_in_one_drive(outcome: Outcome) -> None:
     )
 
 
-def test_one_wheel_that_drags_in_one_drive(outcome: Outcome) -> None:
+@pytest.mark.parametrize(
+    ("power", "size", "like"),
+    [(1.2, "+30", "a wheel that drags"), (-1.2, "-30", "a power sensor that shows too little")],
+)
+def test_one_wheel_that_needs_another_torque_in_one_drive(
+    outcome: Outcome, power: float, size: str, like: str
+) -> None:
     first, second, third = outcome.fitted
-    found = said(evolve(outcome, fitted=(added(first, 3, 1.2), second, third)))
-    assert any(line.startswith("tour1: wheel 3 needs +30 %") for line in found)
+    found = said(evolve(outcome, fitted=(added(first, 3, power), second, third)))
+    told = [line for line in found if line.startswith(f"tour1: wheel 3 needs {size} %")]
+    assert len(told) == 1
+    assert like in told[0]
 
 
 def test_drive_that_scatters_more_than_the_rest(outcome: Outcome, steady: Steady) -> None:

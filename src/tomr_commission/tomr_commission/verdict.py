@@ -176,12 +176,17 @@ def _another_floor(drive: str, share: Array) -> Reason:
     wheel = int(np.argmax(np.abs(share)))
     what = "every wheel needs" if alike else f"wheel {wheel + 1} needs"
     size = float(np.mean(share)) if alike else float(share[wheel])
+    remedy = "look after that wheel and its power sensor, and leave the drive out"
+    if alike:
+        like = "another floor or load"
+        remedy = "commission each floor by itself, or give drives of both to fit"
+    elif size > 0.0:
+        like = "a wheel that drags, or a power sensor that shows too much"
+    else:
+        like = "a power sensor that shows too little, or a wheel that slips"
     return Reason(
-        f"{drive}: {what} {100 * size:+.0f} % of the usual torque beside the "
-        f"other drives: {'another floor or load' if alike else 'a wheel that drags'}",
-        "commission each floor by itself, or give drives of both to fit"
-        if alike
-        else "look after that wheel, and leave the drive out",
+        f"{drive}: {what} {100 * size:+.0f} % of the usual torque beside the other drives: {like}",
+        remedy,
     )
 
 

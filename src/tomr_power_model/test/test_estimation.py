@@ -19,7 +19,13 @@ from tomr_power_model.estimation.gauss_newton import (
     maximise,
 )
 from tomr_power_model.estimation.intervals import block_jackknife, block_length
-from tomr_power_model.estimation.linear_gaussian import Gram, solve, transposed_product
+from tomr_power_model.estimation.linear_gaussian import (
+    AT_A_TIME,
+    Gram,
+    product,
+    solve,
+    transposed_product,
+)
 from tomr_power_model.estimation.parameter import Parameter, ParameterisedRobot, per_wheel
 from tomr_power_model.estimation.robust import soft_l1
 from tomr_power_model.robot import read_description
@@ -61,6 +67,25 @@ def test_normal_equations_of_many_rows_weigh_each() -> None:
     np.testing.assert_allclose(second.matrix, found.matrix[1:, 1:])
     np.testing.assert_allclose(second.vector, found.vector[1:])
     np.testing.assert_allclose(transposed_product(columns, residual), columns.T @ residual)
+
+
+def test_normal_equations_of_parameters_with_other_priors(linear: tuple[Array, Array]) -> None:
+    """Columns times their prior standard deviations; one of next to none is not fitted."""
+    columns, residual = linear
+    scale = np.array([1.0, 0.1, 1e-9])
+    scaled = Gram.of(columns, residual).scaled(scale)
+    expected = Gram.of(columns * scale, residual)
+    np.testing.assert_allclose(scaled.matrix, expected.matrix, atol=1e-12)
+    np.testing.assert_allclose(scaled.vector, expected.vector, atol=1e-12)
+    assert abs(scale * solve(scaled, range(3)).mean)[2] < 1e-12
+
+
+def test_several_products_at_a_time(linear: tuple[Array, Array]) -> None:
+    columns = np.tile(linear[0], (400, 1))
+    units = np.stack([np.ones(3), np.arange(3.0)], axis=1)
+    assert len(columns) > AT_A_TIME
+    np.testing.assert_allclose(product(columns, units), columns @ units)
+    np.testing.assert_allclose(product(columns, units[:, 1]), columns @ units[:, 1])
 
 
 def test_a_linear_problem_takes_one_step(linear: tuple[Array, Array]) -> None:

@@ -8,14 +8,18 @@ import pytest
 from attrs import evolve
 
 from tomr_reality_gap.alignment.channels import Channel
-from tomr_reality_gap.fit.remainder import Remainder, predicted_share
+from tomr_reality_gap.fit.remainder import Prediction, Remainder, predicted
 
 SAMPLES, BLOCKS = 4000, 8
 LABELS = np.tile(np.arange(SAMPLES // 2) * 2 * BLOCKS // SAMPLES, 2)  # of two channels alike
 
 
-def _share(residual: np.ndarray, column: np.ndarray) -> float:
-    """One column, nothing else that is not exactly known."""
+def _share(residual: np.ndarray, *columns: np.ndarray) -> float:
+    return _predicted(residual, *columns).share
+
+
+def _predicted(residual: np.ndarray, *columns: np.ndarray) -> Prediction:
+    """Some columns, nothing else that is not exactly known."""
     half = SimpleNamespace(time=np.arange(SAMPLES // 2))
     rest = Remainder(
         SimpleNamespace(channels=(half, half)),  # type: ignore[arg-type]
@@ -23,7 +27,7 @@ def _share(residual: np.ndarray, column: np.ndarray) -> float:
         np.empty((SAMPLES, 0)),
         np.ones(SAMPLES),
     )
-    return predicted_share(rest, [column[:, None]], LABELS)
+    return predicted(rest, [np.stack(columns, axis=1)], LABELS)
 
 
 def _made() -> tuple[np.ndarray, np.ndarray]:
@@ -60,6 +64,16 @@ def test_a_share_is_bounded_either_way() -> None:
     _, column = _made()
     assert _share(2.0 * column, column) == 1.0
     assert _share(2.0 * column, np.where(LABELS == 3, 30.0, 1.0) * column) == -1.0
+
+
+def test_what_other_blocks_hardly_tell_does_not_spoil_a_block() -> None:
+    """A column that is large in one block alone, and elsewhere follows what is none of it."""
+    noise, column = _made()
+    elsewhere = np.where(LABELS == 3, 3.0 * column, 0.03 * noise)
+    found = _predicted(2.0 * column + noise, column, elsewhere)
+    assert found.share > 0.9
+    assert found.size < 0.5
+    assert _predicted(2.0 * column + noise, column).size == 1.0
 
 
 def test_what_a_coarse_sensor_rounds_off_is_noise() -> None:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from attrs import evolve
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.effects.scales import Scales
@@ -43,8 +43,9 @@ from tomr_reality_gap.verdict import explanation_of
 
 Array = NDArray[np.float64]
 
-_SEVERAL = 2  # names, that one law may stand behind
-_MORE = 1.2  # times noise, or what another model leaves
+_DOUBT = 1.05  # times noise: names that leave as much may stand for what has none
+_MORE = 1.2  # times what another model leaves
+_NEARLY = 0.95  # of what names leave out, that what has no name predicts
 _SLIGHT = 0.03  # of the mismatch: where names leave less, what comes and goes is no finding
 _LITTLE = 0.15  # of the noise: what is left of what is drawn is not looked into
 
@@ -100,11 +101,12 @@ def _analysed(
     if not is_loop_known and sums_otherwise(dataset, found, tick):
         return _analysed(request, ready.summed_otherwise(), progress, is_loop_known=True)
     check_same_robot(dataset, found.rounds[-1])
-    effect, plain = _unmodelled(dataset, found, ready), None
+    seen, plain = _unmodelled(dataset, found, ready), None
+    effect = seen.effect if seen is not None and seen.is_much else None
     if effect is not None:
         plain = dataset
         dataset, found, effect = _beside(plain, found, effect, named, ready.scales)
-    elif (tried := _instead(dataset, found, named, ready.scales)) is not None:
+    elif (tried := _instead(dataset, found, named, ready.scales, seen)) is not None:
         plain = dataset
         dataset, found, effect = tried
     baseline = SimulatorBaseline.of(ready.simulations, dataset, found.noise, base.robot)
@@ -175,21 +177,26 @@ def _beside(
 
 
 def _instead(
-    plain: Dataset, found: Selection, named: _Named, scales: Scales
+    plain: Dataset, found: Selection, named: _Named, scales: Scales, seen: "_Seen | None" = None
 ) -> tuple[Dataset, Selection, Unmodelled] | None:
-    """A law without a name in the place of several names, if it leaves much less than they do."""
+    """What has no name in the place of one name or several, if much less is left with it.
+
+    A law, or what it depends on predicts nearly all. It is sought where names leave more than
+    noise, or something that another drive would repeat is `seen` beside them.
+    """
     names, sigma = found.best.model.findings, found.noise.sigma
     left = _left(plain, found, sigma)
-    if names < _SEVERAL or left < _MORE * len(plain.value):
+    is_seen = seen is not None and seen.effect.is_repeatable
+    if not names or not (is_seen or left > _DOUBT * len(plain.value)):
         return None
     bare = found.without.model
     rest = _remainder(plain, bare)
     alone = unmodelled_effect(rest, bare.described.robot, scales, is_repeatable=True)
-    if alone is None or not alone.laws or not alone.is_repeatable:
+    if alone is None or not (alone.laws or alone.share > _NEARLY) or not alone.is_repeatable:
         return None
     tried = _settled(plain, alone, named)
-    fewer = tried[1].best.model.findings + 1 < names
-    return tried if fewer and _left(*tried[:2], sigma) < left / _MORE else None
+    no_more = tried[1].best.model.findings < names
+    return tried if no_more and _left(*tried[:2], sigma) < left / _MORE else None
 
 
 def _settled(
@@ -228,8 +235,16 @@ def _remainder(dataset: Dataset, model: Model) -> Remainder:
     return Remainder.of(dataset, jacobian.value, np.asarray(jacobian.matrix, dtype=np.float64))
 
 
-def _unmodelled(dataset: Dataset, found: Selection, ready: Prepared) -> Unmodelled | None:
-    """What no name explains, if that is much, and a term predicts it."""
+@frozen
+class _Seen:
+    """What no name explains and a term predicts."""
+
+    effect: Unmodelled
+    is_much: bool  # enough for a finding beside the names
+
+
+def _unmodelled(dataset: Dataset, found: Selection, ready: Prepared) -> _Seen | None:
+    """What no name explains, if anything, and a term predicts it."""
     robot = found.best.model.described.robot
     described, explained = dataset.predict([ready.base.robot, robot])
     share, size = unexplained(residuals_of(dataset, described, explained))
@@ -244,9 +259,10 @@ def _unmodelled(dataset: Dataset, found: Selection, ready: Prepared) -> Unmodell
         return None
     cost = finding_cost(len(dataset.value))
     named = found.best.evidence - found.without.evidence
-    if effect is None or gross:
-        return effect
-    return effect if effect.is_large and is_unmodelled(effect.evidence, named, cost) else None
+    if effect is None:
+        return None
+    is_much = effect.is_large and is_unmodelled(effect.evidence, named, cost)
+    return _Seen(effect, gross or is_much)
 
 
 def _with_term(dataset: Dataset, robot: Robot, effect: Unmodelled) -> Dataset:

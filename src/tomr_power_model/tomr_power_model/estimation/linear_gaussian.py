@@ -55,11 +55,15 @@ class Gram:
             vector += part.T @ whitened[rows]
         return cls(matrix, vector, float(whitened @ whitened))
 
+    def scaled(self, scale: Array) -> "Gram":
+        """Of columns times `scale`, (p,): of parameters with other prior standard deviations."""
+        return Gram(self.matrix * np.outer(scale, scale), self.vector * scale, self.square)
+
 
 def product(columns: Matrix, units: Array) -> Array:
-    """Columns (n, p) times units (p,), in double precision."""
+    """Columns (n, p) times units (p,), or several of them (p, k), in double precision."""
     parts = [columns[row : row + AT_A_TIME] @ units for row in range(0, len(columns), AT_A_TIME)]
-    return np.concatenate([np.empty(0), *parts])
+    return np.concatenate([np.empty((0, *units.shape[1:])), *parts])
 
 
 def transposed_product(columns: Matrix, values: Array) -> Array:

@@ -5,7 +5,6 @@ of what the named model leaves there. What changes with time alone can predict n
 judged by moments left out between others, and called not repeatable.
 """
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,15 +15,16 @@ from tomr_power_model.effects.scales import Scales
 from tomr_power_model.estimation.linear_gaussian import Gram, Matrix, product, solve
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.robot import WHEELS, Robot
-from tomr_power_model.unmodelled import FAMILIES, Family, LearntTerm, Motion
+from tomr_power_model.unmodelled import Family, LearntTerm, Motion
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS
 from tomr_reality_gap.alignment.motion import motion_in
 from tomr_reality_gap.explanation import FittedLaw, Shape
 from tomr_reality_gap.fit.dataset import Dataset
+from tomr_reality_gap.fit.families import Tried, families_tried, predicting
 from tomr_reality_gap.fit.laws import Evidence, laws_of
 from tomr_reality_gap.fit.learnt import Table
 from tomr_reality_gap.fit.polish import changes_of, polished
-from tomr_reality_gap.fit.remainder import Remainder, inflations, predicted_share, whitened
+from tomr_reality_gap.fit.remainder import Remainder, inflations, whitened
 from tomr_reality_gap.fit.supplied import is_supplied
 
 Array = NDArray[np.float64]
@@ -37,9 +37,8 @@ _SMALL = 0.02  # of a channel's standard deviation: less is not worth a word
 _LAW = 0.8  # of the squares that are left: a law that explains so much is no chance
 _AS_MUCH = 0.95  # of what a wider family predicts
 _ALIKE = 0.02  # shares that say no more for one family than for another
-_NEAR = 0.35  # of the best share: worth a closer look
 _HINT = 0.1  # share that shows at a glance of what will predict `_NAMED`: no closer look gave less
-_EVENT = 0.45  # of what a term of time explains: as much of it, and it is repeatable
+_EVENT = 0.6  # of what a term of time explains: as much of it, and it is repeatable
 
 
 @frozen
@@ -62,21 +61,6 @@ class Unmodelled:
     def family(self) -> type[Family]:
         """Of the term."""
         return self.table.family
-
-
-@frozen
-class Tried:
-    """A family and how well it predicts."""
-
-    table: Table
-    share: float  # of stretches left out; of moments if it is an event
-    # Of moments left out, of a map: each stretch is on ground of its own.
-    moments: float = -1.0
-
-    @property
-    def best(self) -> float:
-        """The larger of the shares."""
-        return max(self.share, self.moments)
 
 
 def unmodelled_effect(
@@ -116,17 +100,22 @@ def unmodelled_effect(
     if best is not events:
         alike = [item for item in tried if not item.table.family.is_event and item is not best]
         alike = [item for item in alike if item.share > best.share - _ALIKE]
-        return _most(rest, [best, *alike], robot, motions)
+        found = _most(rest, [best, *alike], robot, motions)
+        return _by_law(rest, found, tried, robot, motions)
     found = fitted(rest, best, robot, motions)
     if found.family.acts == "driver":
         drawn = best.table.columns(rest.dataset, robot, motions)
-        if not is_supplied(rest, [whitened(part, rest.weight) for part in drawn]):
+        if not is_supplied(rest, [whitened(best.size * part, rest.weight) for part in drawn]):
             return None  # sensors show what nobody draws
     # Few stretches may not meet again, but a law that holds for all is one.
-    for item in [item for item in tried if item.table.family.is_strange and item is not best]:
+    for item in tried:
+        family = item.table.family
+        if item is best or not (family.is_strange or (not family.is_event and item.share > _NAMED)):
+            continue
         other = fitted(rest, evolve(item, share=item.best), robot, motions)
-        least = found.explained if item.table.family.is_shared else 0.0
-        if other.laws and other.explained > max(least, _LAW):
+        # A map follows much, and what names depend on as well is no news: these must explain more.
+        is_likely = family.is_strange and not family.is_shared
+        if other.laws and other.explained > max(0.0 if is_likely else found.explained, _LAW):
             return other
     return found
 
@@ -134,13 +123,36 @@ def unmodelled_effect(
 def _most(
     rest: Remainder, tried: Sequence[Tried], robot: Robot, motions: Sequence[Motion]
 ) -> Unmodelled:
-    """The first, or another that acts elsewhere, predicts as much, and explains clearly more."""
+    """The first, or another that acts elsewhere, predicts as much, and explains clearly more.
+
+    Of two with laws the one whose law fits better.
+    """
     found = fitted(rest, tried[0], robot, motions)
     for item in tried[1:]:
         if item.table.family.acts != found.family.acts:
             other = fitted(rest, item, robot, motions)
-            if other.explained > found.explained + _CLEARLY:
+            least = 0.0 if other.laws and found.laws else _CLEARLY
+            if other.explained > found.explained + least:
                 found = other
+    return found
+
+
+def _by_law(
+    rest: Remainder,
+    found: Unmodelled,
+    tried: Sequence[Tried],
+    robot: Robot,
+    motions: Sequence[Motion],
+) -> Unmodelled:
+    """A term without a law, or the family within its own that has one which explains as much.
+
+    A law knows what lies beyond the speeds of a stretch, a table does not.
+    """
+    for item in tried:
+        if not found.laws and item.table.family.family_id == found.family.holds:
+            other = fitted(rest, item, robot, motions)
+            if other.laws and other.explained > _AS_MUCH * found.explained:
+                return other
     return found
 
 
@@ -161,76 +173,11 @@ def _narrowest(tried: Sequence[Tried]) -> Tried | None:
     return best
 
 
-def families_tried(
-    rest: Remainder,
-    robot: Robot,
-    scales: Scales,
-    motions: Sequence[Motion],
-    *,
-    least: float = -1.0,
-    is_repeatable: bool = False,
-) -> list[Tried]:
-    """All families that the recordings can show, best first; none where only noise is left.
-
-    Args:
-        rest: what is left of the recordings.
-        robot: of which it is left.
-        scales: how large terms may be.
-        motions: of the robot in the recordings.
-        least: share that must show at a glance for a closer look.
-        is_repeatable: none at all unless one that another drive would repeat shows as much.
-    """
-    # A map of the floor costs as much as all others, and no names are like it.
-    first = [item for item in FAMILIES.values() if not (item.is_event or item.is_shared)]
-    found = _at_a_glance(rest, robot, scales, motions, first)
-    if is_repeatable and max((item.share for item in found), default=-1.0) < least:
-        return []
-    others = [item for item in FAMILIES.values() if item.is_event or item.is_shared]
-    found += _at_a_glance(rest, robot, scales, motions, others)
-    most = max((item.share for item in found), default=0.0)
-    for number, item in enumerate(found):
-        if item.table.family.acts == "torque" and item.share > max(most - _NEAR, least):
-            columns = item.table.columns(rest.dataset, robot, motions)
-            share = predicted_share(rest, columns, _blocks(rest, item.table.family))
-            found[number] = evolve(item, share=share)
-    return sorted(found, key=lambda item: -item.share)
-
-
-def _at_a_glance(
-    rest: Remainder,
-    robot: Robot,
-    scales: Scales,
-    motions: Sequence[Motion],
-    families: Sequence[type[Family]],
-) -> list[Tried]:
-    """Some families, what one wheel's torque does to the others left out."""
-    kinds, found = {channel.kind for channel in rest.dataset.channels}, []
-    for family in families:
-        seen = {"driver": "power", "supply": "total"}.get(family.acts)
-        table = Table.over(family, motions, scales)
-        if table is None or (seen is not None and seen not in kinds):
-            continue
-        columns = table.columns(rest.dataset, robot, motions, is_exact=False)
-        share = predicted_share(rest, columns, _blocks(rest, family))
-        if not math.isnan(share):
-            moments = predicted_share(rest, columns, rest.blocks[1]) if family.is_shared else -1.0
-            found.append(Tried(table, share, moments))
-    return found
-
-
-def _blocks(rest: Remainder, family: type[Family]) -> NDArray[np.intp]:
-    """What is left out by turns: moments of what says when, stretches of all else."""
-    stretch, moment = rest.blocks
-    return moment if family.is_event else stretch
-
-
 def refitted(rest: Remainder, effect: Unmodelled, robot: Robot) -> Unmodelled:
     """The same term, fitted anew to what another model leaves."""
-    motions, table = [motion_in(item, robot) for item in rest.dataset.simulations], effect.table
-    columns = table.columns(rest.dataset, robot, motions)
-    share = predicted_share(rest, columns, _blocks(rest, table.family))
-    again = predicted_share(rest, columns, rest.blocks[1]) if table.family.is_shared else share
-    return fitted(rest, Tried(table, max(share, again)), robot, motions)
+    motions = [motion_in(item, robot) for item in rest.dataset.simulations]
+    found = predicting(rest, effect.table, robot, motions)
+    return fitted(rest, evolve(found, share=found.best), robot, motions)
 
 
 def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]) -> Unmodelled:
@@ -239,7 +186,7 @@ def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]
         whitened(part, rest.weight) for part in best.table.columns(rest.dataset, robot, motions)
     ]
     every = list(range(len(columns)))
-    rows = _rows_shown(rest, best.table, columns)
+    rows = _rows_shown(rest, best, columns)
     found = _fitted_at(rest, best, robot, motions, [columns[row] for row in rows], rows)
     if not found.laws or len(rows) == len(every):
         return found
@@ -249,17 +196,17 @@ def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]
         term, wheels=best.table.wheels(every), values=np.tile(term.values[:1], (WHEELS, 1))
     )
     change = changes_of(rest.dataset, robot, motions, [wide])[0]
-    if _explained(rest, _alone(rest), change) < found.explained + _CLEARLY:
+    if _share(_alone(rest), _lacking(rest, change)) < found.explained + _CLEARLY:
         return found
     return _fitted_at(rest, best, robot, motions, columns, every)
 
 
-def _rows_shown(rest: Remainder, table: Table, columns: Sequence[Matrix]) -> list[int]:
+def _rows_shown(rest: Remainder, best: Tried, columns: Sequence[Matrix]) -> list[int]:
     """Rows of a table at the wheels that show it; all where it acts elsewhere."""
     rows = list(range(len(columns)))
-    if not table.wheels(rows) or table.family.is_shared:
+    if not best.table.wheels(rows) or best.table.family.is_shared:
         return rows
-    units, _, _ = _solved(rest, columns)
+    units, _, _ = _solved(rest, columns, best.size)
     energy = [float((product(c, u) ** 2).sum()) for c, u in zip(columns, units, strict=True)]
     return [row for row in rows if energy[row] > _WHEEL_SHARE * max(energy)]
 
@@ -273,9 +220,9 @@ def _fitted_at(
     rows: Sequence[int],
 ) -> Unmodelled:
     """Of some rows, whose whitened columns are given."""
-    table = best.table
-    units, covariance, change = _solved(rest, columns)
-    alone, left, count = _alone(rest), rest.residual - change, len(units[0])
+    table, count = best.table, best.table.root.shape[1]
+    units, covariance, change = _solved(rest, columns, best.size)
+    alone, left = _alone(rest), rest.residual - change
     sigma = [
         np.sqrt(np.einsum("ij,jk,ik->i", table.root, covariance[part, part], table.root))
         for part in (slice(n * count, (n + 1) * count) for n in range(len(units)))
@@ -296,6 +243,7 @@ def _fitted_at(
             inflation=equations.inflation,
         )
         laws, simulated = [first, *laws[1:]], first.term
+    lacking = _lacking(rest, change)
     return Unmodelled(
         table,
         term,
@@ -303,23 +251,28 @@ def _fitted_at(
         simulated,
         best.share,
         not table.family.is_event or (bool(laws) and len(motions) > 1),
-        _evidence(rest.dataset, alone, left),
+        _evidence(rest.dataset, alone, lacking),
         _is_large(rest.dataset, change),
         change,
-        _explained(rest, alone, change),
+        _share(alone, lacking),
         np.stack(sigma),
     )
 
 
 def _alone(rest: Remainder) -> Array:
     """What is left where only what is not exactly known is fitted, whitened, (n,)."""
-    gram = Gram.of(rest.base, rest.residual)
-    return np.asarray(rest.residual - rest.base @ solve(gram, range(rest.base.shape[1])).mean)
+    return _lacking(rest, np.zeros_like(rest.residual))
 
 
-def _explained(rest: Remainder, alone: Array, change: Array) -> float:
-    lacking, count = rest.residual - change * rest.weight, rest.base.shape[1]
-    lacking = lacking - rest.base @ solve(Gram.of(rest.base, lacking), range(count)).mean
+def _lacking(rest: Remainder, change: Array) -> Array:
+    """What is left beside a change of all values, what is not exactly known fitted anew, (n,)."""
+    lacking = rest.residual - change * rest.weight
+    return np.asarray(
+        lacking - rest.base @ solve(Gram.of(rest.base, lacking), range(rest.base.shape[1])).mean
+    )
+
+
+def _share(alone: Array, lacking: Array) -> float:
     return 1.0 - float(lacking @ lacking) / max(float(alone @ alone), 1e-300)
 
 
@@ -351,12 +304,19 @@ def _is_large(dataset: Dataset, change: Array) -> bool:
     )
 
 
-def _solved(rest: Remainder, columns: Sequence[Matrix]) -> tuple[list[Array], Array, Array]:
-    """Units of each block of whitened columns, their covariance, and all that is explained."""
+def _solved(
+    rest: Remainder, columns: Sequence[Matrix], size: float
+) -> tuple[list[Array], Array, Array]:
+    """Units of each block of whitened columns, their covariance, and all that is explained.
+
+    `size`: standard deviation of the units' prior.
+    """
     joined, q = rest.beside(columns), rest.base.shape[1]
-    found = solve(Gram.of(joined, rest.residual), range(joined.shape[1]))
-    units = np.split(found.mean[q:], len(columns))
-    return units, found.covariance[q:, q:], product(joined, found.mean)
+    scale = np.where(np.arange(joined.shape[1]) < q, 1.0, size)
+    found = solve(Gram.of(joined, rest.residual).scaled(scale), range(joined.shape[1]))
+    mean, covariance = scale * found.mean, found.covariance * np.outer(scale, scale)
+    units = np.split(mean[q:], len(columns))
+    return units, covariance[q:, q:], product(joined, mean)
 
 
 def shape_of(effect: Unmodelled, robot: Robot) -> Shape:
