@@ -151,26 +151,6 @@ def test_of_families_that_predict_alike_the_one_that_explains_clearly_more_is_ta
     assert _chosen(monkeypatch, {DRIVER: 0.99, SPEED: share}, explained=explained) == expected
 
 
-@pytest.mark.parametrize(
-    ("laws", "explained", "narrower"),
-    [((), 0.96, True), ((), 0.94, False), (("a law",), 0.96, False)],
-)
-def test_a_law_of_speed_is_taken_before_a_table_of_signed_speed_without_one(
-    monkeypatch: pytest.MonkeyPatch, laws: tuple[str, ...], explained: float, narrower: bool
-) -> None:
-    """If it explains 0.95 as much; however little a table of speed predicts."""
-    found = SimpleNamespace(family=FAMILIES[SIGNED], laws=laws, explained=1.0)
-    law = SimpleNamespace(laws=("a law",), explained=explained)
-    monkeypatch.setattr(unmodelled, "fitted", lambda *_: law)
-    tried = [
-        Tried(SimpleNamespace(family=FAMILIES[name]), share)  # type: ignore[arg-type]
-        for name, share in ((SIGNED, 0.8), (DRIVER, 0.7), (SPEED, 0.1))
-    ]
-    taken = unmodelled._by_law(None, found, tried, None, ())  # type: ignore[arg-type]
-    assert taken is (law if narrower else found)
-    assert unmodelled._by_law(None, found, tried[:2], None, ()) is found  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize(("keeps", "names"), [(True, "with"), (False, "without")])
 def test_names_that_take_the_law_from_a_term_are_dropped(
     monkeypatch: pytest.MonkeyPatch, keeps: bool, names: str

@@ -107,17 +107,31 @@ def unmodelled_effect(
         drawn = best.table.columns(rest.dataset, robot, motions)
         if not is_supplied(rest, [whitened(best.size * part, rest.weight) for part in drawn]):
             return None  # sensors show what nobody draws
-    # Few stretches may not meet again, but a law that holds for all is one.
+    return _lawful(rest, found, [item for item in tried if item is not best], robot, motions)
+
+
+def _lawful(
+    rest: Remainder,
+    found: Unmodelled,
+    tried: Sequence[Tried],
+    robot: Robot,
+    motions: Sequence[Motion],
+) -> Unmodelled:
+    """What comes and goes, or another term with a law that explains nearly all.
+
+    Few stretches may not meet again, but a law that holds for all is one.
+    """
+    lawful: list[Unmodelled] = []
     for item in tried:
         family = item.table.family
-        if item is best or not (family.is_strange or (not family.is_event and item.share > _NAMED)):
+        if not (family.is_strange or (not family.is_event and item.share > _NAMED)):
             continue
         other = fitted(rest, evolve(item, share=item.best), robot, motions)
         # A map follows much, and what names depend on as well is no news: these must explain more.
         is_likely = family.is_strange and not family.is_shared
         if other.laws and other.explained > max(0.0 if is_likely else found.explained, _LAW):
-            return other
-    return found
+            lawful.append(other)
+    return max(lawful, key=lambda item: item.explained, default=found)
 
 
 def _most(
