@@ -145,6 +145,7 @@ def test_a_law_holds_at_wheels_that_hardly_show_it_but_not_where_it_is_not(
 
 def test_a_patch_of_the_floor_is_one_for_all_wheels_and_the_users_simulation_may_have_it(
     simulation: RecordingSimulation,  # noqa: F811
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """0.2 N m more within 0.3 m of a place where wheel 1 has been."""
     robot, motion = simulation.robot, motion_in(simulation, simulation.robot)
@@ -159,6 +160,10 @@ def test_a_patch_of_the_floor_is_one_for_all_wheels_and_the_users_simulation_may
     effect = refitted(rest, SimpleNamespace(table=table), robot)  # type: ignore[arg-type]
     assert effect.term.wheels == (0, 1, 2)
     assert effect.share > 0.8  # by moments: each stretch is on ground of its own
+    # A smaller table stays near nothing where nobody has been, and says so.
+    wide, small = (fitted(rest, Tried(table, 1.0, 1.0, size), robot, [motion]) for size in (1, 0.1))
+    assert small.learnt.values.std() < 0.7 * wide.learnt.values.std()
+    assert small.sigma.max() == pytest.approx(0.1 * wide.sigma.max(), rel=0.3)
     law = {name: item.value for name, item in effect.laws[0].parameters.items()}
     expected = {"size": 0.2, "radius": 0.3, "x": place[0], "y": place[1]}
     assert law == pytest.approx(expected, abs=0.02)
@@ -167,6 +172,11 @@ def test_a_patch_of_the_floor_is_one_for_all_wheels_and_the_users_simulation_may
         baseline = SimulatorBaseline.of(recorded, dataset, found.noise, robot)
         assert baseline is not None
         assert baseline.shows(effect) is expected
+    # A law that does not explain as much as the table at once may do so at its best.
+    for least, names in ((1.0, ["patch"]), (2.0, [])):
+        monkeypatch.setattr(unmodelled, "AS_WELL", least)
+        again = fitted(rest, Tried(table, 1.0), robot, [motion])
+        assert [law.name for law in again.laws] == names
 
 
 @pytest.mark.parametrize("recordings", [1, 2])

@@ -23,7 +23,7 @@ from tomr_reality_gap.rules import estimate_of
 
 Array = NDArray[np.float64]
 
-_AS_WELL = 0.9  # of what the table explains
+AS_WELL = 0.9  # of what the table explains
 _LISTED = 3
 _COST = 10.0  # log evidence that a parameter must bring
 _NOTHING = 1e-300  # variance of a parameter that the data do not determine
@@ -111,12 +111,14 @@ def unit_of(unit: str, term: LearntTerm) -> str:
     return {"*": term.unit, "variable": term.family.axes[0].unit}.get(unit, unit)
 
 
-def laws_of(table: Table, learnt: LearntTerm, evidence: Evidence) -> list[LawAt]:
-    """Laws that explain about as much as the table, simplest first."""
+def laws_of(
+    table: Table, learnt: LearntTerm, evidence: Evidence, least: float = AS_WELL
+) -> list[LawAt]:
+    """Laws that explain `least` of what the table does at least, simplest first."""
     misfit = _Misfit.of(table, evidence)
     known = [law for law in LAWS.values() if table.family.family_id in law.families]
     found = [_fitted(law, table, learnt, misfit) for law in known]
-    found = [item for item in found if item.share > _AS_WELL and item.is_within]
+    found = [item for item in found if item.share > least and item.is_within]
     whole = 0.5 * misfit.explained(learnt.values) / evidence.inflation
     found.sort(key=lambda item: _COST * len(item.parameters) - whole * item.share)
     return found[:_LISTED]

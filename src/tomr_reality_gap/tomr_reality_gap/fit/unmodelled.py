@@ -21,7 +21,7 @@ from tomr_reality_gap.alignment.motion import motion_in
 from tomr_reality_gap.explanation import FittedLaw, Shape
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.families import Tried, families_tried, predicting
-from tomr_reality_gap.fit.laws import Evidence, laws_of
+from tomr_reality_gap.fit.laws import AS_WELL, Evidence, LawAt, laws_of
 from tomr_reality_gap.fit.learnt import Table
 from tomr_reality_gap.fit.polish import changes_of, polished
 from tomr_reality_gap.fit.remainder import Remainder, inflations, whitened
@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 
 _CLEARLY = 0.005  # of the squares that are left, that other wheels must explain
 _WHEEL_SHARE = 0.1  # of the wheel that shows most
+_MAYBE = 0.75  # of what a table explains: a law that may explain as much at its best
 _NAMED = 0.3  # share of what is left that a term must predict
 _LITTLE = 0.1  # the same where something is there for sure: with less it would say nothing
 _SMALL = 0.02  # of a channel's standard deviation: less is not worth a word
@@ -88,7 +89,7 @@ def unmodelled_effect(
             item
             for item in tried
             if not item.table.family.is_event
-            and not (event and item.table.family.is_shared and item.moments < event.share)
+            and not (event and item.table.family.is_shared and item.moments <= event.share)
         ]
     )
     events = _by_moments(tried, event)
@@ -173,7 +174,7 @@ def _by_law(
 def _by_moments(tried: Sequence[Tried], event: Tried | None) -> Tried | None:
     """The best event, or a map that explains more moments: a drive shows most places but once."""
     mapped = max(tried, key=lambda item: item.moments)
-    if mapped.moments < max(event.share if event else 0.0, _NAMED):
+    if mapped.moments <= max(event.share if event else 0.0, _NAMED):
         return event
     return evolve(mapped, share=mapped.moments)
 
@@ -244,19 +245,14 @@ def _fitted_at(
     own = sum(product(part, row) for part, row in zip(columns, units, strict=True))
     term, change = table.term(units, table.wheels(rows)), own / rest.weight
     equations = _normal_equations(rest, columns, left)
-    laws, simulated = laws_of(table, term, equations), term
-    if laws:
-        first, change = polished(
-            laws[0],
-            rest.dataset,
-            robot,
-            motions,
-            residual=rest.residual,
-            base=rest.base,
-            weight=rest.weight,
-            inflation=equations.inflation,
-        )
-        laws, simulated = [first, *laws[1:]], first.term
+    near, simulated = laws_of(table, term, equations, _MAYBE), term
+    laws = [law for law in near if law.share > AS_WELL]
+    if near:
+        # A stiff tether pulls the robot off its way: only at its best such a law explains as much.
+        first, shown = _at_its_best(rest, (laws or near)[0], robot, motions, equations.inflation)
+        least = AS_WELL * _share(alone, _lacking(rest, change))
+        if laws or _share(alone, _lacking(rest, shown)) > least:
+            laws, simulated, change = [first, *laws[1:]], first.term, shown
     lacking = _lacking(rest, change)
     return Unmodelled(
         table,
@@ -276,6 +272,22 @@ def _fitted_at(
 def _alone(rest: Remainder) -> Array:
     """What is left where only what is not exactly known is fitted, whitened, (n,)."""
     return _lacking(rest, np.zeros_like(rest.residual))
+
+
+def _at_its_best(
+    rest: Remainder, law: LawAt, robot: Robot, motions: Sequence[Motion], inflation: float
+) -> tuple[LawAt, Array]:
+    """A law polished, and what it adds to every value, (n,)."""
+    return polished(
+        law,
+        rest.dataset,
+        robot,
+        motions,
+        residual=rest.residual,
+        base=rest.base,
+        weight=rest.weight,
+        inflation=inflation,
+    )
 
 
 def _lacking(rest: Remainder, change: Array) -> Array:
