@@ -115,6 +115,7 @@ def test_a_law_of_place_that_explains_nearly_all_is_no_event(
         (-0.5, 0.91, FLOOR),  # new ground all along, but the same for all wheels
         (-0.5, 0.89, TIME),
         (0.7, 0.89, TIME),  # it only follows time
+        (0.7, 0.9, TIME),
         (0.95, 0.91, FLOOR),
     ],
 )

@@ -60,3 +60,28 @@ def test_of_laws_the_one_that_explains_most_is_taken(monkeypatch: pytest.MonkeyP
     tried = [Tried(SimpleNamespace(family=FAMILIES[name]), 0.5) for name in laws]  # type: ignore[arg-type]
     taken = unmodelled._lawful(None, comes, tried, None, ())  # type: ignore[arg-type]
     assert taken.explained == laws[SPEED]
+
+
+@pytest.mark.parametrize(
+    ("laws", "explained", "expected"),
+    [
+        (("a law",), 0.951, SPEED),
+        (("a law",), 0.949, DRIVER),
+        ((), 0.951, DRIVER),
+        ((), 0.956, SPEED),
+    ],
+)
+def test_of_two_laws_that_predict_alike_the_one_that_fits_better_is_taken(
+    monkeypatch: pytest.MonkeyPatch, laws: tuple[str, ...], explained: float, expected: str
+) -> None:
+    """A table has to explain clearly more."""
+    explains = {DRIVER: 0.95, SPEED: explained}
+
+    def fitted(rest: object, item: Tried, *_: object) -> SimpleNamespace:
+        family = item.table.family
+        return SimpleNamespace(family=family, laws=laws, explained=explains[family.family_id])
+
+    monkeypatch.setattr(unmodelled, "fitted", fitted)
+    tried = [Tried(SimpleNamespace(family=FAMILIES[name]), 1.0) for name in explains]  # type: ignore[arg-type]
+    taken = unmodelled._most(None, tried, None, ())  # type: ignore[arg-type]
+    assert taken.family.family_id == expected
