@@ -9,37 +9,53 @@ from tomr_reality_gap.fit import unmodelled
 from tomr_reality_gap.fit.families import Tried
 
 PLACE, SPEED, SIGNED, DRIVER = "force.place", "torque.speed", "torque.signed_speed", "driver.speed"
+TIME = "supply.time"
 
 
 @pytest.mark.parametrize(
-    ("laws", "explained", "narrower"),
-    [((), 0.96, True), ((), 0.94, False), (("a law",), 0.96, False)],
+    ("laws", "known", "explained", "is_taken"),
+    [
+        ((), 0.85, 0.86, True),
+        ((), 0.85, 0.84, False),
+        ((), 0.7, 0.79, False),  # not nearly all
+        (("a law",), 0.5, 0.51, True),  # of two laws the one that fits better
+        (("a law",), 0.5, 0.49, False),
+    ],
 )
-def test_a_law_of_speed_is_taken_before_a_table_of_signed_speed_without_one(
-    monkeypatch: pytest.MonkeyPatch, laws: tuple[str, ...], explained: float, narrower: bool
+def test_a_law_of_speed_is_taken_before_a_table_of_signed_speed_that_explains_less(
+    monkeypatch: pytest.MonkeyPatch,
+    laws: tuple[str, ...],
+    known: float,
+    explained: float,
+    is_taken: bool,
 ) -> None:
-    """If it explains 0.95 as much; however little a table of speed predicts."""
-    found = SimpleNamespace(family=FAMILIES[SIGNED], laws=laws, explained=1.0)
+    """However much less a table of speed predicts."""
+    found = SimpleNamespace(family=FAMILIES[SIGNED], laws=laws, explained=known)
     law = SimpleNamespace(laws=("a law",), explained=explained)
     monkeypatch.setattr(unmodelled, "fitted", lambda *_: law)
     tried = [
         Tried(SimpleNamespace(family=FAMILIES[name]), share)  # type: ignore[arg-type]
-        for name, share in ((SIGNED, 0.8), (DRIVER, 0.7), (SPEED, 0.1))
+        for name, share in ((SIGNED, 0.8), (SPEED, 0.31), (PLACE, 0.29))
     ]
-    taken = unmodelled._by_law(None, found, tried, None, ())  # type: ignore[arg-type]
-    assert taken is (law if narrower else found)
-    assert unmodelled._by_law(None, found, tried[:2], None, ()) is found  # type: ignore[arg-type]
+    taken = unmodelled._lawful(None, found, tried, None, ())  # type: ignore[arg-type]
+    assert taken is (law if is_taken else found)
+    assert unmodelled._lawful(None, found, tried[::2], None, ()) is found  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("laws", [(), ("a law",)])
 @pytest.mark.parametrize(
     ("share", "explained", "is_lawful"),
     [(0.31, 0.91, True), (0.29, 0.91, False), (0.31, 0.89, False)],
 )
 def test_a_law_of_speed_that_explains_more_than_a_table_over_time_is_no_event(
-    monkeypatch: pytest.MonkeyPatch, share: float, explained: float, is_lawful: bool
+    monkeypatch: pytest.MonkeyPatch,
+    laws: tuple[str, ...],
+    share: float,
+    explained: float,
+    is_lawful: bool,
 ) -> None:
     """Stretches of other speeds hardly predict each other, a law does."""
-    comes = SimpleNamespace(laws=(), explained=0.9)
+    comes = SimpleNamespace(family=FAMILIES[TIME], laws=laws, explained=0.9)
     law = SimpleNamespace(laws=("a law",), explained=explained)
     monkeypatch.setattr(unmodelled, "fitted", lambda *_: law)
     tried = [Tried(SimpleNamespace(family=FAMILIES[SPEED]), share)]  # type: ignore[arg-type]
@@ -48,7 +64,7 @@ def test_a_law_of_speed_that_explains_more_than_a_table_over_time_is_no_event(
 
 
 def test_of_laws_the_one_that_explains_most_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
-    comes = SimpleNamespace(laws=(), explained=0.9)
+    comes = SimpleNamespace(family=FAMILIES[TIME], laws=(), explained=0.9)
     laws = {DRIVER: 0.95, SPEED: 0.96, PLACE: 0.94}
     monkeypatch.setattr(
         unmodelled,
@@ -85,3 +101,16 @@ def test_of_two_laws_that_predict_alike_the_one_that_fits_better_is_taken(
     tried = [Tried(SimpleNamespace(family=FAMILIES[name]), 1.0) for name in explains]  # type: ignore[arg-type]
     taken = unmodelled._most(None, tried, None, ())  # type: ignore[arg-type]
     assert taken.family.family_id == expected
+
+
+@pytest.mark.parametrize(("explained", "is_taken"), [(0.81, True), (0.79, False)])
+def test_what_comes_and_goes_by_a_law_gives_way_to_a_stand_only_if_that_explains_nearly_all(
+    monkeypatch: pytest.MonkeyPatch, explained: float, is_taken: bool
+) -> None:
+    """Friction that runs in is no grease that holds until the wheel has turned."""
+    runs_in = SimpleNamespace(family=FAMILIES[TIME], laws=("a law",), explained=0.95)
+    stand = SimpleNamespace(laws=("a law",), explained=explained)
+    monkeypatch.setattr(unmodelled, "fitted", lambda *_: stand)
+    tried = [Tried(SimpleNamespace(family=FAMILIES["torque.turned"]), 0.1)]  # type: ignore[arg-type]
+    taken = unmodelled._lawful(None, runs_in, tried, None, ())  # type: ignore[arg-type]
+    assert taken is (stand if is_taken else runs_in)

@@ -102,13 +102,13 @@ def unmodelled_effect(
         alike = [item for item in tried if not item.table.family.is_event and item is not best]
         alike = [item for item in alike if item.share > best.share - _ALIKE]
         found = _most(rest, [best, *alike], robot, motions)
-        return _by_law(rest, found, tried, robot, motions)
+        return _lawful(rest, found, tried, robot, motions)
     found = fitted(rest, best, robot, motions)
     if found.family.acts == "driver":
         drawn = best.table.columns(rest.dataset, robot, motions)
         if not is_supplied(rest, [whitened(best.size * part, rest.weight) for part in drawn]):
             return None  # sensors show what nobody draws
-    return _lawful(rest, found, [item for item in tried if item is not best], robot, motions)
+    return _lawful(rest, found, tried, robot, motions)
 
 
 def _lawful(
@@ -118,19 +118,23 @@ def _lawful(
     robot: Robot,
     motions: Sequence[Motion],
 ) -> Unmodelled:
-    """What comes and goes, or another term with a law that explains nearly all.
+    """The term, or another one with a law that explains more.
 
-    Few stretches may not meet again, but a law that holds for all is one.
+    A law knows what lies beyond a stretch, a table does not; few stretches of one drive may meet
+    again. Of an event, and of a term without a law, it has to explain nearly all.
     """
-    lawful: list[Unmodelled] = []
+    comes_and_goes, lawful = found.family.is_event, []
     for item in tried:
         family = item.table.family
-        if not (family.is_strange or (not family.is_event and item.share > _NAMED)):
+        is_news = comes_and_goes and family.is_strange
+        if family.is_event or family is found.family or not (is_news or item.share > _NAMED):
             continue
         other = fitted(rest, evolve(item, share=item.best), robot, motions)
         # A map follows much, and what names depend on as well is no news: these must explain more.
-        is_likely = family.is_strange and not family.is_shared
-        if other.laws and other.explained > max(0.0 if is_likely else found.explained, _LAW):
+        least = 0.0 if is_news and not family.is_shared else found.explained
+        if comes_and_goes or not found.laws:
+            least = max(least, _LAW)
+        if other.laws and other.explained > least:
             lawful.append(other)
     return max(lawful, key=lambda item: item.explained, default=found)
 
@@ -149,25 +153,6 @@ def _most(
             least = 0.0 if other.laws and found.laws else _CLEARLY
             if other.explained > found.explained + least:
                 found = other
-    return found
-
-
-def _by_law(
-    rest: Remainder,
-    found: Unmodelled,
-    tried: Sequence[Tried],
-    robot: Robot,
-    motions: Sequence[Motion],
-) -> Unmodelled:
-    """A term without a law, or the family within its own that has one which explains as much.
-
-    A law knows what lies beyond the speeds of a stretch, a table does not.
-    """
-    for item in tried:
-        if not found.laws and item.table.family.family_id == found.family.holds:
-            other = fitted(rest, item, robot, motions)
-            if other.laws and other.explained > _AS_MUCH * found.explained:
-                return other
     return found
 
 
