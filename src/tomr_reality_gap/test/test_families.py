@@ -59,6 +59,8 @@ def test_nothing_but_a_hint_is_looked_into(monkeypatch: pytest.MonkeyPatch) -> N
     assert sorted(closely) == ["torque.current", SPEED]
     _, closely = _glanced(monkeypatch, {SPEED: 0.8, "torque.current": 0.29}, is_repeatable=False)
     assert closely == [SPEED]
+    _, closely = _glanced(monkeypatch, {SPEED: 0.8, "torque.current": 0.31}, is_repeatable=False)
+    assert sorted(closely) == ["torque.current", SPEED]
 
 
 @pytest.mark.parametrize(("share", "is_looked_on"), [(0.09, False), (0.11, True)])

@@ -18,13 +18,15 @@ def _share(residual: np.ndarray, *columns: np.ndarray) -> float:
     return _predicted(residual, *columns).share
 
 
-def _predicted(residual: np.ndarray, *columns: np.ndarray) -> Prediction:
-    """Some columns, nothing else that is not exactly known."""
+def _predicted(
+    residual: np.ndarray, *columns: np.ndarray, base: np.ndarray | None = None
+) -> Prediction:
+    """Some columns, beside one of what is not exactly known."""
     half = SimpleNamespace(time=np.arange(SAMPLES // 2))
     rest = Remainder(
         SimpleNamespace(channels=(half, half)),  # type: ignore[arg-type]
         residual,
-        np.empty((SAMPLES, 0)),
+        np.empty((SAMPLES, 0)) if base is None else base[:, None],
         np.ones(SAMPLES),
     )
     return predicted(rest, [np.stack(columns, axis=1)], LABELS)
@@ -74,6 +76,9 @@ def test_what_other_blocks_hardly_tell_does_not_spoil_a_block() -> None:
     assert found.share > 0.9
     assert found.size < 0.5
     assert _predicted(2.0 * column + noise, column).size == 1.0
+    # What is not exactly known is as free as it was.
+    base = 0.1 * np.random.default_rng(6).standard_normal(SAMPLES)
+    assert _predicted(2.0 * column + noise + 10.0 * base, column, elsewhere, base=base).share > 0.9
 
 
 def test_what_a_coarse_sensor_rounds_off_is_noise() -> None:

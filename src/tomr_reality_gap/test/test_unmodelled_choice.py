@@ -140,6 +140,14 @@ def test_a_law_of_the_floor_that_explains_more_than_a_table_over_time_is_no_even
     assert found == expected
 
 
+def test_a_law_of_place_that_explains_more_is_taken_before_a_table_of_speed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shares, explained = {SIGNED: 0.8, PLACE: 0.4}, {SIGNED: 0.85, PLACE: 0.9}
+    assert _chosen(monkeypatch, shares, law=0.9, explained=explained) == PLACE
+    assert _chosen(monkeypatch, shares, explained=explained) == SIGNED
+
+
 @pytest.mark.parametrize(
     ("share", "speed", "expected"),
     [(0.98, 0.9, SPEED), (0.98, 0.8, DRIVER), (0.96, 0.9, DRIVER), (0.98, 0.803, DRIVER)],
@@ -355,3 +363,6 @@ def test_a_little_that_comes_and_goes_beside_names_is_no_finding(
     seen = explain._unmodelled(dataset, found, ready)  # type: ignore[arg-type]
     assert (seen is not None) == named
     assert seen is None or (seen.effect, seen.is_much) == (effect, True)
+    effect.evidence = 10.0
+    seen = explain._unmodelled(dataset, found, ready)  # type: ignore[arg-type]
+    assert seen is None or not seen.is_much
