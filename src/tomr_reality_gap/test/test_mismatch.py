@@ -177,6 +177,7 @@ def test_a_patch_of_the_floor_is_one_for_all_wheels_and_the_users_simulation_may
         monkeypatch.setattr(unmodelled, "AS_WELL", least)
         again = fitted(rest, Tried(table, 1.0), robot, [motion])
         assert [law.name for law in again.laws] == names
+        assert all(law.share > least for law in again.laws)
 
 
 @pytest.mark.parametrize("recordings", [1, 2])

@@ -1,12 +1,14 @@
-"""Where a law is taken before a table that predicts more."""
+"""Where a law is taken before a table that predicts more, and what a small table shows."""
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from tomr_power_model.unmodelled import FAMILIES
 from tomr_reality_gap.fit import unmodelled
 from tomr_reality_gap.fit.families import Tried
+from tomr_reality_gap.fit.remainder import Remainder
 
 PLACE, SPEED, SIGNED, DRIVER = "force.place", "torque.speed", "torque.signed_speed", "driver.speed"
 TIME = "supply.time"
@@ -114,3 +116,34 @@ def test_what_comes_and_goes_by_a_law_gives_way_to_a_stand_only_if_that_explains
     tried = [Tried(SimpleNamespace(family=FAMILIES["torque.turned"]), 0.1)]  # type: ignore[arg-type]
     taken = unmodelled._lawful(None, runs_in, tried, None, ())  # type: ignore[arg-type]
     assert taken is (stand if is_taken else runs_in)
+
+
+def _rest(residual: np.ndarray) -> Remainder:
+    count = len(residual)
+    dataset = SimpleNamespace(simulations=())
+    return Remainder(dataset, residual, np.empty((count, 0)), np.ones(count))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("size", "rows"), [(1.0, [0, 1]), (0.01, [0])])
+def test_a_small_table_does_not_show_at_a_wheel_that_only_large_values_could(
+    size: float, rows: list[int]
+) -> None:
+    first, second = np.random.default_rng(7).standard_normal((2, 4000))
+    table = SimpleNamespace(family=FAMILIES[SPEED], wheels=tuple)
+    tried = Tried(table, 1.0, size=size)  # type: ignore[arg-type]
+    columns = [first[:, None], 0.03 * second[:, None]]
+    assert unmodelled._rows_shown(_rest(3.0 * (first + second)), tried, columns) == rows
+
+
+def test_the_total_is_asked_for_a_term_as_large_as_it_predicts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[np.ndarray] = []
+    family = FAMILIES["driver.time"]
+    table = SimpleNamespace(family=family, columns=lambda *_: [np.ones((2, 1))])
+    tried = [Tried(table, 0.9, size=0.1)]  # type: ignore[arg-type]
+    monkeypatch.setattr(unmodelled, "families_tried", lambda *_, **__: tried)
+    monkeypatch.setattr(unmodelled, "fitted", lambda *_: SimpleNamespace(family=family))
+    monkeypatch.setattr(unmodelled, "is_supplied", lambda rest, columns: asked.extend(columns))
+    assert unmodelled.unmodelled_effect(_rest(np.zeros(2)), None, None) is None  # type: ignore[arg-type]
+    np.testing.assert_allclose(asked, [[[0.1], [0.1]]])

@@ -56,6 +56,14 @@ class _Named(Protocol):
     def __call__(self, data: Dataset, beside: float = 0.0) -> Selection: ...
 
 
+@frozen
+class _Seen:
+    """What no name explains and a term predicts."""
+
+    effect: Unmodelled
+    is_much: bool  # enough for a finding beside the names
+
+
 def explain(request: Request, progress: Progress = lambda stage, part: None) -> Explanation:
     """Explain where reality differs. Raises InputError with one line for bad input."""
     progress("reading", 0.0)
@@ -177,7 +185,7 @@ def _beside(
 
 
 def _instead(
-    plain: Dataset, found: Selection, named: _Named, scales: Scales, seen: "_Seen | None" = None
+    plain: Dataset, found: Selection, named: _Named, scales: Scales, seen: _Seen | None
 ) -> tuple[Dataset, Selection, Unmodelled] | None:
     """What has no name in the place of one name or several, if much less is left with it.
 
@@ -233,14 +241,6 @@ def _left(dataset: Dataset, found: Selection, sigma: Array) -> float:
 def _remainder(dataset: Dataset, model: Model) -> Remainder:
     jacobian = linearise(dataset, model, ())
     return Remainder.of(dataset, jacobian.value, np.asarray(jacobian.matrix, dtype=np.float64))
-
-
-@frozen
-class _Seen:
-    """What no name explains and a term predicts."""
-
-    effect: Unmodelled
-    is_much: bool  # enough for a finding beside the names
 
 
 def _unmodelled(dataset: Dataset, found: Selection, ready: Prepared) -> _Seen | None:

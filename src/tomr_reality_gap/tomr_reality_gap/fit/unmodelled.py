@@ -1,8 +1,7 @@
-"""What no named effect explains: what it acts on, what it depends on, and its table.
+"""What no named effect explains: what it acts on, what it depends on, and its table or law.
 
-A family of terms is judged by what it predicts of stretches that it was not fitted to: the share
-of what the named model leaves there. What changes with time alone can predict no stretch; it is
-judged by moments left out between others, and called not repeatable.
+`families` says what each family of terms predicts. What changes with time alone predicts no other
+drive: it is called not repeatable.
 """
 
 from collections.abc import Sequence
@@ -21,6 +20,7 @@ from tomr_reality_gap.alignment.motion import motion_in
 from tomr_reality_gap.explanation import FittedLaw, Shape
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.families import Tried, families_tried, predicting
+from tomr_reality_gap.fit.law_forms import TINY
 from tomr_reality_gap.fit.laws import AS_WELL, Evidence, LawAt, laws_of
 from tomr_reality_gap.fit.learnt import Table
 from tomr_reality_gap.fit.polish import changes_of, polished
@@ -235,8 +235,9 @@ def _fitted_at(
     if near:
         # A stiff tether pulls the robot off its way: only at its best such a law explains as much.
         first, shown = _at_its_best(rest, (laws or near)[0], robot, motions, equations.inflation)
-        least = AS_WELL * _share(alone, _lacking(rest, change))
-        if laws or _share(alone, _lacking(rest, shown)) > least:
+        table_share, law_share = (_share(alone, _lacking(rest, item)) for item in (change, shown))
+        if laws or law_share > AS_WELL * table_share:
+            first = evolve(first, share=law_share / max(table_share, TINY))
             laws, simulated, change = [first, *laws[1:]], first.term, shown
     lacking = _lacking(rest, change)
     return Unmodelled(
