@@ -15,6 +15,7 @@ from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import (
     Selection,
     _is_large_enough,
+    cost_beside,
     finding_cost,
     forward_selection,
 )
@@ -256,6 +257,25 @@ def test_a_finding_costs_more_among_many_samples_and_beside_large_ones() -> None
     assert finding_cost(1000) == 20.0
     assert finding_cost(100_000) == pytest.approx(300.0)
     assert finding_cost(1000, 5000.0) == pytest.approx(50.0)
+
+
+def test_a_fifth_of_what_is_left_is_a_finding_beside_whatever_others_explain() -> None:
+    assert finding_cost(1000, 5000.0, 200.0) == pytest.approx(40.0)
+    assert finding_cost(1000, 5000.0, 400.0) == pytest.approx(50.0)
+    assert finding_cost(1000, 5000.0, 10.0) == 20.0
+    assert cost_beside(1000, _fitted(-500.0), _fitted(-9_500.0), 0.0) == pytest.approx(90.0)
+    assert cost_beside(1000, _fitted(-300.0), _fitted(-9_300.0), 0.0) == pytest.approx(60.0)
+
+
+def test_what_a_learnt_term_is_off_by_is_no_finding_however_much_of_the_rest_it_is() -> None:
+    assert cost_beside(1000, _fitted(-300.0), _fitted(-9_300.0), 1000.0) == pytest.approx(100.0)
+
+
+def _fitted(evidence: float) -> FittedModel:
+    none = np.empty(0)
+    return FittedModel(
+        Model(ParameterisedRobot({}, "made"), (), (), (), ()), evidence, 0.0, none, none, none
+    )
 
 
 @pytest.mark.parametrize(

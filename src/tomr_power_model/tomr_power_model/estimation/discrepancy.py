@@ -17,6 +17,7 @@ class SimulatorDiscrepancy:
     parameter: float = 0.02  # of a fitted offset: added to its interval
     log_evidence_per_sample: float = 0.003  # that a finding must bring
     named: float = 0.01  # of the log evidence of all findings: what one of them must bring
+    left: float = 0.2  # of what is left: what brings as much is a finding beside any others
     unmodelled: float = 0.12  # the same, of an effect without a name
     temper: float = 3.0  # root of the odds: likelihoods are not exact either
 

@@ -9,6 +9,7 @@ now of the nonlinear model (Laplace), is highest:
 with r the whitened residual, u all offsets in prior standard deviations, G their normal matrix.
 """
 
+import math
 from collections.abc import Sequence
 
 from attrs import evolve, field, frozen
@@ -56,7 +57,7 @@ class Selection:
 
     def cost(self, samples: int, best: FittedModel) -> float:
         """Log evidence that a finding must bring beside all others of a model."""
-        return finding_cost(samples, best.evidence - self.without.evidence + self.beside)
+        return cost_beside(samples, best, self.without, self.beside)
 
 
 def forward_selection(
@@ -85,7 +86,7 @@ def forward_selection(
         start, screened = screen(dataset, jacobian, noise, open_ones)
         current, tried = _tried(dataset, start, screened, jacobian, noise, tick)
         without = without or current
-        cost = finding_cost(len(dataset.value), current.evidence - without.evidence + beside)
+        cost = cost_beside(len(dataset.value), current, without, beside)
         tried.sort(key=lambda item: item.model.weight * cost - item.evidence)
         rounds.append(Round(jacobian, noise, tuple(tried)))
         added = tried[0].model.weight - model.weight if tried else 0
@@ -112,9 +113,23 @@ def _tried(
     return current, [item for item in fitted if _is_large_enough(item, first)]
 
 
-def finding_cost(samples: int, explained: float = 0.0) -> float:
-    """Log evidence that a finding must bring beside others that have explained so much."""
-    return max(_COST, SIMULATOR.log_evidence_per_sample * samples, SIMULATOR.named * explained)
+def cost_beside(samples: int, model: FittedModel, without: FittedModel, beside: float) -> float:
+    """Log evidence that a finding must bring beside all of a model, and `beside` of learnt terms.
+
+    What these are off by may look like a named effect, so beside them no such gain is enough.
+    """
+    explained = model.evidence - without.evidence + beside
+    return finding_cost(samples, explained, math.inf if beside else -model.evidence)
+
+
+def finding_cost(samples: int, explained: float = 0.0, left: float = math.inf) -> float:
+    """Log evidence that a finding must bring beside others that have explained so much.
+
+    Our simulation errs by a share of what it simulates. Its errors look like nothing in
+    particular, so what brings much of what is `left` to be had is no such error.
+    """
+    beside = min(SIMULATOR.named * explained, SIMULATOR.left * left)
+    return max(_COST, SIMULATOR.log_evidence_per_sample * samples, beside)
 
 
 def _is_large_enough(fitted: FittedModel, first: int) -> bool:
