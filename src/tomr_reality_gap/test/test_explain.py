@@ -72,16 +72,17 @@ def test_what_the_users_simulation_resists_resists_in_every_recording(
 def test_a_described_learnt_term_resists_and_states_what_lies_beyond_its_table(
     simulation: RecordingSimulation,  # noqa: F811
 ) -> None:
-    """0.02 N m at wheel 1 up to 3 rad/s; the drive goes faster."""
+    """0.02 N m at wheel 1 up to 3 rad/s, in the motion that it leaves; the drive goes faster."""
     knots = (np.array([0.0, 1.5, 3.0]),)
     term = LearntTerm(FAMILIES["torque.speed"], (0,), knots, np.full((1, 3), 0.02))
     robot = evolve(simulation.robot, unmodelled=(term,))
     made = evolve(simulation, robot=robot)
-    found = prepared._as_described(made).resisting
-    speed = simulation.run(simulation.robot).speed
+    described = prepared._as_described(made)
+    found = described.resisting
+    speed = described.run(simulation.robot).speed
     slow = np.abs(speed[:, 0]) < 3.0
     assert found is not None
-    np.testing.assert_allclose(found[slow, 0], 0.02 * np.tanh(speed[slow, 0] / 0.1), atol=1e-9)
+    np.testing.assert_allclose(found[slow, 0], 0.02 * np.tanh(speed[slow, 0] / 0.1), atol=1e-4)
     assert not found[:, 1:].any()
     (note,) = prepared._beyond((made,))
     assert note.startswith("made: ")

@@ -1,7 +1,5 @@
 """Where a mismatch is, and what depends on what: on series made by hand."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from attrs import evolve
@@ -12,10 +10,12 @@ from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.estimation.parameter import ParameterisedRobot, per_wheel
 from tomr_power_model.robot import read_description, shipped_robot
 from tomr_power_model.unmodelled import FAMILIES
+from tomr_reality_gap import explain
 from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.alignment.motion import motion_in
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
 from tomr_reality_gap.fit import unmodelled
+from tomr_reality_gap.fit.basis_responses import basis_responses
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection
 from tomr_reality_gap.fit.jacobian import linearise
@@ -143,6 +143,33 @@ def test_a_law_holds_at_wheels_that_hardly_show_it_but_not_where_it_is_not(
     assert effect.laws[0].parameters["exponent"].value == pytest.approx(3.0, abs=0.1)
 
 
+def test_a_strong_drag_is_fitted_in_the_motion_that_it_leaves(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    """0.03 N m s^2/rad^2: wheels lag by up to 0.9 rad/s, and motors draw many times the power."""
+    robot = simulation.robot
+    drag = ({"coefficient": 0.03},) * 3
+    real = evolve(robot, physics={**robot.physics, "friction.quadratic": drag})
+    dataset, found = searched(simulation, simulation.predict([real])[0], ())
+    motions = [motion_in(simulation, robot)]
+    scales, bare = _scales(simulation), found.without.model
+    table = Table.over(FAMILIES["torque.speed"], motions, scales)
+    assert table is not None
+    first = fitted(_rest(dataset, found), Tried(table, 1.0), bare.described.robot, motions)
+    base = evolve(bare, offsets=(), hypotheses=())
+    basis = basis_responses(dataset, robot, scales.torque)
+    search = explain._Search(base, (), basis, lambda _: None)
+    effect = explain._at_its_best(dataset, bare, first, search)
+    assert effect.laws[0].name == "power law"
+    law = {name: item.value for name, item in effect.laws[0].parameters.items()}
+    assert law == pytest.approx({"size": 0.03, "exponent": 2.0}, rel=0.008)
+    left = [
+        (dataset.value - explain._with_term(dataset, robot, item).predict([robot])[0]).std()
+        for item in (first, effect)
+    ]
+    assert left[1] < 0.9 * left[0]
+
+
 def test_a_patch_of_the_floor_is_one_for_all_wheels_and_the_users_simulation_may_have_it(
     simulation: RecordingSimulation,  # noqa: F811
     monkeypatch: pytest.MonkeyPatch,
@@ -157,7 +184,7 @@ def test_a_patch_of_the_floor_is_one_for_all_wheels_and_the_users_simulation_may
     table = Table.over(FAMILIES["torque.place"], [motion], _scales(simulation))
     assert table is not None
     rest = _rest(dataset, found)
-    effect = refitted(rest, SimpleNamespace(table=table), robot)  # type: ignore[arg-type]
+    effect = refitted(rest, fitted(rest, Tried(table, 1.0), robot, [motion]), robot)
     assert effect.term.wheels == (0, 1, 2)
     assert effect.share > 0.8  # by moments: each stretch is on ground of its own
     # A smaller table stays near nothing where nobody has been, and says so.

@@ -22,12 +22,15 @@ def _chosen(
     shares: dict[str, float],
     *,
     law: float = 0.0,
+    timed: float = 0.0,
     is_sure: bool = False,
     moments: Mapping[str, float] = MappingProxyType({}),
     explained: Mapping[str, float] = MappingProxyType({}),
     is_supplied: bool = True,
 ) -> str | None:
-    """The family that is fitted; what depends on place is a law that explains `law`."""
+    """The family that is fitted; what depends on place is a law that explains `law`, what depends
+    on time one that explains `timed`.
+    """
 
     class Tabled(SimpleNamespace):
         def columns(self, *_: object) -> list[object]:
@@ -35,10 +38,10 @@ def _chosen(
 
     def fitted(rest: object, item: SimpleNamespace, *_: object) -> SimpleNamespace:
         family = item.table.family
-        laws = ("a law",) if family.is_strange and law else ()
-        return SimpleNamespace(
-            family=family, laws=laws, explained=explained.get(family.family_id, law)
-        )
+        own = timed if family.is_event else law
+        laws = ("a law",) if own and (family.is_strange or family.is_event) else ()
+        shown = explained.get(family.family_id, own)
+        return SimpleNamespace(family=family, laws=laws, explained=shown, share=item.share)
 
     tried = [
         Tried(Tabled(family=FAMILIES[name]), share, moments.get(name, -1.0))  # type: ignore[arg-type]
@@ -110,6 +113,23 @@ def test_a_law_of_place_that_explains_nearly_all_is_no_event(
 
 
 @pytest.mark.parametrize(
+    ("time", "timed", "expected"),
+    [
+        (0.9, 0.81, TIME),  # friction that dies out: few headings, each at a time of its own
+        (0.9, 0.79, PLACE),
+        (0.9, 0.0, PLACE),  # a table over time explains whatever there is
+        (0.69, 0.81, PLACE),
+    ],
+)
+def test_a_law_of_time_that_explains_more_than_a_law_of_place_is_taken(
+    monkeypatch: pytest.MonkeyPatch, time: float, timed: float, expected: str
+) -> None:
+    shares, explained = {PLACE: 0.7, TIME: time}, {TIME: timed or 0.95}
+    found = _chosen(monkeypatch, shares, law=0.8, timed=timed, explained=explained)
+    assert found == expected
+
+
+@pytest.mark.parametrize(
     ("stretches", "moments", "expected"),
     [
         (-0.5, 0.91, FLOOR),  # new ground all along, but the same for all wheels
@@ -175,7 +195,8 @@ def test_names_that_take_the_law_from_a_term_are_dropped(
     monkeypatch.setattr(explain, "_with_term", lambda *_: "data")
     monkeypatch.setattr(explain, "_refitted", lambda *_: again)
     plain = SimpleNamespace(simulations=(SimpleNamespace(robot=None),))
-    _, found, effect = explain._settled(plain, law, lambda *_: made)  # type: ignore[arg-type]
+    search = SimpleNamespace(named=lambda *_: made)
+    _, found, effect = explain._settled(plain, law, search)  # type: ignore[arg-type]
     assert found.best.key == names  # type: ignore[attr-defined]
     assert effect.laws == ("a law",)
 
@@ -204,10 +225,11 @@ def _instead(
     plain = SimpleNamespace(value=(0.0,) * 100)
     monkeypatch.setattr(explain, "_remainder", lambda *_: None)
     monkeypatch.setattr(explain, "unmodelled_effect", lambda *_, is_repeatable: effect)
+    monkeypatch.setattr(explain, "_at_its_best", lambda *_: effect)
     monkeypatch.setattr(explain, "_settled", lambda *_: (None, made[1], effect))
     monkeypatch.setattr(explain, "_left", lambda data, *_: left if data is plain else then)
     beside_names = None if seen is None else explain._Seen(seen, is_much=False)  # type: ignore[arg-type]
-    tried = explain._instead(plain, made[0], lambda *_: made[1], None, beside_names)  # type: ignore[arg-type,return-value]
+    tried = explain._instead(plain, made[0], None, None, beside_names)  # type: ignore[arg-type]
     return tried is not None
 
 
@@ -227,6 +249,12 @@ LAW = SimpleNamespace(laws=("a law",), is_repeatable=True, share=0.4)
         (3, 0, 106.0, 60.0, True),
         (3, 0, 200.0, 166.0, True),  # a sixth less
         (3, 0, 200.0, 167.0, False),
+        (1, 0, 90.0, 87.0, True),  # a single name, noise with either: a thirtieth less
+        (1, 0, 90.0, 88.0, False),
+        (1, 1, 90.0, 80.0, False),
+        (2, 0, 90.0, 80.0, False),
+        (1, 0, 104.0, 100.5, False),
+        (3, 0, 106.0, 100.0, True),
     ],
 )
 def test_one_law_takes_the_place_of_names_if_it_leaves_much_less(
@@ -295,7 +323,7 @@ def test_a_term_is_sought_without_names_that_stood_in_for_it(
 
     monkeypatch.setattr(explain, "_remainder", lambda *_: None)
     monkeypatch.setattr(explain, "unmodelled_effect", lambda *_: alone)
-    monkeypatch.setattr(explain, "_refitted", lambda _, __, effect: effect)
+    monkeypatch.setattr(explain, "_at_its_best", lambda _, __, effect, ___: effect)
     monkeypatch.setattr(explain, "_settled", _settled)
     monkeypatch.setattr(explain, "_left", lambda data, *_: left if data == "data" else 100.0)
     *_, effect = explain._beside(None, found, beside, None, None)  # type: ignore[arg-type]

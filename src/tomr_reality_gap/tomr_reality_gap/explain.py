@@ -1,7 +1,6 @@
 """From recordings to an explanation: align, compare, name, model, show."""
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 from attrs import evolve, frozen
@@ -15,7 +14,7 @@ from tomr_reality_gap.alignment.simulation import Run, Tick
 from tomr_reality_gap.analysis import AnalysisResult, residuals_of, spoils
 from tomr_reality_gap.explanation import Explanation
 from tomr_reality_gap.fit.backward_elimination import backward_elimination
-from tomr_reality_gap.fit.basis_responses import basis_responses
+from tomr_reality_gap.fit.basis_responses import BasisResponses, basis_responses
 from tomr_reality_gap.fit.consistency import check_same_robot
 from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection, finding_cost, forward_selection
@@ -45,15 +44,31 @@ Array = NDArray[np.float64]
 
 _DOUBT = 1.05  # times noise: names that leave as much may stand for what has none
 _MORE = 1.2  # times what another model leaves
+_LITTLE_MORE = 1.03  # the same where that is noise
 _NEARLY = 0.95  # of what names leave out, that what has no name predicts
 _SLIGHT = 0.03  # of the mismatch: where names leave less, what comes and goes is no finding
 _LITTLE = 0.15  # of the noise: what is left of what is drawn is not looked into
 
 
-class _Named(Protocol):
-    """Finds names for recordings, beside what else brings a log evidence."""
+@frozen
+class _Search:
+    """All hypotheses, to be tried on recordings."""
 
-    def __call__(self, data: Dataset, beside: float = 0.0) -> Selection: ...
+    start: Model  # without any
+    candidates: Sequence[Hypothesis]
+    basis: BasisResponses
+    tick: Tick
+
+    def named(self, data: Dataset, beside: float = 0.0) -> Selection:
+        """Names for recordings, beside what else brings a log evidence."""
+        found = forward_selection(
+            data, self.start, self.candidates, self.basis, beside=beside, tick=self.tick
+        )
+        return backward_elimination(data, found, self.candidates, self.tick)
+
+    def unnamed(self, data: Dataset) -> Model:
+        """Only what is not exactly known, fitted to recordings."""
+        return forward_selection(data, self.start, (), self.basis, tick=self.tick).best.model
 
 
 @frozen
@@ -100,12 +115,8 @@ def _analysed(
     tick = _Counter(progress, 3 * len(candidates) * len(ready.real))
     basis = basis_responses(dataset, base.robot, ready.scales.torque, orders)
     start = Model(base, parameters, (0.0,) * len(parameters))
-
-    def named(data: Dataset, beside: float = 0.0) -> Selection:
-        found = forward_selection(data, start, candidates, basis, beside=beside, tick=tick)
-        return backward_elimination(data, found, candidates, tick)
-
-    found = named(dataset)
+    search = _Search(start, candidates, basis, tick)
+    found = search.named(dataset)
     if not is_loop_known and sums_otherwise(dataset, found, tick):
         return _analysed(request, ready.summed_otherwise(), progress, is_loop_known=True)
     check_same_robot(dataset, found.rounds[-1])
@@ -113,14 +124,14 @@ def _analysed(
     effect = seen.effect if seen is not None and seen.is_much else None
     if effect is not None:
         plain = dataset
-        dataset, found, effect = _beside(plain, found, effect, named, ready.scales)
-    elif (tried := _instead(dataset, found, named, ready.scales, seen)) is not None:
+        dataset, found, effect = _beside(plain, found, effect, search, ready.scales)
+    elif (tried := _instead(dataset, found, search, ready.scales, seen)) is not None:
         plain = dataset
         dataset, found, effect = tried
     baseline = SimulatorBaseline.of(ready.simulations, dataset, found.noise, base.robot)
     if effect is not None and baseline is not None and baseline.shows(effect):
         effect, dataset, plain = None, plain or dataset, None
-        found = named(dataset)
+        found = search.named(dataset)
     found, shared = _held(dataset, found, candidates, baseline, tick)
     found = evolve(found, best=refined_at_itself(dataset, found.best, found.noise, tick=tick))
     return AnalysisResult(
@@ -160,7 +171,7 @@ def _beside(
     plain: Dataset,
     found: Selection,
     effect: Unmodelled,
-    named: _Named,
+    search: _Search,
     scales: Scales,
 ) -> tuple[Dataset, Selection, Unmodelled]:
     """Names sought once more, beside an unnamed term, and the term fitted anew beside them.
@@ -174,48 +185,52 @@ def _beside(
         alone = unmodelled_effect(rest, bare.described.robot, scales)
         if alone is not None and alone.family.is_strange:
             effect = alone
-        first = _refitted(plain, bare, effect)
-        tried = _settled(plain, first, named)
+        first = _at_its_best(plain, bare, effect, search)
+        tried = _settled(plain, first, search)
         names = [item.best.model.findings for item in (found, tried[1])]
         sigma = tried[1].noise.sigma
         left = [_left(data, item, sigma) for data, item in ((plain, found), tried[:2])]
         if names[1] < names[0] and left[1] < left[0]:
             return tried
-    return _settled(plain, effect, named, found.best.model)
+    return _settled(plain, effect, search, found.best.model)
 
 
 def _instead(
-    plain: Dataset, found: Selection, named: _Named, scales: Scales, seen: _Seen | None
+    plain: Dataset, found: Selection, search: _Search, scales: Scales, seen: _Seen | None
 ) -> tuple[Dataset, Selection, Unmodelled] | None:
-    """What has no name in the place of one name or several, if much less is left with it.
+    """What has no name in the place of one name or several, if less is left with it.
 
-    A law, or what it depends on predicts nearly all. It is sought where names leave more than
-    noise, or something that another drive would repeat is `seen` beside them.
+    A law, or what it depends on predicts nearly all. It is sought in the place of a single name,
+    and where names leave more than noise, or something that another drive would repeat is `seen`
+    beside them.
     """
     names, sigma = found.best.model.findings, found.noise.sigma
     left = _left(plain, found, sigma)
     is_seen = seen is not None and seen.effect.is_repeatable
-    if not names or not (is_seen or left > _DOUBT * len(plain.value)):
+    if not names or not (names == 1 or is_seen or left > _DOUBT * len(plain.value)):
         return None
     bare = found.without.model
     rest = _remainder(plain, bare)
     alone = unmodelled_effect(rest, bare.described.robot, scales, is_repeatable=True)
     if alone is None or not (alone.laws or alone.share > _NEARLY) or not alone.is_repeatable:
         return None
-    tried = _settled(plain, alone, named)
+    tried = _settled(plain, _at_its_best(plain, bare, alone, search), search)
     no_more = tried[1].best.model.findings < names
-    return tried if no_more and _left(*tried[:2], sigma) < left / _MORE else None
+    then = _left(*tried[:2], sigma)
+    # Beside errors of the simulator much less must be left, where only noise is left a little.
+    least = _MORE if then > len(plain.value) else _LITTLE_MORE
+    return tried if no_more and then < left / least else None
 
 
 def _settled(
     plain: Dataset,
     effect: Unmodelled,
-    named: _Named,
+    search: _Search,
     model: Model | None = None,
 ) -> tuple[Dataset, Selection, Unmodelled]:
     """Recordings with a term, the names beside it, and the term as fitted beside these."""
     robot = plain.simulations[0].robot if model is None else model.described.robot
-    found = named(_with_term(plain, robot, effect), effect.evidence)
+    found = search.named(_with_term(plain, robot, effect), effect.evidence)
     again = _refitted(plain, found.best.model, effect)
     if effect.laws and not again.laws and model is None:
         # Names that take the law away only made up for what it was off by.
@@ -228,8 +243,21 @@ def _settled(
     return _with_term(plain, found.best.model.described.robot, effect), found, effect
 
 
+def _at_its_best(plain: Dataset, bare: Model, effect: Unmodelled, search: _Search) -> Unmodelled:
+    """The term without any name, and what is not exactly known, fitted in turn."""
+    data = _with_term(plain, bare.described.robot, effect)
+    return _refitted(plain, search.unnamed(data), effect)
+
+
 def _refitted(plain: Dataset, model: Model, effect: Unmodelled) -> Unmodelled:
-    return refitted(_remainder(plain, model), effect, model.described.robot)
+    """The term fitted anew beside a model, whose derivatives are those of a robot with the term."""
+    robot = model.described.robot
+    value = plain.predict([robot])[0]
+    there = linearise(_with_term(plain, robot, effect), model, ())
+    rest = Remainder.of(
+        plain, value, np.asarray(there.matrix, dtype=np.float64), there.value - value
+    )
+    return refitted(rest, effect, robot)
 
 
 def _left(dataset: Dataset, found: Selection, sigma: Array) -> float:

@@ -13,12 +13,8 @@ from tomr_power_model.unmodelled import LearntTerm
 
 Array = NDArray[np.float64]
 
-_HELD = {  # families whose variable answers to what they do, with the unit of their slope
-    "torque.speed": "N m s/rad",
-    "torque.signed_speed": "N m s/rad",
-    "torque.current": "N m/A",
-    "force.velocity": "N s/m",
-}
+# Unit of the slope over what answers to a torque or a force, by the unit of that.
+_SLOPES = {"rad/s": "N m s/rad", "A": "N m/A", "m/s": "N s/m"}
 
 
 def too_steep(
@@ -38,9 +34,9 @@ def too_steep(
         proportional: gain of the drivers [V s/rad].
         wheel_radius: m.
     """
-    unit = _HELD.get(term.family.family_id)
-    if unit is None:
+    if not term.family.is_coupled:
         return ""
+    unit = _SLOPES[term.family.axes[0].unit]
     # Torque with which motor and driver resist a change of speed, per rad/s.
     stiff = [k * (proportional + k) / r for k, r in zip(constants, resistances, strict=True)]
     bounds = list(constants) if unit == "N m/A" else stiff

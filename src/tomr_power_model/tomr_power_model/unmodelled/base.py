@@ -42,6 +42,7 @@ class Family:
     is_strange: ClassVar[bool] = False  # whether no effect of the vocabulary depends on the like
     is_event: ClassVar[bool] = False  # whether it says when, not why: no other drive repeats it
     is_shared: ClassVar[bool] = False  # whether one table holds for all wheels
+    is_coupled: ClassVar[bool] = False  # whether it changes the speeds or currents it depends on
     holds: ClassVar[str] = ""  # the family whose terms are all among its own
 
     @classmethod

@@ -251,8 +251,8 @@ _FORMS = (
         (*_MEMORY, *_SPEEDS),
         {"size": "*", "decay": "variable"},
         _curve_starts(0.05, 0.15, 0.4),
-        lambda p, at: p[0] * np.exp(-np.minimum(at[:, 0] / max(abs(p[1]), TINY), 50.0)),
-        "size * math.exp(-min(x / decay, 50.0))",
+        lambda p, at: p[0] * np.exp(-np.clip(at[:, 0] / max(abs(p[1]), TINY), -50.0, 50.0)),
+        "size * math.exp(-max(min(x / decay, 50.0), -50.0))",
     ),
     Law(
         "periodic",

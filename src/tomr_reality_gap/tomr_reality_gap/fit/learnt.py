@@ -23,6 +23,7 @@ _LENGTH = 1.5  # knots over which a table is smooth
 _ROUGH = 1e-3  # of the variance of its smoothest shape: shapes with less are left out
 _AT_ONCE = 32  # torques that are kept in memory at a time
 _LEAST_FLOOR = 0.2  # m: who goes no farther sees no floor
+_PASSES = 2  # to the motion that a coupled term leaves: a drag slows the wheels it depends on
 _SMALL = 1e-9
 _ALL = -1  # wheels at once
 
@@ -32,15 +33,21 @@ def with_terms(
 ) -> RecordingSimulation:
     """The recording, simulated with learnt terms besides; `robot` determines the motion."""
     for term in terms:
-        found = term.actions(motion_in(simulation, robot))
-        before = 0.0 if simulation.resisting is None else simulation.resisting
-        drawn = 0.0 if simulation.drawn is None else simulation.drawn
-        simulation = evolve(
-            simulation,
-            resisting=before + found.torque,
-            drawn=drawn + power_rows(simulation, found),
-        )
+        motion = motion_in(simulation, robot)
+        for _ in range(_PASSES if term.family.is_coupled else 0):
+            motion = motion_in(_with(simulation, term.actions(motion)), robot)
+        simulation = _with(simulation, term.actions(motion))
     return simulation
+
+
+def _with(simulation: RecordingSimulation, actions: Actions) -> RecordingSimulation:
+    before = 0.0 if simulation.resisting is None else simulation.resisting
+    drawn = 0.0 if simulation.drawn is None else simulation.drawn
+    return evolve(
+        simulation,
+        resisting=before + actions.torque,
+        drawn=drawn + power_rows(simulation, actions),
+    )
 
 
 def power_rows(simulation: RecordingSimulation, actions: Actions) -> Array:

@@ -15,8 +15,10 @@ from tomr_reality_gap.fit.learnt import power_rows
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 8
-_STEP = 0.02  # of a parameter, for its derivative
+_ROUNDS = 10
+_ENOUGH = 1e-4  # of the squares left: a step that promises less is not taken
+_FACTOR = 1.0  # logarithm of the most that a step makes of a size
+_STEP = 0.02  # of a parameter, to either side, for its derivative
 _LEAST = 0.005  # the same, in its unit, of what may be nothing: places, speeds, angles
 
 
@@ -72,20 +74,41 @@ def polished(
     step = np.zeros_like(law.parameters)
     for _ in range(_ROUNDS):
         steps = np.maximum(_STEP * np.abs(law.parameters), least)
-        moved = [evolve(law, parameters=law.parameters + row) for row in np.diag(steps)]
-        terms = [item.term for item in (law, *moved)]
-        rows = changes_of(dataset, robot, motions, terms) * weight
+        rows = changes_of(dataset, robot, motions, _around(law, steps)) * weight
         left = beside(residual - rows[0])
         now = float(left @ left)
-        if now >= cost:  # the last step was too long
+        if not now < cost:  # the last step was too long
             step = 0.5 * step
-            law = evolve(best, parameters=best.parameters + step)
+            law = _moved(best, step)
             continue
-        jacobian = beside(((rows[1:] - rows[0]).T) / steps)
+        # An exponent bends what it shows, and an edge has none but small corners.
+        up, down = np.split(rows[1:], 2)
+        jacobian = beside((up - down).T / (2.0 * steps))
         information = jacobian.T @ jacobian
         covariance = np.asarray(np.linalg.pinv(information), dtype=np.float64)
         best = evolve(law, covariance=covariance * inflation)
         change, cost = rows[0] / weight, now
-        step = covariance @ (jacobian.T @ left)
-        law = evolve(law, parameters=law.parameters + step)
+        slope = jacobian.T @ left
+        step = covariance @ slope
+        if float(step @ slope) < _ENOUGH * now:
+            break
+        law = _moved(law, step)
     return best, change
+
+
+def _around(law: LawAt, steps: Array) -> list[LearntTerm]:
+    """The law's term, then those with each parameter a step above, and a step below."""
+    both = np.concatenate([np.diag(steps), -np.diag(steps)])
+    return [law.term, *(evolve(law, parameters=law.parameters + row).term for row in both)]
+
+
+def _moved(law: LawAt, step: Array) -> LawAt:
+    """The law after a step, of which a size takes a part of it: its logarithm and an exponent
+    trade places along a line, it itself along a curve.
+    """
+    parameters = law.parameters + step
+    for number, name in enumerate(law.law.units):
+        size = law.parameters[number]
+        if name in SIZES and size:
+            parameters[number] = size * np.exp(np.clip(step[number] / size, -_FACTOR, _FACTOR))
+    return evolve(law, parameters=parameters)

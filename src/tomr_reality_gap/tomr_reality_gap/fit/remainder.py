@@ -35,13 +35,23 @@ class Remainder:
     weight: Array  # (n,)
 
     @classmethod
-    def of(cls, dataset: Dataset, value: Array, columns: Array) -> "Remainder":
-        """Of simulated values; `columns` are derivatives in prior standard deviations, (n, p)."""
+    def of(
+        cls, dataset: Dataset, value: Array, columns: Array, change: Array | None = None
+    ) -> "Remainder":
+        """Of simulated values.
+
+        Args:
+            dataset: recordings.
+            value: simulated, (n,).
+            columns: derivatives in prior standard deviations, (n, p).
+            change: what a term is known to add: what varies with it is no noise, (n,).
+        """
         residual = dataset.value - value
+        noise = residual if change is None else residual - change
         weight = np.empty_like(residual)
         for channel, part in zip(dataset.channels, rows_of(dataset.channels), strict=True):
             rounding = channel.rounding(value[part])
-            weight[part] = 1.0 / _scatter(channel.value, residual[part], rounding)
+            weight[part] = 1.0 / _scatter(channel.value, noise[part], rounding)
         gram = Gram.of(columns, residual, weight)
         values, vectors = np.linalg.eigh(gram.matrix)
         shown = (columns @ vectors[:, values > _SHOWS]) * weight[:, None]

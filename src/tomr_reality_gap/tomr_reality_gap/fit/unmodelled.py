@@ -22,7 +22,7 @@ from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.families import Tried, families_tried, predicting
 from tomr_reality_gap.fit.law_forms import TINY
 from tomr_reality_gap.fit.laws import AS_WELL, Evidence, LawAt, laws_of
-from tomr_reality_gap.fit.learnt import Table
+from tomr_reality_gap.fit.learnt import Table, with_terms
 from tomr_reality_gap.fit.polish import changes_of, polished
 from tomr_reality_gap.fit.remainder import Remainder, inflations, whitened
 from tomr_reality_gap.fit.supplied import is_supplied
@@ -57,6 +57,7 @@ class Unmodelled:
     change: Array  # what it adds to every value, (n,)
     explained: float  # of the squares that are left without it, those of noise included
     sigma: Array  # of the term's values, like them
+    law: LawAt | None = None  # the first, at its best
 
     @property
     def family(self) -> type[Family]:
@@ -102,7 +103,7 @@ def unmodelled_effect(
         alike = [item for item in tried if not item.table.family.is_event and item is not best]
         alike = [item for item in alike if item.share > best.share - _ALIKE]
         found = _most(rest, [best, *alike], robot, motions)
-        return _lawful(rest, found, tried, robot, motions)
+        return _timed(rest, _lawful(rest, found, tried, robot, motions), event, robot, motions)
     found = fitted(rest, best, robot, motions)
     if found.family.acts == "driver":
         drawn = best.table.columns(rest.dataset, robot, motions)
@@ -133,10 +134,28 @@ def _lawful(
         # A map follows much, and what names depend on as well is no news: these must explain more.
         least = 0.0 if is_news and not family.is_shared else found.explained
         if comes_and_goes or not found.laws:
-            least = max(least, _LAW)
+            # A table has many values to do with: a law that explains as much says more.
+            least = max(least - _CLEARLY, _LAW)
         if other.laws and other.explained > least:
             lawful.append(other)
     return max(lawful, key=lambda item: item.explained, default=found)
+
+
+def _timed(
+    rest: Remainder,
+    found: Unmodelled,
+    event: Tried | None,
+    robot: Robot,
+    motions: Sequence[Motion],
+) -> Unmodelled:
+    """The term, or one over time whose law explains more: friction that dies out as it runs in.
+
+    A drive passes most headings and places but a few times, at times of their own.
+    """
+    if event is None or event.share < found.share:
+        return found
+    other = fitted(rest, event, robot, motions)
+    return other if other.laws and other.explained > found.explained else found
 
 
 def _most(
@@ -174,20 +193,32 @@ def _narrowest(tried: Sequence[Tried]) -> Tried | None:
 
 
 def refitted(rest: Remainder, effect: Unmodelled, robot: Robot) -> Unmodelled:
-    """The same term, fitted anew to what another model leaves."""
-    motions = [motion_in(item, robot) for item in rest.dataset.simulations]
+    """The same term, fitted anew to what another model leaves, a coupled one in its own motion."""
+    terms = (effect.term,) if effect.family.is_coupled else ()
+    simulations = [with_terms(item, robot, terms) for item in rest.dataset.simulations]
+    motions = [motion_in(item, robot) for item in simulations]
     found = predicting(rest, effect.table, robot, motions)
-    return fitted(rest, evolve(found, share=found.best), robot, motions)
+    return fitted(rest, evolve(found, share=found.best), robot, motions, effect.law)
 
 
-def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]) -> Unmodelled:
-    """A family's table at the wheels that show it, or at all where its law holds for them too."""
+def fitted(
+    rest: Remainder,
+    best: Tried,
+    robot: Robot,
+    motions: Sequence[Motion],
+    known: LawAt | None = None,
+) -> Unmodelled:
+    """A family's table at the wheels that show it, or at all where its law holds for them too.
+
+    `known`: a law that was found before.
+    """
     columns: list[Matrix] = [
         whitened(part, rest.weight) for part in best.table.columns(rest.dataset, robot, motions)
     ]
     every = list(range(len(columns)))
     rows = _rows_shown(rest, best, columns)
-    found = _fitted_at(rest, best, robot, motions, [columns[row] for row in rows], rows)
+    shown = [columns[row] for row in rows]
+    found = _fitted_at(rest, best, robot, motions, shown, rows, known)
     if not found.laws or len(rows) == len(every):
         return found
     # A wheel that turned slower than the others shows little of what grows with its speed.
@@ -196,9 +227,9 @@ def fitted(rest: Remainder, best: Tried, robot: Robot, motions: Sequence[Motion]
         term, wheels=best.table.wheels(every), values=np.tile(term.values[:1], (WHEELS, 1))
     )
     change = changes_of(rest.dataset, robot, motions, [wide])[0]
-    if _share(_alone(rest), _lacking(rest, change)) < found.explained + _CLEARLY:
+    if _share(_alone(rest), _lacking(rest, change)) <= found.explained:
         return found
-    return _fitted_at(rest, best, robot, motions, columns, every)
+    return _fitted_at(rest, best, robot, motions, columns, every, known or found.law)
 
 
 def _rows_shown(rest: Remainder, best: Tried, columns: Sequence[Matrix]) -> list[int]:
@@ -218,6 +249,7 @@ def _fitted_at(
     motions: Sequence[Motion],
     columns: Sequence[Matrix],
     rows: Sequence[int],
+    known: LawAt | None,
 ) -> Unmodelled:
     """Of some rows, whose whitened columns are given."""
     table, count = best.table, best.table.root.shape[1]
@@ -232,13 +264,19 @@ def _fitted_at(
     equations = _normal_equations(rest, columns, left)
     near, simulated = laws_of(table, term, equations, _MAYBE), term
     laws = [law for law in near if law.share > AS_WELL]
-    if near:
+    # What a strong drag does no table adds up to: a law that was found before may fit better.
+    tried = [*(laws or near)[:1], *([evolve(known, table=table, learnt=term)] if known else [])]
+    if tried:
         # A stiff tether pulls the robot off its way: only at its best such a law explains as much.
-        first, shown = _at_its_best(rest, (laws or near)[0], robot, motions, equations.inflation)
-        table_share, law_share = (_share(alone, _lacking(rest, item)) for item in (change, shown))
+        best_ones = [_at_its_best(rest, law, robot, motions, equations.inflation) for law in tried]
+        shares = [_share(alone, _lacking(rest, shown)) for _, shown in best_ones]
+        law_share = max(shares)
+        first, shown = best_ones[shares.index(law_share)]
+        table_share = _share(alone, _lacking(rest, change))
         if laws or law_share > AS_WELL * table_share:
             first = evolve(first, share=law_share / max(table_share, TINY))
-            laws, simulated, change = [first, *laws[1:]], first.term, shown
+            others = [law for law in laws if law.law.name != first.law.name]
+            laws, simulated, change = [first, *others], first.term, shown
     lacking = _lacking(rest, change)
     return Unmodelled(
         table,
@@ -252,6 +290,7 @@ def _fitted_at(
         change,
         _share(alone, lacking),
         np.stack(sigma),
+        laws[0] if laws else None,
     )
 
 

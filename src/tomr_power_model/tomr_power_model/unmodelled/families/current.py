@@ -20,6 +20,7 @@ class TorqueByCurrent(Resistance):
     axes: ClassVar = (Axis("motor current", "A", 10, _flowing),)
     words = "a torque that depends on the motor's load"
     look = "the gear: its teeth and bearings under load"
+    is_coupled = True
 
 
 @family

@@ -18,6 +18,7 @@ class TorqueBySpeed(Resistance):
     axes: ClassVar = _SPEED
     words = "a torque that depends on the wheel's speed"
     look = "the wheel's bearings, seal and grease, and whether something rubs on it"
+    is_coupled = True
 
 
 @family
@@ -30,6 +31,7 @@ class TorqueBySignedSpeed(Family):
     words = "a torque that depends on the wheel's speed and the way it turns"
     look = "the gear and what rubs on the wheel in one direction only"
     holds = "torque.speed"
+    is_coupled = True
 
     @staticmethod
     def factor(motion: Motion) -> Array:

@@ -18,3 +18,4 @@ class ForceByVelocity(Family):
     words = "a force on the body that depends on its velocity in the world"
     look = "what moves against the floor: wind, a fan, a conveyor, the nap of a carpet"
     is_strange = True
+    is_coupled = True
