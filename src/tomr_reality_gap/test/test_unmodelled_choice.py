@@ -166,6 +166,10 @@ def test_a_law_of_place_that_explains_more_is_taken_before_a_table_of_speed(
     shares, explained = {SIGNED: 0.8, PLACE: 0.4}, {SIGNED: 0.85, PLACE: 0.9}
     assert _chosen(monkeypatch, shares, law=0.9, explained=explained) == PLACE
     assert _chosen(monkeypatch, shares, explained=explained) == SIGNED
+    # Of a table with its many values a law has to explain about as much.
+    for least, expected in ((0.846, PLACE), (0.844, SIGNED)):
+        explained = {SIGNED: 0.85, PLACE: least}
+        assert _chosen(monkeypatch, shares, law=0.9, explained=explained) == expected
 
 
 @pytest.mark.parametrize(
@@ -201,9 +205,10 @@ def test_names_that_take_the_law_from_a_term_are_dropped(
     assert effect.laws == ("a law",)
 
 
-def _selection(names: int) -> Selection:
-    """Of so many names."""
-    model = SimpleNamespace(hypotheses=("a name",) * names, findings=names)
+def _selection(names: int, places: int = 2) -> Selection:
+    """Of so many names, at so many places."""
+    hypotheses = tuple(SimpleNamespace(where=f"wheel {n % places}") for n in range(names))
+    model = SimpleNamespace(hypotheses=hypotheses, findings=names)
     bare = SimpleNamespace(described=SimpleNamespace(robot=None))
     best, without = (SimpleNamespace(model=item) for item in (model, bare))
     noise = SimpleNamespace(sigma=None)
@@ -214,6 +219,7 @@ def _instead(
     monkeypatch: pytest.MonkeyPatch,
     *,
     names: int = 3,
+    places: int = 2,
     beside: int = 0,
     left: float = 200.0,
     then: float = 110.0,
@@ -221,7 +227,7 @@ def _instead(
     seen: SimpleNamespace | None = None,
 ) -> bool:
     """Whether a term takes the place of `names` that leave `left` of 100 values; with it `then`."""
-    made = [_selection(count) for count in (names, beside)]
+    made = [_selection(count, places) for count in (names, beside)]
     plain = SimpleNamespace(value=(0.0,) * 100)
     monkeypatch.setattr(explain, "_remainder", lambda *_: None)
     monkeypatch.setattr(explain, "unmodelled_effect", lambda *_, is_repeatable: effect)
@@ -281,6 +287,15 @@ def test_what_is_no_law_or_not_repeatable_takes_no_names_place(
     monkeypatch: pytest.MonkeyPatch, effect: SimpleNamespace | None
 ) -> None:
     assert not _instead(monkeypatch, effect=effect)
+
+
+def test_names_at_one_place_that_leave_little_may_stand_in_for_what_has_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Friction and braking energy of one wheel for what its driver draws by speed."""
+    for places, expected in ((1, True), (2, False)):
+        found = _instead(monkeypatch, names=3, places=places, left=96.0, then=86.0, effect=LAW)
+        assert found == expected
 
 
 @pytest.mark.parametrize("is_repeatable", [True, False])

@@ -200,14 +200,14 @@ def _instead(
 ) -> tuple[Dataset, Selection, Unmodelled] | None:
     """What has no name in the place of one name or several, if less is left with it.
 
-    A law, or what it depends on predicts nearly all. It is sought in the place of a single name,
-    and where names leave more than noise, or something that another drive would repeat is `seen`
-    beside them.
+    A law, or what it depends on predicts nearly all. It is sought where all names are at one place,
+    or leave more than noise, or something that another drive would repeat is `seen` beside them.
     """
     names, sigma = found.best.model.findings, found.noise.sigma
     left = _left(plain, found, sigma)
     is_seen = seen is not None and seen.effect.is_repeatable
-    if not names or not (names == 1 or is_seen or left > _DOUBT * len(plain.value)):
+    is_one_place = len({item.where for item in found.best.model.hypotheses}) == 1
+    if not names or not (is_one_place or is_seen or left > _DOUBT * len(plain.value)):
         return None
     bare = found.without.model
     rest = _remainder(plain, bare)

@@ -122,7 +122,7 @@ def _lawful(
     """The term, or another one with a law that explains more.
 
     A law knows what lies beyond a stretch, a table does not; few stretches of one drive may meet
-    again. Of an event, and of a term without a law, it has to explain nearly all.
+    again. In the place of an event it has to explain nearly all, in that of a table about as much.
     """
     comes_and_goes, lawful = found.family.is_event, []
     for item in tried:
@@ -133,9 +133,10 @@ def _lawful(
         other = fitted(rest, evolve(item, share=item.best), robot, motions)
         # A map follows much, and what names depend on as well is no news: these must explain more.
         least = 0.0 if is_news and not family.is_shared else found.explained
-        if comes_and_goes or not found.laws:
-            # A table has many values to do with: a law that explains as much says more.
-            least = max(least - _CLEARLY, _LAW)
+        if comes_and_goes:
+            least = max(least, _LAW)
+        elif not found.laws:
+            least -= _CLEARLY  # a table has many values to do with
         if other.laws and other.explained > least:
             lawful.append(other)
     return max(lawful, key=lambda item: item.explained, default=found)
