@@ -10,6 +10,7 @@ from tomr_reality_gap.fit import laws, polish
 from tomr_reality_gap.fit.law_forms import LAWS
 from tomr_reality_gap.fit.laws import Evidence, laws_of, words_of
 from tomr_reality_gap.fit.learnt import Table
+from tomr_reality_gap.fit.remainder import Remainder
 
 
 def _table(family: str, *knots: np.ndarray) -> Table:
@@ -268,19 +269,18 @@ def test_a_law_is_brought_to_its_best_however_small_its_size_is(
     monkeypatch.setattr(polish, "changes_of", shown)
     (residual,) = shown(None, None, None, [law.term])
     off = evolve(law, parameters=law.parameters * factors)
+    rest = Remainder(None, 1e3 * residual, np.empty((len(speed), 0)), np.full(len(speed), 1e3))  # type: ignore[arg-type]
     (best, change), (wide, _) = (
-        polish.polished(
-            off,
-            None,  # type: ignore[arg-type]
-            None,  # type: ignore[arg-type]
-            (),
-            residual=1e3 * residual,
-            base=np.empty((len(speed), 0)),
-            weight=np.full(len(speed), 1e3),
-            inflation=inflation,
-        )
+        polish.polished(off, rest, None, (), inflation=inflation)  # type: ignore[arg-type]
         for inflation in (1.0, 4.0)
     )
     np.testing.assert_allclose(wide.covariance, 4.0 * best.covariance)
     assert best.parameters == pytest.approx(law.parameters, rel=0.01)
     np.testing.assert_allclose(change, residual, atol=1e-3)
+    # Of laws the first that explains enough, or else the one that explains most.
+    other = evolve(law, law=LAWS["step"], parameters=np.array([0.05, 2.0]))
+    for enough, name in ((0.3, "step"), (0.9999, "power law"), (2.0, "power law")):
+        tried = [other, off]
+        taken, change, share = polish.best_law(rest, tried, None, (), inflation=1.0, enough=enough)  # type: ignore[arg-type]
+        assert taken.law.name == name
+        assert share == pytest.approx(1.0 - ((residual - change) ** 2).sum() / (residual**2).sum())

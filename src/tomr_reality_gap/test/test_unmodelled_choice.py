@@ -314,22 +314,24 @@ def test_a_table_that_predicts_nearly_all_needs_no_law(monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize(
-    ("family", "names", "left", "first"),
+    ("family", "law", "names", "left", "first"),
     [
-        ("force.place", 1, 90.0, True),  # sought without any name: fewer names leave less
-        ("force.place", 2, 90.0, False),
-        ("force.place", 1, 100.0, False),
-        ("torque.speed", 1, 90.0, True),  # what names depend on too is taken as it was found
+        ("force.place", "", 1, 90.0, True),  # sought without any name: fewer names leave less
+        ("force.place", "", 2, 90.0, False),
+        ("force.place", "", 1, 100.0, False),
+        ("torque.speed", "", 1, 90.0, True),  # what names depend on too is taken as it was found
+        ("torque.speed", "alone", 1, 90.0, True),  # unless it is a law only without them
+        ("torque.speed", "both", 1, 90.0, True),
     ],
 )
 def test_a_term_is_sought_without_names_that_stood_in_for_it(
-    monkeypatch: pytest.MonkeyPatch, family: str, names: int, left: float, first: bool
+    monkeypatch: pytest.MonkeyPatch, family: str, law: str, names: int, left: float, first: bool
 ) -> None:
     """Two names leave 100; a term sought without them has some beside it."""
     found, fewer = _selection(2), _selection(names)
-    beside, alone = SimpleNamespace(key="beside"), SimpleNamespace(
-        key="alone", family=FAMILIES[family]
-    )  # fmt: skip
+    laws = ("a law",) if law else ()
+    beside = SimpleNamespace(key="beside", laws=laws if law == "both" else ())
+    alone = SimpleNamespace(key="alone", family=FAMILIES[family], laws=laws)
     settled: list[tuple[str, bool]] = []
 
     def _settled(_: object, effect: SimpleNamespace, *rest: object) -> tuple[object, ...]:
@@ -342,7 +344,7 @@ def test_a_term_is_sought_without_names_that_stood_in_for_it(
     monkeypatch.setattr(explain, "_settled", _settled)
     monkeypatch.setattr(explain, "_left", lambda data, *_: left if data == "data" else 100.0)
     *_, effect = explain._beside(None, found, beside, None, None)  # type: ignore[arg-type]
-    own = "alone" if FAMILIES[family].is_strange else "beside"
+    own = "alone" if FAMILIES[family].is_strange or law == "alone" else "beside"
     assert effect.key == own
     assert settled == ([(own, True)] if first else [(own, True), (own, False)])
 

@@ -177,13 +177,15 @@ def _beside(
     """Names sought once more, beside an unnamed term, and the term fitted anew beside them.
 
     Names that only stood in for what no name has have bent it. What depends on nothing that names
-    depend on is sought without any of them, and comes first if fewer names then leave less.
+    depend on, or is a law where it was none, is sought without any of them, and comes first if
+    fewer names then leave less.
     """
     if found.best.model.hypotheses:
         bare = found.without.model
         rest = _remainder(plain, bare)
         alone = unmodelled_effect(rest, bare.described.robot, scales)
-        if alone is not None and alone.family.is_strange:
+        is_lawful = alone is not None and bool(alone.laws) and not effect.laws
+        if alone is not None and (alone.family.is_strange or is_lawful):
             effect = alone
         first = _at_its_best(plain, bare, effect, search)
         tried = _settled(plain, first, search)

@@ -12,6 +12,7 @@ from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.law_forms import SIZES
 from tomr_reality_gap.fit.laws import LawAt
 from tomr_reality_gap.fit.learnt import power_rows
+from tomr_reality_gap.fit.remainder import Remainder
 
 Array = NDArray[np.float64]
 
@@ -39,29 +40,58 @@ def changes_of(
     )
 
 
-def polished(
-    law: LawAt,
-    dataset: Dataset,
+def best_law(
+    rest: Remainder,
+    tried: Sequence[LawAt],
     robot: Robot,
     motions: Sequence[Motion],
     *,
-    residual: Array,
-    base: Array,
-    weight: Array,
+    inflation: float,
+    enough: float,
+) -> tuple[LawAt, Array, float]:
+    """The first law that explains enough at its best, or the one that explains most.
+
+    A stiff tether pulls the robot off its way: only at its best such a law explains as much as its
+    table.
+
+    Args:
+        rest: what is left of recordings.
+        tried: laws, the first ones first.
+        robot: of which it is left.
+        motions: of the robot in the recordings.
+        inflation: of the parameters' variance.
+        enough: share of the squares that are left.
+
+    Returns:
+        The law, what it adds to every value, (n,), and the share that it explains.
+    """
+    found = []
+    for law in tried:
+        best, shown = polished(law, rest, robot, motions, inflation=inflation)
+        found.append((best, shown, rest.explained(shown)))
+        if found[-1][2] > enough:
+            break
+    return max(found, key=lambda item: item[2])
+
+
+def polished(
+    law: LawAt,
+    rest: Remainder,
+    robot: Robot,
+    motions: Sequence[Motion],
+    *,
     inflation: float,
 ) -> tuple[LawAt, Array]:
-    """The law at its best, and what it adds to every value.
+    """The law at its best, and what it adds to every value, (n,).
 
     Args:
         law: where to start.
-        dataset: recordings.
-        robot: without the law.
-        motions: its motions in them.
-        residual: that it leaves, whitened, (n,).
-        base: whitened derivatives by what is not exactly known, (n, q).
-        weight: of each value, (n,).
+        rest: what is left of recordings without it.
+        robot: of which it is left.
+        motions: of the robot in the recordings.
         inflation: of the parameters' variance.
     """
+    base, weight = rest.base, rest.weight
     inner = np.linalg.inv(base.T @ base + np.eye(base.shape[1]))
 
     def beside(columns: Array) -> Array:
@@ -70,12 +100,12 @@ def polished(
 
     # However small a size is, a step is a part of it.
     least = np.array([1e-12 if name in SIZES else _LEAST for name in law.law.units])
-    best, change, cost = law, np.zeros_like(residual), np.inf
+    best, change, cost = law, np.zeros_like(rest.residual), np.inf
     step = np.zeros_like(law.parameters)
     for _ in range(_ROUNDS):
         steps = np.maximum(_STEP * np.abs(law.parameters), least)
-        rows = changes_of(dataset, robot, motions, _around(law, steps)) * weight
-        left = beside(residual - rows[0])
+        rows = changes_of(rest.dataset, robot, motions, _around(law, steps)) * weight
+        left = beside(rest.residual - rows[0])
         now = float(left @ left)
         if not now < cost:  # the last step was too long
             step = 0.5 * step

@@ -61,6 +61,22 @@ class Remainder:
         """Whitened columns beside the base, (n, q + p)."""
         return np.concatenate([self.base.astype(np.float32), *columns], axis=1)
 
+    def left(self, change: Array) -> Array:
+        """What is left beside a change of all values, what is not exactly known fitted, (n,)."""
+        left = self.residual - change * self.weight
+        known = solve(Gram.of(self.base, left), range(self.base.shape[1])).mean
+        return np.asarray(left - self.base @ known)
+
+    @cached_property
+    def alone(self) -> Array:
+        """What is left where only what is not exactly known is fitted, whitened, (n,)."""
+        return self.left(np.zeros_like(self.residual))
+
+    def explained(self, change: Array) -> float:
+        """Share of these squares, those of noise included, that a change of all values explains."""
+        left = self.left(change)
+        return 1.0 - float(left @ left) / max(float(self.alone @ self.alone), 1e-300)
+
     @cached_property
     def blocks(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Stretch and moment of each row."""

@@ -23,7 +23,7 @@ from tomr_reality_gap.fit.families import Tried, families_tried, predicting
 from tomr_reality_gap.fit.law_forms import TINY
 from tomr_reality_gap.fit.laws import AS_WELL, Evidence, LawAt, laws_of
 from tomr_reality_gap.fit.learnt import Table, with_terms
-from tomr_reality_gap.fit.polish import changes_of, polished
+from tomr_reality_gap.fit.polish import best_law, changes_of
 from tomr_reality_gap.fit.remainder import Remainder, inflations, whitened
 from tomr_reality_gap.fit.supplied import is_supplied
 
@@ -228,7 +228,7 @@ def fitted(
         term, wheels=best.table.wheels(every), values=np.tile(term.values[:1], (WHEELS, 1))
     )
     change = changes_of(rest.dataset, robot, motions, [wide])[0]
-    if _share(_alone(rest), _lacking(rest, change)) <= found.explained:
+    if rest.explained(change) <= found.explained:
         return found
     return _fitted_at(rest, best, robot, motions, columns, every, known or found.law)
 
@@ -255,7 +255,7 @@ def _fitted_at(
     """Of some rows, whose whitened columns are given."""
     table, count = best.table, best.table.root.shape[1]
     units, covariance, change = _solved(rest, columns, best.size)
-    alone, left = _alone(rest), rest.residual - change
+    left = rest.residual - change
     sigma = [
         np.sqrt(np.einsum("ij,jk,ik->i", table.root, covariance[part, part], table.root))
         for part in (slice(n * count, (n + 1) * count) for n in range(len(units)))
@@ -266,19 +266,21 @@ def _fitted_at(
     near, simulated = laws_of(table, term, equations, _MAYBE), term
     laws = [law for law in near if law.share > AS_WELL]
     # What a strong drag does no table adds up to: a law that was found before may fit better.
-    tried = [*(laws or near)[:1], *([evolve(known, table=table, learnt=term)] if known else [])]
+    tried = [*([evolve(known, table=table, learnt=term)] if known else []), *(laws or near)]
     if tried:
-        # A stiff tether pulls the robot off its way: only at its best such a law explains as much.
-        best_ones = [_at_its_best(rest, law, robot, motions, equations.inflation) for law in tried]
-        shares = [_share(alone, _lacking(rest, shown)) for _, shown in best_ones]
-        law_share = max(shares)
-        first, shown = best_ones[shares.index(law_share)]
-        table_share = _share(alone, _lacking(rest, change))
+        table_share = rest.explained(change)
+        first, shown, law_share = best_law(
+            rest,
+            tried,
+            robot,
+            motions,
+            inflation=equations.inflation,
+            enough=table_share - _CLEARLY,
+        )
         if laws or law_share > AS_WELL * table_share:
             first = evolve(first, share=law_share / max(table_share, TINY))
             others = [law for law in laws if law.law.name != first.law.name]
             laws, simulated, change = [first, *others], first.term, shown
-    lacking = _lacking(rest, change)
     return Unmodelled(
         table,
         term,
@@ -286,46 +288,13 @@ def _fitted_at(
         simulated,
         best.share,
         not table.family.is_event or (bool(laws) and len(motions) > 1),
-        _evidence(rest.dataset, alone, lacking),
+        _evidence(rest.dataset, rest.alone, rest.left(change)),
         _is_large(rest.dataset, change),
         change,
-        _share(alone, lacking),
+        rest.explained(change),
         np.stack(sigma),
         laws[0] if laws else None,
     )
-
-
-def _alone(rest: Remainder) -> Array:
-    """What is left where only what is not exactly known is fitted, whitened, (n,)."""
-    return _lacking(rest, np.zeros_like(rest.residual))
-
-
-def _at_its_best(
-    rest: Remainder, law: LawAt, robot: Robot, motions: Sequence[Motion], inflation: float
-) -> tuple[LawAt, Array]:
-    """A law polished, and what it adds to every value, (n,)."""
-    return polished(
-        law,
-        rest.dataset,
-        robot,
-        motions,
-        residual=rest.residual,
-        base=rest.base,
-        weight=rest.weight,
-        inflation=inflation,
-    )
-
-
-def _lacking(rest: Remainder, change: Array) -> Array:
-    """What is left beside a change of all values, what is not exactly known fitted anew, (n,)."""
-    lacking = rest.residual - change * rest.weight
-    return np.asarray(
-        lacking - rest.base @ solve(Gram.of(rest.base, lacking), range(rest.base.shape[1])).mean
-    )
-
-
-def _share(alone: Array, lacking: Array) -> float:
-    return 1.0 - float(lacking @ lacking) / max(float(alone @ alone), 1e-300)
 
 
 def _normal_equations(rest: Remainder, columns: Sequence[Matrix], left: Array) -> Evidence:
