@@ -89,6 +89,21 @@ def test_a_described_learnt_term_resists_and_states_what_lies_beyond_its_table(
     assert "lies beyond the table of learnt term 1" in note
 
 
+def test_a_term_over_time_resists_in_the_motion_without_it(
+    simulation: RecordingSimulation,  # noqa: F811
+) -> None:
+    """Friction that holds a wheel, and is none of one that stands, would come and go."""
+    term = LearntTerm(
+        FAMILIES["torque.time"], (0, 1, 2), (np.array([0.0, 40.0]),), np.full((3, 2), 0.3)
+    )
+    robot = simulation.robot
+    found = prepared._as_described(evolve(simulation, robot=evolve(robot, unmodelled=(term,))))
+    resists = 0.3 * np.tanh(simulation.run(robot).speed / 0.1)
+    assert found.resisting is not None
+    driven = simulation.timeline.middle > 0.0
+    np.testing.assert_allclose(found.resisting[driven], resists[driven], atol=1e-9)
+
+
 @pytest.mark.parametrize(("quantum", "expected"), [(0.1, 0), (2.4, 1)])
 def test_sensors_that_show_little_but_their_steps_are_noted(
     simulation: RecordingSimulation,  # noqa: F811

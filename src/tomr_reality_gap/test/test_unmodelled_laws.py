@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tomr_power_model.unmodelled import FAMILIES
+from tomr_power_model.unmodelled import FAMILIES, LearntTerm
 from tomr_reality_gap.fit import unmodelled
 from tomr_reality_gap.fit.families import Tried
 from tomr_reality_gap.fit.remainder import Remainder
@@ -148,3 +148,27 @@ def test_the_total_is_asked_for_a_term_as_large_as_it_predicts(
     monkeypatch.setattr(unmodelled, "is_supplied", lambda rest, columns: asked.extend(columns))
     assert unmodelled.unmodelled_effect(_rest(np.zeros(2)), None, None) is None  # type: ignore[arg-type]
     np.testing.assert_allclose(asked, [[[0.1], [0.1]]])
+
+
+@pytest.mark.parametrize(("everywhere", "expected"), [(0.901, "all wheels"), (0.899, "two wheels")])
+def test_a_law_that_explains_no_less_at_all_wheels_is_one_for_all(
+    monkeypatch: pytest.MonkeyPatch, everywhere: float, expected: str
+) -> None:
+    """It is fitted to all of them from where it was at those that show it."""
+    begun: list[object] = []
+
+    def fitted_at(*arguments: object) -> SimpleNamespace:
+        *_, rows, known = arguments
+        begun.append(known)
+        at = "all wheels" if rows == [0, 1, 2] else "two wheels"
+        term = LearntTerm(FAMILIES[SPEED], (1, 2), (np.array([0.0, 1.0]),), np.ones((2, 2)))
+        return SimpleNamespace(laws=("a law",), law="found", explained=0.9, term=term, at=at)
+
+    table = SimpleNamespace(columns=lambda *_: [np.ones((2, 1))] * 3, wheels=tuple)
+    rest = SimpleNamespace(weight=np.ones(2), dataset=None, explained=lambda _: everywhere)
+    monkeypatch.setattr(unmodelled, "_rows_shown", lambda *_: [1, 2])
+    monkeypatch.setattr(unmodelled, "_fitted_at", fitted_at)
+    monkeypatch.setattr(unmodelled, "changes_of", lambda *_: [None])
+    found = unmodelled.fitted(rest, Tried(table, 1.0), None, ())  # type: ignore[arg-type]
+    assert found.at == expected  # type: ignore[attr-defined]
+    assert begun == [None, "found"][: len(begun)]
