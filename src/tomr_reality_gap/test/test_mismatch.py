@@ -161,6 +161,7 @@ def test_a_strong_drag_is_fitted_in_the_motion_that_it_leaves(
     search = explain._Search(base, (), basis, lambda _: None)
     effect = explain._at_its_best(dataset, bare, first, search)
     assert effect.laws[0].name == "power law"
+    assert len({item.name for item in effect.laws}) == len(effect.laws)
     law = {name: item.value for name, item in effect.laws[0].parameters.items()}
     assert law == pytest.approx({"size": 0.03, "exponent": 2.0}, rel=0.008)
     left = [

@@ -173,14 +173,21 @@ def test_a_law_of_place_that_explains_more_is_taken_before_a_table_of_speed(
 
 
 @pytest.mark.parametrize(
-    ("share", "speed", "expected"),
-    [(0.98, 0.9, SPEED), (0.98, 0.8, DRIVER), (0.96, 0.9, DRIVER), (0.98, 0.803, DRIVER)],
+    ("share", "driver", "speed", "expected"),
+    [
+        (0.98, 0.8, 0.9, SPEED),
+        (0.98, 0.8, 0.8, DRIVER),
+        (0.96, 0.8, 0.9, DRIVER),
+        (0.98, 0.8, 0.803, DRIVER),
+        (0.98, 0.08, 0.081, SPEED),  # most of what is left is noise
+        (0.98, 0.08, 0.0805, DRIVER),
+    ],
 )
 def test_of_families_that_predict_alike_the_one_that_explains_clearly_more_is_taken(
-    monkeypatch: pytest.MonkeyPatch, share: float, speed: float, expected: str
+    monkeypatch: pytest.MonkeyPatch, share: float, driver: float, speed: float, expected: str
 ) -> None:
     """What a driver draws by speed and what resists by speed: power distinguishes them in turns."""
-    explained = {DRIVER: 0.8, SPEED: speed}
+    explained = {DRIVER: driver, SPEED: speed}
     assert _chosen(monkeypatch, {DRIVER: 0.99, SPEED: share}, explained=explained) == expected
 
 

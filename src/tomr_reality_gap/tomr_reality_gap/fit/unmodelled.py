@@ -29,7 +29,8 @@ from tomr_reality_gap.fit.supplied import is_supplied
 
 Array = NDArray[np.float64]
 
-_CLEARLY = 0.005  # of the squares that are left, that other wheels must explain
+_CLEARLY = 0.005  # of the squares that are left, that another term must explain
+_MORE = 0.01  # the same, of what is explained where that is little
 _WHEEL_SHARE = 0.1  # of the wheel that shows most
 _MAYBE = 0.75  # of what a table explains: a law that may explain as much at its best
 _NAMED = 0.3  # share of what is left that a term must predict
@@ -170,7 +171,7 @@ def _most(
     for item in tried[1:]:
         if item.table.family.acts != found.family.acts:
             other = fitted(rest, item, robot, motions)
-            least = 0.0 if other.laws and found.laws else _CLEARLY
+            least = 0.0 if other.laws and found.laws else min(_CLEARLY, _MORE * found.explained)
             if other.explained > found.explained + least:
                 found = other
     return found
