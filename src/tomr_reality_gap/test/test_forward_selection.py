@@ -43,6 +43,7 @@ def searched(
     tried: tuple[str, ...] = TRIED,
     without: tuple[str, ...] = (),
     beside: float = 0.0,
+    barred: tuple[str, ...] = (),
 ) -> tuple[Dataset, Selection]:
     """Record values with noise, and search with the description of the reference robot, but for
     what is left out of it.
@@ -66,7 +67,9 @@ def searched(
     dataset = Dataset((evolve(made, channels=channels),))
     basis = basis_responses(dataset, base.robot, scales.torque)
     model = Model(base, parameters, (0.0,) * len(parameters))
-    found = forward_selection(dataset, model, candidates, basis, beside=beside)
+    found = forward_selection(dataset, model, candidates, basis, beside=beside, barred=barred)
+    if barred:
+        return dataset, found
     return dataset, backward_elimination(dataset, found, candidates)
 
 
@@ -82,13 +85,20 @@ def test_a_concealed_friction_is_named_with_its_wheel_and_size(
     real = evolve(
         robot, mass=1.01 * robot.mass, physics={**robot.physics, "friction.asymmetric": concealed}
     )
-    found = _found(simulation, real).best
+    selection = _found(simulation, real)
+    found = selection.best
     assert [item.name for item in found.model.hypotheses] == [
         "friction.asymmetric at wheel_2_joint"
     ]
     value, sigma = found.model.offsets[0][0], found.own_sigma[0]
     assert abs(value - 0.02) < 4.0 * sigma
     assert sigma < 0.004
+    # What is barred is not added; its derivatives are there to replace others with it.
+    (name,) = found.model.names
+    _, other = searched(simulation, simulation.predict([real])[0], barred=(name,))
+    assert name not in other.best.model.names
+    first = [item.rounds[0].jacobian.candidates.keys() for item in (selection, other)]
+    assert first[0] == first[1]
 
 
 def test_beside_what_explains_far_more_a_small_finding_is_none(

@@ -8,7 +8,7 @@ import pytest
 from tomr_power_model.unmodelled import FAMILIES
 from tomr_reality_gap import explain
 from tomr_reality_gap.fit import unmodelled
-from tomr_reality_gap.fit.forward_selection import Selection
+from tomr_reality_gap.fit.forward_selection import Selection, first_names
 from tomr_reality_gap.fit.unmodelled import Tried, unmodelled_effect
 
 PLACE, SPEED, TIME = "force.place", "torque.speed", "supply.time"
@@ -418,3 +418,47 @@ def test_a_little_that_comes_and_goes_beside_names_is_no_finding(
     effect.evidence = 10.0
     seen = explain._unmodelled(dataset, found, ready)  # type: ignore[arg-type]
     assert seen is None or not seen.is_much
+
+
+@pytest.mark.parametrize(
+    ("names", "left", "then", "after", "taken"),
+    [
+        (2, 186.0, 100.0, 2, True),  # a wheel radius and an inertia for a payload and a resistance
+        (2, 186.0, 100.0, 3, False),
+        (2, 186.0, 160.0, 2, False),  # a sixth less is asked for where more than noise is left
+        (2, 106.0, 100.0, 1, True),
+        (2, 104.0, 90.0, 2, False),  # hardly more than noise
+        (3, 186.0, 100.0, 2, False),
+        (0, 186.0, 100.0, 0, False),
+    ],
+)
+def test_names_that_leave_more_than_noise_are_sought_again_without_the_first(
+    monkeypatch: pytest.MonkeyPatch, names: int, left: float, then: float, after: int, taken: bool
+) -> None:
+    first, second = _selection(names), _selection(after)
+    barred: list[object] = []
+
+    def forward(*_: object, **settings: object) -> Selection:
+        barred.append(settings["barred"])
+        return second if settings["barred"] else first
+
+    monkeypatch.setattr(explain, "forward_selection", forward)
+    monkeypatch.setattr(explain, "backward_elimination", lambda _, found, *__: found)
+    monkeypatch.setattr(explain, "first_names", lambda _: {"a wheel radius"})
+    monkeypatch.setattr(explain, "_left", lambda _, found, __: left if found is first else then)
+    search = explain._Search(None, (), None, lambda _: None)  # type: ignore[arg-type]
+    found = search.named(SimpleNamespace(value=(0.0,) * 100))  # type: ignore[arg-type]
+    assert found is (second if taken else first)
+    assert barred in ([()], [(), {"a wheel radius"}])
+
+
+def test_the_first_names_are_all_that_would_have_done_as_well() -> None:
+    tried = [
+        SimpleNamespace(
+            evidence=evidence,
+            model=SimpleNamespace(hypotheses=[SimpleNamespace(name=name) for name in together]),
+        )
+        for evidence, together in ((-10.0, ("a", "b")), (-14.9, ("c",)), (-15.1, ("d",)))
+    ]
+    found = SimpleNamespace(rounds=(SimpleNamespace(tried=tried), SimpleNamespace(tried=[])))
+    assert first_names(found) == {"a", "c"}  # type: ignore[arg-type]

@@ -1,6 +1,6 @@
 """From recordings to an explanation: align, compare, name, model, show."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from attrs import evolve, frozen
@@ -17,7 +17,12 @@ from tomr_reality_gap.fit.backward_elimination import backward_elimination
 from tomr_reality_gap.fit.basis_responses import BasisResponses, basis_responses
 from tomr_reality_gap.fit.consistency import check_same_robot
 from tomr_reality_gap.fit.dataset import Dataset
-from tomr_reality_gap.fit.forward_selection import Selection, finding_cost, forward_selection
+from tomr_reality_gap.fit.forward_selection import (
+    Selection,
+    finding_cost,
+    first_names,
+    forward_selection,
+)
 from tomr_reality_gap.fit.integrator import sums_otherwise
 from tomr_reality_gap.fit.jacobian import linearise
 from tomr_reality_gap.fit.learnt import with_terms
@@ -46,6 +51,7 @@ _DOUBT = 1.05  # times noise: names that leave as much may stand for what has no
 _MORE = 1.2  # times what another model leaves
 _LITTLE_MORE = 1.03  # the same where that is noise
 _NEARLY = 0.95  # of what names leave out, that what has no name predicts
+_FEW = 2  # names: of more the search has been through most
 _SLIGHT = 0.03  # of the mismatch: where names leave less, what comes and goes is no finding
 _LITTLE = 0.15  # of the noise: what is left of what is drawn is not looked into
 
@@ -60,9 +66,29 @@ class _Search:
     tick: Tick
 
     def named(self, data: Dataset, beside: float = 0.0) -> Selection:
-        """Names for recordings, beside what else brings a log evidence."""
+        """Names for recordings, beside what else brings a log evidence.
+
+        Where one or two leave more than noise, the first may have done the work of two others: the
+        search begins once more without it and what would have done as well.
+        """
+        found = self._from(data, beside)
+        names, sigma = found.best.model.findings, found.noise.sigma
+        left = _left(data, found, sigma)
+        if not 0 < names <= _FEW or left <= _DOUBT * len(data.value):
+            return found
+        again = self._from(data, beside, first_names(found))
+        no_more = again.best.model.findings <= names
+        return again if no_more and _is_less(_left(data, again, sigma), left, data) else found
+
+    def _from(self, data: Dataset, beside: float, barred: Collection[str] = ()) -> Selection:
         found = forward_selection(
-            data, self.start, self.candidates, self.basis, beside=beside, tick=self.tick
+            data,
+            self.start,
+            self.candidates,
+            self.basis,
+            beside=beside,
+            barred=barred,
+            tick=self.tick,
         )
         return backward_elimination(data, found, self.candidates, self.tick)
 
@@ -218,10 +244,7 @@ def _instead(
         return None
     tried = _settled(plain, _at_its_best(plain, bare, alone, search), search)
     no_more = tried[1].best.model.findings < names
-    then = _left(*tried[:2], sigma)
-    # Beside errors of the simulator much less must be left, where only noise is left a little.
-    least = _MORE if then > len(plain.value) else _LITTLE_MORE
-    return tried if no_more and then < left / least else None
+    return tried if no_more and _is_less(_left(*tried[:2], sigma), left, plain) else None
 
 
 def _settled(
@@ -266,6 +289,13 @@ def _left(dataset: Dataset, found: Selection, sigma: Array) -> float:
     """Sum of squares that a selection leaves, in units of a noise."""
     value = dataset.predict([found.best.model.described.robot])[0]
     return float((((dataset.value - value) / sigma) ** 2).sum())
+
+
+def _is_less(then: float, left: float, data: Dataset) -> bool:
+    """Whether another model leaves clearly less: beside errors of the simulator much, where only
+    noise is left a little.
+    """
+    return then < left / (_MORE if then > len(data.value) else _LITTLE_MORE)
 
 
 def _remainder(dataset: Dataset, model: Model) -> Remainder:

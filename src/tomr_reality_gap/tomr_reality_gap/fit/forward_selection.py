@@ -10,7 +10,7 @@ with r the whitened residual, u all offsets in prior standard deviations, G thei
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from attrs import evolve, field, frozen
 
@@ -27,6 +27,7 @@ from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 
 _COST = 20.0  # log evidence that an addition must bring: about e^20 : 1
 _MOST_FINDINGS = 4
+_ALIKE = 5.0  # log evidence: no difference
 _NOTHING = 1e-3  # prior standard deviations
 _SIGMAS = 3.0  # that a size must be away from nothing
 
@@ -67,11 +68,13 @@ def forward_selection(
     basis: BasisResponses,
     *,
     beside: float = 0.0,
+    barred: Collection[str] = (),
     tick: Tick = lambda done: None,
 ) -> Selection:
     """Add hypotheses while they bring evidence; what has no name is not mistaken for noise.
 
-    `beside`: log evidence of a term without a name that the recordings are simulated with.
+    `beside`: log evidence of a term without a name that the recordings are simulated with;
+    `barred`: names of candidates that are not added.
     """
     rounds: list[Round] = []
     without: FittedModel | None = None
@@ -83,7 +86,8 @@ def forward_selection(
         )
         rounds = [item.without_derivatives() for item in rounds]
         noise = _noise(dataset, jacobian, local)
-        start, screened = screen(dataset, jacobian, noise, open_ones)
+        allowed = [item for item in open_ones if item.name not in barred]
+        start, screened = screen(dataset, jacobian, noise, allowed)
         current, tried = _tried(dataset, start, screened, jacobian, noise, tick)
         without = without or current
         cost = cost_beside(len(dataset.value), current, without, beside)
@@ -111,6 +115,13 @@ def _tried(
     current, *fitted = refine(dataset, trials, jacobian, noise, tick=tick)
     first = len(start[0].hypotheses)
     return current, [item for item in fitted if _is_large_enough(item, first)]
+
+
+def first_names(found: Selection) -> frozenset[str]:
+    """What was added first, and what would have done as well: alone or with what came along."""
+    tried = found.rounds[0].tried
+    alike = [item for item in tried if item.evidence > tried[0].evidence - _ALIKE]
+    return frozenset(item.model.hypotheses[0].name for item in alike)
 
 
 def cost_beside(samples: int, model: FittedModel, without: FittedModel, beside: float) -> float:
