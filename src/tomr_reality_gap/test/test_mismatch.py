@@ -1,5 +1,7 @@
 """Where a mismatch is, and what depends on what: on series made by hand."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from attrs import evolve
@@ -137,7 +139,16 @@ def test_a_law_holds_at_wheels_that_hardly_show_it_but_not_where_it_is_not(
     motions = [motion_in(simulation, robot)]
     table = Table.over(FAMILIES["torque.speed"], motions, _scales(simulation))
     assert table is not None
+    enough, best_law = [], unmodelled.best_law
+
+    def asked(*arguments: Any, **settings: Any) -> Any:
+        enough.append(settings["enough"])
+        return best_law(*arguments, **settings)
+
+    monkeypatch.setattr(unmodelled, "best_law", asked)
     effect = fitted(_rest(dataset, found), Tried(table, 1.0), robot, motions)
+    # As much as the table, of what is left with its noise.
+    assert all(effect.explained - 0.02 < item < effect.explained for item in enough[-1:])
     assert effect.term.wheels == expected
     assert effect.laws[0].name == "power law"
     assert effect.laws[0].parameters["exponent"].value == pytest.approx(3.0, abs=0.1)
