@@ -90,3 +90,19 @@ def test_what_a_coarse_sensor_rounds_off_is_noise() -> None:
         rest = Remainder.of(dataset, np.ones(200), np.zeros((200, 1)))  # type: ignore[arg-type]
         left = np.abs(rest.residual).max()
         assert left >= least if channel is exact else left == pytest.approx(least)
+
+
+def test_what_a_term_is_known_to_add_is_no_noise() -> None:
+    random = np.random.default_rng(11)
+    change = 30.0 * random.standard_normal(4000)
+    measured = change + random.standard_normal(4000)
+    channel = SimpleNamespace(time=np.arange(4000.0), value=measured, rounding=lambda _: 0.0)
+    dataset = SimpleNamespace(value=measured, channels=(channel,))
+    none = np.zeros(4000)
+    alone, beside = (
+        Remainder.of(dataset, none, none[:, None], known)  # type: ignore[arg-type]
+        for known in (None, change)
+    )
+    assert alone.weight[0] == pytest.approx(1.0 / 30.0, rel=0.1)
+    assert beside.weight[0] == pytest.approx(1.0, rel=0.1)
+    assert beside.explained(change) == pytest.approx(1.0 - 1.0 / 901.0, rel=1e-3)

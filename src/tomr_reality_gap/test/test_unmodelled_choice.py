@@ -462,3 +462,14 @@ def test_the_first_names_are_all_that_would_have_done_as_well() -> None:
     ]
     found = SimpleNamespace(rounds=(SimpleNamespace(tried=tried), SimpleNamespace(tried=[])))
     assert first_names(found) == {"a", "c"}  # type: ignore[arg-type]
+
+
+def test_a_term_is_fitted_beside_what_is_not_exactly_known_fitted_with_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(explain, "_with_term", lambda *item: item)
+    monkeypatch.setattr(explain, "_refitted", lambda *item: item)
+    search = SimpleNamespace(unnamed=lambda data: ("fitted to", data))
+    bare = SimpleNamespace(described=SimpleNamespace(robot="robot"))
+    found = explain._at_its_best("plain", bare, "term", search)  # type: ignore[arg-type]
+    assert found == ("plain", ("fitted to", ("plain", "robot", "term")), "term")
