@@ -238,11 +238,12 @@ def _instead(
     plain = SimpleNamespace(value=(0.0,) * 100)
     monkeypatch.setattr(explain, "_remainder", lambda *_: None)
     monkeypatch.setattr(explain, "unmodelled_effect", lambda *_, is_repeatable: effect)
-    monkeypatch.setattr(explain, "_at_its_best", lambda *_: effect)
-    monkeypatch.setattr(explain, "_settled", lambda *_: (None, made[1], effect))
+    monkeypatch.setattr(explain, "_at_its_best", lambda _, __, alone, ___: ("at its best", alone))
+    monkeypatch.setattr(explain, "_settled", lambda _, best, __: (None, made[1], best))
     monkeypatch.setattr(explain, "_left", lambda data, *_: left if data is plain else then)
     beside_names = None if seen is None else explain._Seen(seen, is_much=False)  # type: ignore[arg-type]
     tried = explain._instead(plain, made[0], None, None, beside_names)  # type: ignore[arg-type]
+    assert tried is None or tried[2] == ("at its best", effect)
     return tried is not None
 
 
