@@ -348,13 +348,18 @@ def test_a_term_is_sought_without_names_that_stood_in_for_it(
 
     monkeypatch.setattr(explain, "_remainder", lambda *_: None)
     monkeypatch.setattr(explain, "unmodelled_effect", lambda *_: alone)
-    monkeypatch.setattr(explain, "_at_its_best", lambda _, __, effect, ___: effect)
+    monkeypatch.setattr(
+        explain,
+        "_at_its_best",
+        lambda _, __, effect, ___: SimpleNamespace(key=effect.key + " at its best"),
+    )
     monkeypatch.setattr(explain, "_settled", _settled)
     monkeypatch.setattr(explain, "_left", lambda data, *_: left if data == "data" else 100.0)
     *_, effect = explain._beside(None, found, beside, None, None)  # type: ignore[arg-type]
     own = "alone" if FAMILIES[family].is_strange or law == "alone" else "beside"
-    assert effect.key == own
-    assert settled == ([(own, True)] if first else [(own, True), (own, False)])
+    best = (f"{own} at its best", True)
+    assert effect.key == (best[0] if first else own)
+    assert settled == ([best] if first else [best, (own, False)])
 
 
 @pytest.mark.parametrize(
