@@ -8,7 +8,7 @@ from tomr_power_model.unmodelled import FAMILIES, LearntTerm
 from tomr_power_model.unmodelled.term import value_at
 from tomr_reality_gap.fit import laws, polish
 from tomr_reality_gap.fit.law_forms import LAWS
-from tomr_reality_gap.fit.laws import Evidence, laws_of, words_of
+from tomr_reality_gap.fit.laws import Evidence, LawAt, laws_of, words_of
 from tomr_reality_gap.fit.learnt import Table
 from tomr_reality_gap.fit.remainder import Remainder
 
@@ -284,3 +284,32 @@ def test_a_law_is_brought_to_its_best_however_small_its_size_is(
         taken, change, share = polish.best_law(rest, tried, None, (), inflation=1.0, enough=enough)  # type: ignore[arg-type]
         assert taken.law.name == name
         assert share == pytest.approx(1.0 - ((residual - change) ** 2).sum() / (residual**2).sum())
+
+
+def test_a_law_comes_to_its_best_along_a_bent_valley_and_stops_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Wheels that turn at 8 to 12 rad/s alone: size and exponent of a drag trade places."""
+    table = _table("torque.speed", np.linspace(0.0, 14.0, 24))
+    term = LearntTerm(table.family, (), table.knots, np.zeros((1, 24)))
+    start = LawAt(LAWS["power law"], np.array([0.0046, 2.53]), np.eye(2), 1.0, table, term)
+    random = np.random.default_rng(3)
+    speed, rounds = random.uniform(8.0, 12.0, (2000, 1)), []
+
+    def shown(_: object, __: object, ___: object, terms: list[LearntTerm]) -> np.ndarray:
+        rounds.append(terms)
+        torques = [value_at(item.family, item.knots, item.values[0], speed) for item in terms]
+        return np.array(torques) * (np.nan if len(rounds) == 3 else 1.0)
+
+    monkeypatch.setattr(polish, "changes_of", shown)
+    true = evolve(start, parameters=np.array([1e-3, 3.0])).term
+    (torque,) = shown(None, None, None, [true])
+    rest = Remainder(
+        None,  # type: ignore[arg-type]
+        1e3 * torque + random.standard_normal(2000),
+        np.empty((2000, 0)),
+        np.full(2000, 1e3),
+    )
+    best, _ = polish.polished(start, rest, None, (), inflation=1.0)  # type: ignore[arg-type]
+    assert best.parameters == pytest.approx([1e-3, 3.0], rel=2e-3)
+    assert len(rounds) < 10  # nothing is to be had any more; the third was a step too long
