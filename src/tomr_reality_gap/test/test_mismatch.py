@@ -86,6 +86,13 @@ def _scales(made: RecordingSimulation) -> Scales:
     return scales_of(made.robot, run.speed, run.power, run.copper, duration=30.0)
 
 
+def _table(made: RecordingSimulation, family: str) -> Table:
+    """Over the motion in it."""
+    table = Table.over(FAMILIES[family], [motion_in(made, made.robot)], _scales(made))
+    assert table is not None
+    return table
+
+
 def _rest(dataset: Dataset, found: Selection) -> Remainder:
     jacobian = linearise(dataset, found.best.model, ())
     return Remainder.of(dataset, jacobian.value, jacobian.matrix)
@@ -137,8 +144,7 @@ def test_a_law_holds_at_wheels_that_hardly_show_it_but_not_where_it_is_not(
     torque[0][:, list(wheels)] = 3e-4 * speed[:, list(wheels)] ** 3
     dataset, found = searched(simulation, next(simulation.respond(robot, torque)), ())
     motions = [motion_in(simulation, robot)]
-    table = Table.over(FAMILIES["torque.speed"], motions, _scales(simulation))
-    assert table is not None
+    table = _table(simulation, "torque.speed")
     enough, best_law = [], unmodelled.best_law
 
     def asked(*arguments: Any, **settings: Any) -> Any:
@@ -163,12 +169,10 @@ def test_a_strong_drag_is_fitted_in_the_motion_that_it_leaves(
     real = evolve(robot, physics={**robot.physics, "friction.quadratic": drag})
     dataset, found = searched(simulation, simulation.predict([real])[0], ())
     motions = [motion_in(simulation, robot)]
-    scales, bare = _scales(simulation), found.without.model
-    table = Table.over(FAMILIES["torque.speed"], motions, scales)
-    assert table is not None
+    bare, table = found.without.model, _table(simulation, "torque.speed")
     first = fitted(_rest(dataset, found), Tried(table, 1.0), bare.described.robot, motions)
     base = evolve(bare, offsets=(), hypotheses=())
-    basis = basis_responses(dataset, robot, scales.torque)
+    basis = basis_responses(dataset, robot, _scales(simulation).torque)
     search = explain._Search(base, (), basis, lambda _: None)
     effect = explain._at_its_best(dataset, bare, first, search)
     assert effect.laws[0].name == "power law"
@@ -193,8 +197,7 @@ def test_a_patch_of_the_floor_is_one_for_all_wheels_and_the_users_simulation_may
     torque = 0.2 * motion.sign / (1.0 + np.exp((near - 0.3) / 0.02))
     value = next(simulation.respond(robot, torque[None]))
     dataset, found = searched(simulation, value, ())
-    table = Table.over(FAMILIES["torque.place"], [motion], _scales(simulation))
-    assert table is not None
+    table = _table(simulation, "torque.place")
     rest = _rest(dataset, found)
     effect = refitted(rest, fitted(rest, Tried(table, 1.0), robot, [motion]), robot)
     assert effect.term.wheels == (0, 1, 2)
@@ -231,8 +234,7 @@ def test_what_runs_in_is_repeatable_only_if_it_does_so_in_several_recordings(
     value = next(simulation.respond(robot, torque[None]))
     dataset = Dataset((as_recorded(simulation, value),) * recordings)
     motions = [motion] * recordings
-    table = Table.over(FAMILIES["torque.time"], motions, _scales(simulation))
-    assert table is not None
+    table = _table(simulation, "torque.time")
     effect = fitted(_rest(dataset, found), Tried(table, 1.0), robot, motions)
     assert effect.laws[0].name == "exponential"
     assert effect.laws[0].parameters["decay"].value == pytest.approx(8.0, rel=0.1)

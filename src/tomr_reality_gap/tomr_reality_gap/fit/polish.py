@@ -91,21 +91,14 @@ def polished(
         motions: of the robot in the recordings.
         inflation: of the parameters' variance.
     """
-    base, weight = rest.base, rest.weight
-    inner = np.linalg.inv(base.T @ base + np.eye(base.shape[1]))
-
-    def beside(columns: Array) -> Array:
-        """Without what the base makes of it."""
-        return np.asarray(columns - base @ (inner @ (base.T @ columns)))
-
     # However small a size is, a step is a part of it.
     least = np.array([1e-12 if name in SIZES else _LEAST for name in law.law.units])
     best, change, cost = law, np.zeros_like(rest.residual), np.inf
     step = np.zeros_like(law.parameters)
     for _ in range(_ROUNDS):
         steps = np.maximum(_STEP * np.abs(law.parameters), least)
-        rows = changes_of(rest.dataset, robot, motions, _around(law, steps)) * weight
-        left = beside(rest.residual - rows[0])
+        rows = changes_of(rest.dataset, robot, motions, _around(law, steps)) * rest.weight
+        left = rest.beyond_base(rest.residual - rows[0])
         now = float(left @ left)
         if not now < cost:  # the last step was too long
             step = 0.5 * step
@@ -113,11 +106,11 @@ def polished(
             continue
         # An exponent bends what it shows, and an edge has none but small corners.
         up, down = np.split(rows[1:], 2)
-        jacobian = beside((up - down).T / (2.0 * steps))
+        jacobian = rest.beyond_base((up - down).T / (2.0 * steps))
         information = jacobian.T @ jacobian
         covariance = np.asarray(np.linalg.pinv(information), dtype=np.float64)
         best = evolve(law, covariance=covariance * inflation)
-        change, cost = rows[0] / weight, now
+        change, cost = rows[0] / rest.weight, now
         slope = jacobian.T @ left
         step = covariance @ slope
         if float(step @ slope) < _ENOUGH * now:

@@ -63,9 +63,17 @@ class Remainder:
 
     def left(self, change: Array) -> Array:
         """What is left beside a change of all values, what is not exactly known fitted, (n,)."""
-        left = self.residual - change * self.weight
-        known = solve(Gram.of(self.base, left), range(self.base.shape[1])).mean
-        return np.asarray(left - self.base @ known)
+        return self.beyond_base(self.residual - change * self.weight)
+
+    def beyond_base(self, columns: Array) -> Array:
+        """What the base makes nothing of, of whitened columns, (n,) or (n, p)."""
+        return np.asarray(columns - self.base @ (self._inverse @ (self.base.T @ columns)))
+
+    @cached_property
+    def _inverse(self) -> Array:
+        """Of the base's normal matrix, its prior included, (q, q)."""
+        normal = self.base.T @ self.base + np.eye(self.base.shape[1])
+        return np.asarray(np.linalg.inv(normal), dtype=np.float64)
 
     @cached_property
     def alone(self) -> Array:

@@ -49,8 +49,7 @@ class Unmodelled:
 
     table: Table
     learnt: LearntTerm  # the table
-    laws: tuple[FittedLaw, ...]  # that explain about as much, simplest first
-    term: LearntTerm  # what is simulated: the first law, or else the table
+    laws_at: tuple[LawAt, ...]  # that explain about as much, the first at its best
     share: float  # see `predicted_share`
     is_repeatable: bool
     evidence: float  # log, correlation of what is left accounted for
@@ -58,12 +57,26 @@ class Unmodelled:
     change: Array  # what it adds to every value, (n,)
     explained: float  # of the squares that are left without it, those of noise included
     sigma: Array  # of the term's values, like them
-    law: LawAt | None = None  # the first, at its best
 
     @property
     def family(self) -> type[Family]:
         """Of the term."""
         return self.table.family
+
+    @property
+    def law(self) -> LawAt | None:
+        """The first."""
+        return self.laws_at[0] if self.laws_at else None
+
+    @property
+    def laws(self) -> tuple[FittedLaw, ...]:
+        """As a report has them."""
+        return tuple(law.fitted for law in self.laws_at)
+
+    @property
+    def term(self) -> LearntTerm:
+        """What is simulated: the first law, or else the table."""
+        return self.learnt if self.law is None else self.law.term
 
 
 def unmodelled_effect(
@@ -264,7 +277,7 @@ def _fitted_at(
     own = sum(product(part, row) for part, row in zip(columns, units, strict=True))
     term, change = table.term(units, table.wheels(rows)), own / rest.weight
     equations = _normal_equations(rest, columns, left)
-    near, simulated = laws_of(table, term, equations, _MAYBE), term
+    near = laws_of(table, term, equations, _MAYBE)
     laws = [law for law in near if law.share > AS_WELL]
     # What a strong drag does no table adds up to: a law that was found before may fit better.
     tried = [*([evolve(known, table=table, learnt=term)] if known else []), *(laws or near)]
@@ -281,12 +294,11 @@ def _fitted_at(
         if laws or law_share > AS_WELL * table_share:
             first = evolve(first, share=law_share / max(table_share, TINY))
             others = [law for law in laws if law.law.name != first.law.name]
-            laws, simulated, change = [first, *others], first.term, shown
+            laws, change = [first, *others], shown
     return Unmodelled(
         table,
         term,
-        tuple(law.fitted for law in laws),
-        simulated,
+        tuple(laws),
         best.share,
         not table.family.is_event or (bool(laws) and len(motions) > 1),
         _evidence(rest.dataset, rest.alone, rest.left(change)),
@@ -294,7 +306,6 @@ def _fitted_at(
         change,
         rest.explained(change),
         np.stack(sigma),
-        laws[0] if laws else None,
     )
 
 
