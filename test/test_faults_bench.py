@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "bench"))
@@ -16,12 +17,13 @@ sys.path.append(str(ROOT / "bench"))
 from faults.cli import _SENSORS, main
 from faults.closed_loop import MotorPower, Prediction, closed_loop
 from faults.diagnose import diagnose
-from faults.explain import measured
+from faults.explain import Run, measured
 from faults.play import Played, changes_of, play, scored_name
 from faults.power import PATHS, compared
 from faults.recordings import Recordings
 from faults.regimes import AT_REST, noise_of, regimes_of, rms, tick_means, tick_speeds, undisturbed
 from faults.sensors import record
+from faults.spoilt import Spoilt, faulty_drives, reasons_of
 from faults.truth import missed, ratios, true_value
 from other_sensors import SENSORS
 
@@ -36,6 +38,7 @@ from tomr_fault_diag.classifier.states import (
 )
 from tomr_fault_diag.residuals.frame import ResidualFrame
 from tomr_power_model.cli import EXIT_BAD_INPUT, run_main
+from tomr_power_model.errors import InputError
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import load_robot
 
@@ -227,6 +230,55 @@ def test_the_cost_of_a_command_is_its_own(tmp_path: Path) -> None:
     assert (run.code, run.last) == (3, "luck")
     assert 80.0 < run.memory < 400.0
     assert 0.0 < run.cpu < 60.0
+
+
+def _set_of(folder: Path, truths: dict[str, dict[str, Any]]) -> Recordings:
+    """A set of faulty drives of which only the truth is there."""
+    for identity, truth in truths.items():
+        (folder / "faults" / "r" / "drives" / identity).mkdir(parents=True)
+        written = folder / "faults_truth" / "r" / f"{identity}.json"
+        written.parent.mkdir(parents=True, exist_ok=True)
+        written.write_text(json.dumps({"t0_ns": 0, "severity": None, **truth}))
+    return Recordings(folder, "r")
+
+
+def test_only_drives_with_a_fault_are_put_among_healthy_ones(tmp_path: Path) -> None:
+    slip = {"state": "slip", "extended": "none", "wheel": None, "onset": 9.0}
+    drag = {"state": "motor_system_2", "extended": "bearing_drag", "wheel": 2, "onset": 9.0}
+    normal = {"state": "normal", "extended": "none", "wheel": None, "onset": None}
+    found = _set_of(tmp_path, {"aa": slip, "bb": normal, "cc": drag})
+    assert [drive.identity for drive in faulty_drives(found, [])] == ["aa", "cc"]
+    assert [drive.identity for drive in faulty_drives(found, ["cc"])] == ["cc"]
+    assert [found.fault(name) for name in ("aa", "cc")] == [("slip", None), ("bearing_drag", 2)]
+    with pytest.raises(InputError, match="--only bb: give ids of faulty drives: aa, cc"):
+        faulty_drives(found, ["bb"])
+
+
+def _spoilt(code: int, wheel: int | None, *reasons: str) -> Spoilt:
+    return Spoilt("cc", "bearing_drag", wheel, Run(code, "", 1.0, 1.0, 1.0), reasons)
+
+
+def test_a_refusal_may_name_the_drive_and_the_wheel() -> None:
+    good = _spoilt(
+        1, 2, "bands are wide: mend", "cc: wheel 2 needs +30 % of the usual torque: look"
+    )
+    assert (good.is_go, good.names_drive, good.names_wheel) == (False, True, True)
+    other = _spoilt(1, 2, "aa: wheel 22 needs more: look", "motor_3_joint stands")
+    assert (other.names_drive, other.names_wheel) == (False, False)
+    assert _spoilt(2, 3, "cc: motor_3_joint stands: look").names_wheel
+    assert _spoilt(0, None, "written: commissioned.yaml").is_go
+    assert _spoilt(1, None, "cc: slip is named").names_wheel is None
+
+
+def test_why_a_commissioning_is_no_go_is_read_from_its_report_or_its_last_line(
+    tmp_path: Path,
+) -> None:
+    run = Run(2, "cc: wheel 2 stands: look", 1.0, 1.0, 1.0)
+    assert list(reasons_of(tmp_path, run)) == ["cc: wheel 2 stands: look"]
+    written = {"reasons": [{"what": "too short", "remedy": "record more"}]}
+    (tmp_path / "commission.json").write_text(json.dumps(written))
+    assert list(reasons_of(tmp_path, run)) == ["too short: record more"]
+    assert list(reasons_of(tmp_path, evolve(run, code=0, last="go"))) == ["go"]
 
 
 def test_the_closed_loop_predicts_the_power_of_a_recording() -> None:

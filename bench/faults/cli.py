@@ -26,6 +26,7 @@ exit codes: 0 done, 2 bad input, or the recordings are absent"""
 _FITTING = {
     "explain": "run tomr_gap explain on the healthy drives: cost, findings beside the truth, error",
     "commission": "run tomr_commission on the healthy drives: cost, verdict, floors",
+    "spoilt": "run tomr_commission on three healthy drives and a faulty one: is it noticed?",
     "calibrate": "run tomr_calibrate on the same: cost, values over the truth, or why it refused",
 }
 _SENSORS = (
@@ -63,8 +64,12 @@ def _parser() -> argparse.ArgumentParser:
                 help="results go here (default %(default)s)",
             )
         if name in _FITTING:
-            if name == "commission":
-                continue  # it holds out a drive by itself
+            if name == "spoilt":
+                command.add_argument(
+                    "--only", nargs="+", default=(), metavar="ID", help="of faulty drives"
+                )
+            if name in ("commission", "spoilt"):
+                continue  # tomr_commission holds out a drive by itself
             command.add_argument(
                 "--fit", type=int, default=3, metavar="N", help="drives to fit (default 3)"
             )
@@ -92,6 +97,7 @@ def main(arguments: Sequence[str] | None) -> int:
     from faults.power import power
     from faults.recordings import Recordings
     from faults.sensors import record
+    from faults.spoilt import spoilt
 
     recordings = Recordings.find()
     console = Console(width=160, highlight=False)
@@ -100,6 +106,8 @@ def main(arguments: Sequence[str] | None) -> int:
         explain(recordings, options.out / "explained", options.fit, more, console)
     elif options.command == "commission":
         commission(recordings, options.out / "commissioned", console)
+    elif options.command == "spoilt":
+        spoilt(recordings, options.out / "spoilt", options.only, console)
     elif options.command == "sensors":
         console.print(f"written: TOMR_RECORDINGS={record(recordings, options.kind, options.out)}")
     elif options.command == "calibrate":

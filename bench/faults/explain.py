@@ -46,7 +46,7 @@ def explain(
     out.mkdir(parents=True, exist_ok=True)
     console.print(f"fitted {', '.join(bag.name for bag in fitted)}; held out {held.name}")
     bags: list[str | Path] = ["--real", *fitted, "--holdout", held]
-    command = [_tool("tomr_gap"), "explain", "--robot", recordings.description, *bags]
+    command = [tool("tomr_gap"), "explain", "--robot", recordings.description, *bags]
     command += ["--out", out, *options]
     run = measured(command, out / "explain.log")
     console.print(run.cost)
@@ -71,7 +71,7 @@ def calibrate(recordings: Recordings, out: Path, count: int, console: Console) -
     out.mkdir(parents=True, exist_ok=True)
     written = out / "calibrated.yaml"
     inputs: list[str | Path] = [*fitted, "--robot", recordings.description, "--holdout", held]
-    command = [_tool("tomr_calibrate"), *inputs, "--out", written]
+    command = [tool("tomr_calibrate"), *inputs, "--out", written]
     run = measured(command, out / "calibrate.log")
     console.print(run.cost)
     if run.code:
@@ -85,7 +85,7 @@ def commission(recordings: Recordings, out: Path, console: Console) -> None:
     """Run `tomr_commission` on all healthy drives; print its cost and what it says."""
     out.mkdir(parents=True, exist_ok=True)
     healthy = [drive.bag for drive in recordings.drives("healthy")]
-    command: list[str | Path] = [_tool("tomr_commission"), *healthy]
+    command: list[str | Path] = [tool("tomr_commission"), *healthy]
     command += ["--robot", recordings.description, "--out", out]
     run = measured(command, out / "commission.log")
     console.print(run.cost)
@@ -100,7 +100,8 @@ def _split(recordings: Recordings, count: int) -> tuple[list[Path], Path]:
     return healthy[:count], healthy[count]
 
 
-def _tool(name: str) -> Path:
+def tool(name: str) -> Path:
+    """Where a command of the suite lies."""
     return Path(sys.executable).with_name(name)
 
 

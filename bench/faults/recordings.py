@@ -71,6 +71,12 @@ class Recordings:
             found.append(Drive(bag.name, bag, is_normal, tuple(bumps), severity))
         return tuple(found)
 
+    def fault(self, identity: str) -> tuple[str, int | None]:
+        """What is wrong in a drive, and with which wheel (1 to 3; None: no single one)."""
+        truth = _json(self.truth / self.robot / f"{identity}.json")
+        extended = truth["extended"]
+        return truth["state"] if extended == "none" else extended, truth["wheel"]
+
     def real(self) -> Mapping[str, Any]:
         """The robot as it is: `nominal`, `deviations`, `effects`, `heating`, `sensors`."""
         return _json(self.truth / self.robot / "robot" / "real.json")
