@@ -38,7 +38,7 @@ def test_wheels_creep_as_their_traction_and_the_travel_ask() -> None:
         first, second, third = (0.01 * sample * rims / ROBOT.wheel_radius).tolist()
         core.encoders(START + 10_000_000 * sample, (first, second, third), (0.0, 0.0, 0.0))
     list(core.due())
-    core._used, core._travel = np.array([0.1, 0.2, -0.02]), np.array([0.3, 0.4])
+    core._used.value, core._travel = np.array([0.1, 0.2, -0.02]), np.array([0.3, 0.4])
     core._x[CREEP] = 2.0
     item = core._estimate(core._time)
     creep = np.array([0.05, 0.2, -0.03])
@@ -66,14 +66,15 @@ def test_the_forces_of_powers_that_are_heard_are_kept() -> None:
     assert core._forces[1] == 3.0
     assert core._force_std[1] == 2.0
     assert np.isnan(core._forces[[0, 2]]).all()
-    assert core._used[0] == core._used[2] == 0.0 < core._used[1]
+    used = core._used.value
+    assert used[0] == used[2] == 0.0 < used[1]
 
 
 def test_without_an_imu_the_force_reported_is_the_one_that_the_slides_speak_for() -> None:
     core = SlipOdometry(ROBOT)
     core._tractive = [Traction(START, 1, 3.0, 2.0, 5.0, ((3.0, -9.0), (2.0, 1.0)), 0.0)]
     core._forces = np.array([1.0, 3.0, 1.0])
-    core._tractions = SimpleNamespace(speeds=np.zeros(3))  # type: ignore[assignment]
+    core._tractions = SimpleNamespace(motion=np.zeros((2, 3)))  # type: ignore[assignment]
     core._by_power = SimpleNamespace(  # type: ignore[assignment]
         force=np.full(3, -8.0), step=lambda *given: None
     )

@@ -19,6 +19,7 @@ from tomr_odometry.start import Beginning, start
 from tomr_odometry.stuck import StuckImu
 from tomr_odometry.traction import Traction, Tractions
 from tomr_odometry.unaided import FEWEST_POWERS, Unaided
+from tomr_odometry.used import UsedTraction
 from tomr_power_model.drive.sources import PowerReading
 from tomr_power_model.geometry.poses import moved
 from tomr_power_model.model.encoder_flaws import EncoderFlaws
@@ -41,7 +42,7 @@ _CREEPING = 0.05  # m/s, the same of creep: a ratio to a wheel that hardly turns
 _SEEN = 0.01  # m/s, the least sliding that is one
 _SLIDES_ON = 2.0  # s, for which a slide may go on unseen
 _GRID_NS = to_ns(1.0)  # of data, between two maps of the floor
-_TRACTION_TIME = 0.3  # s, over which traction is averaged where creep depends on it
+_TRAVEL_TIME = 0.3  # s, over which the speed of travel is averaged where creep depends on it
 _AHEAD = 0.25  # s, for which the motion of the last encoder sample is taken to go on
 _LOST_SPEED = 1.0  # m/s, by which a robot without encoders may be off
 _LOST_MOST = 10.0  # s, after which it may be off no further
@@ -86,7 +87,7 @@ class SlipOdometry:
         self._rims = Rims(self._radius)
         self._stamps = RecentStamps()
         self._forces, self._force_std = np.full((2, WHEELS), np.nan)
-        self._used = np.zeros(WHEELS)
+        self._used = UsedTraction(self._body, self._radius)
         self._travel = np.zeros(2)
         self._available = Available()
         self._inertial: list[tuple[float, ...]] = []
@@ -254,11 +255,11 @@ class SlipOdometry:
         """What the contacts slid in a step without an IMU."""
         is_known = self._are_evidence and np.isfinite(self._forces).sum() >= FEWEST_POWERS
         is_asked = is_known and not self._is_aided
-        speeds = self._tractions.speeds if is_asked else None
-        if speeds is None:
+        motion = self._tractions.motion if is_asked else None
+        if motion is None:
             self._by_power.rest()
             return
-        twist, rims = self._x[VX : WZ + 1], speeds * self._radius
+        twist, rims = self._x[VX : WZ + 1], motion[0] * self._radius
         if not max(np.abs(rims).max(), np.abs(self._body.rows @ twist).max()) < _FASTEST:
             self._by_power.rest()  # counts that leap, not a motion
             return
@@ -269,20 +270,17 @@ class SlipOdometry:
 
     def _keep_forces(self, dt: float) -> None:
         """Keep what creep and messages need of the contacts' forces."""
-        keep = math.exp(-dt / _TRACTION_TIME)
         for found in self._tractive:
             self._forces[found.wheel], self._force_std[found.wheel] = found.force, found.std
         for wheel in range(WHEELS):
             if not self._is_fresh(f"power {wheel}", self._heard["encoders"]):
                 self._forces[wheel] = self._force_std[wheel] = math.nan
-        is_known = np.isfinite(self._forces)
-        known = np.where(is_known, self._forces, 0.0) / self._body.load
-        self._used = known + keep * (self._used - known)
+        self._used.take(self._forces, self._tractions.motion, dt)
 
     def _advance(self, time: int, dt: float, rims: Array, inertial: Array) -> None:
-        keep = math.exp(-dt / _TRACTION_TIME)
+        keep = math.exp(-dt / _TRAVEL_TIME)
         self._travel = self._x[VX : VX + 2] + keep * (self._travel - self._x[VX : VX + 2])
-        used = self.settings.creep.shape(self._used) * math.hypot(*self._travel)
+        used = self.settings.creep.shape(self._used.value) * math.hypot(*self._travel)
         if not self._is_aided:
             self._aided.clear()
             self._P = step(
@@ -314,7 +312,7 @@ class SlipOdometry:
         silent = 1e-9 * (tick - self._rims.time) - _AHEAD
         # Encoders are silent: anything may happen.
         lost = (_LOST_SPEED * max(silent, 0.0)) ** 2 * _EACH
-        creeps = x[CREEP] * self.settings.creep.shape(self._used) * math.hypot(*self._travel)
+        creeps = x[CREEP] * self.settings.creep.shape(self._used.value) * math.hypot(*self._travel)
         sliding, slip = self._slip(body.rows @ twist, creeps)
         missing, sensors = self._sensors(tick)
         is_due = self.settings.publish_floor and tick % _GRID_NS < self.settings.ticks.period

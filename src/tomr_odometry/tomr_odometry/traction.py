@@ -136,12 +136,13 @@ class Tractions:
         return list(last), wheels.speed.tolist(), wheels.acceleration.tolist()
 
     @property
-    def speeds(self) -> NDArray[np.float64] | None:
-        """Of the wheels at the newest encoder sample [rad/s]; None before there are enough."""
+    def motion(self) -> NDArray[np.float64] | None:
+        """Speeds [rad/s] and accelerations [rad/s^2] of the wheels at the newest encoder sample,
+        (2, 3); None before there are enough."""
         if len(self._samples) < _FEWEST:
             return None
         self._fitted = self._fitted or self._fit()
-        return np.array(self._fitted[1])
+        return np.array(self._fitted[1:])
 
     def _motion(self, time_ns: int) -> list[float] | None:
         """Wheels' speeds and accelerations at some time, as the inverse dynamics take them."""

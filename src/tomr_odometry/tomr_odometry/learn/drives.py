@@ -41,7 +41,7 @@ class _Recorder(SlipOdometry):
         super().__init__(robot, OdometrySettings(use_imu=False))
 
     def _advance(self, time: int, dt: float, rims: Array, inertial: Array) -> None:
-        self.rows.append((time, rims[0].copy(), self._used.copy()))
+        self.rows.append((time, rims[0].copy(), self._used.value.copy()))
 
     def _estimate(self, tick: int) -> Estimate:
         if self._nothing is None:

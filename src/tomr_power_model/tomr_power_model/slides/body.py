@@ -44,13 +44,20 @@ def body_of(robot: Robot) -> tuple[ContactBody, Array]:
     return body, wheel[:, at.RADIUS].copy()
 
 
+def moving_wrench(body: ContactBody, twist: Array, change: Array) -> Array:
+    """Forces and moment that move the body as it moves [N, N, N m], (3,).
+
+    twist: of the body in its own frame [m/s, m/s, rad/s]; change: of its components, per second.
+    """
+    turning = np.array([-twist[2] * twist[1], twist[2] * twist[0], 0.0])
+    return np.asarray(body.inertia @ (change + turning))
+
+
 def rolling_forces(body: ContactBody, drag: float, twist: Array, change: Array) -> Array:
     """Forces of contacts that grip on a level floor [N], (3,).
 
-    twist: of the body in its own frame [m/s, m/s, rad/s]; change: of its components, per second;
-    drag: of the rollers, share of the load.
+    twist and change: as above; drag: of the rollers, share of the load.
     """
-    turning = np.array([-twist[2] * twist[1], twist[2] * twist[0], 0.0])
     along = np.tanh(body.along @ twist / STICKING) * body.load
-    needed = body.inertia @ (change + turning) + drag * (along @ body.along)
+    needed = moving_wrench(body, twist, change) + drag * (along @ body.along)
     return np.asarray(body.to_twist.T @ needed)
