@@ -96,6 +96,22 @@ def test_short_drive_is_a_no_go_that_says_what_to_record(done: Path) -> None:
     assert page.count("data:image/png") == 2
 
 
+def test_a_sure_no_go_is_said_before_the_long_steps(
+    tmp_path: Path, steps: dict[str, Mock], capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = str(BAGS / "square")
+    with patch(f"{HERE}.rehearse", side_effect=InputError("the shoves begin")):
+        assert main([bag, "--robot", "reference", "--out", str(tmp_path)]) == 2
+        assert capsys.readouterr().err.splitlines() == [
+            "no-go: 0.2 minutes to fit to and 0.1 held out are too few: 2.5 and 0.8 are needed",
+            "  -> record the drive of tomr_commission plan, and give it as well",
+            "  (the rest is measured for the report; Ctrl-C ends it)",
+            "error: the shoves begin",
+        ]
+        assert run(tmp_path) == 2
+        assert capsys.readouterr().err == "error: the shoves begin\n"  # --quiet
+
+
 def test_simulated_motors_are_as_near_to_their_values_as_voltages_say(
     done: Path, steps: dict[str, Mock]
 ) -> None:

@@ -13,7 +13,7 @@ from tomr_commission.bands import bands_of
 from tomr_commission.evidence import Decided, Episode
 from tomr_commission.observed import Observed
 from tomr_commission.request import BandChoice, CommissionRequest
-from tomr_commission.verdict import Outcome, reasons
+from tomr_commission.verdict import Outcome, early_reasons, reasons
 
 Steady = Callable[..., Observed]
 QUIET = Decided(1000, 0, ())
@@ -50,6 +50,19 @@ def added(drive: Observed, channel: int, power: float) -> Observed:
 
 def test_nothing_speaks_against_a_good_commissioning(outcome: Outcome) -> None:
     assert said(outcome) == []
+
+
+def test_what_no_band_changes_is_known_early(outcome: Outcome, steady: Steady) -> None:
+    first, second, third = outcome.fitted
+    for channel in (1, 2, 3):
+        second = added(second, channel, 0.8)
+    # Another floor, and a drive held out that is named in: that takes bands.
+    alarm = Decided(1000, 0, (Episode("slip", None, 1.0, 2.0),))
+    found = evolve(outcome, fitted=(first, second, third), held_said=(alarm,))
+    early = [reason.what for reason in early_reasons(found)]
+    assert [line.split(":")[0] for line in early] == ["tour2"]
+    assert said(found)[0] == early[0]
+    assert any("slip is named" in line for line in said(found)[1:])
 
 
 def test_another_floor_in_one_drive(outcome: Outcome) -> None:

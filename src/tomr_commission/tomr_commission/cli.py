@@ -4,11 +4,15 @@ import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tomr_commission.request import DEFAULT_RATE, DEFAULT_TOLERANCE, CommissionRequest
 from tomr_power_model.cli import EXIT_MISMATCH, EXIT_OK, run_main
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import shipped_robots
+
+if TYPE_CHECKING:
+    from tomr_commission.verdict import Reason
 
 PLAN, DRIVE = "plan", "drive"  # the other thing that the command does
 
@@ -104,7 +108,8 @@ def _commission(options: argparse.Namespace) -> int:
     from tomr_reality_gap.progress import progress_bar
 
     with progress_bar(options.quiet) as progress:
-        found = commission(request, progress)
+        say = (lambda reason: None) if options.quiet else _said_early
+        found = commission(request, progress, say)
     texts = {"commission.html": page(found), "commission.json": as_json(found)}
     written = write_results(found, texts)
     if not options.quiet:
@@ -113,6 +118,14 @@ def _commission(options: argparse.Namespace) -> int:
         for path in written:
             print(f"written: {path}")
     return EXIT_OK if found.is_go else EXIT_MISMATCH
+
+
+def _said_early(reason: "Reason") -> None:
+    """A no-go takes minutes less to hear of than the report takes to write."""
+    from tqdm import tqdm
+
+    tqdm.write(f"no-go: {reason.what}\n  -> {reason.remedy}", sys.stderr)
+    tqdm.write("  (the rest is measured for the report; Ctrl-C ends it)", sys.stderr)
 
 
 def _plan(arguments: Sequence[str]) -> int:

@@ -29,7 +29,7 @@ from tomr_commission.simulated import try_simulated
 from tomr_commission.store import Store, digest, fingerprint
 from tomr_commission.suspects import check_values, check_wheels
 from tomr_commission.trials import Floor, Trial, floors_of
-from tomr_commission.verdict import Outcome, Reason, reasons
+from tomr_commission.verdict import Outcome, Reason, Recorded, early_reasons, reasons
 from tomr_fault_diag.classifier.commissioned import stamp_of
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
@@ -49,6 +49,7 @@ from tomr_power_model.robot import (
 from tomr_reality_gap.report.write import write_report
 
 Progress = Callable[[str, float], None]
+Say = Callable[[Reason], object]
 
 STEPS = "steps"
 _CURRENTS = (
@@ -105,13 +106,18 @@ class Tuned:
     level: AlarmLevel
 
 
-def commission(request: CommissionRequest, progress: Progress) -> Commissioned:
-    """Run all steps that are not done yet. Raises InputError for what cannot be used."""
+def commission(request: CommissionRequest, progress: Progress, say: Say) -> Commissioned:
+    """Run all steps that are not done yet; `say` hears what makes a no-go as soon as it is known.
+
+    Raises InputError for what cannot be used.
+    """
     work = _Work.begin(request, progress)
     explained = work.explained()
     described = work.description(explained)
     drives = work.observed(described)
     fitted, held = work.divided(drives)
+    for reason in early_reasons(Recorded(request, explained, fitted, held)):
+        say(reason)
     silent = set.intersection(*(set(drive.silent) for drive in fitted))
     longest = max(held, key=lambda drive: drive.hours)
     classifier, plan = work.classifier(described), Rehearsal(silent=tuple(sorted(silent)))

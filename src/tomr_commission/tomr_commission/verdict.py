@@ -29,17 +29,13 @@ class Reason:
 
 
 @frozen
-class Outcome:
-    """All that the verdict rests on."""
+class Recorded:
+    """What the recordings show before any band or level is chosen."""
 
     request: CommissionRequest
     explained: Any  # of `explain_drives`
     fitted: tuple[Observed, ...]
     held: tuple[Observed, ...]
-    bands: BandSettings
-    level: AlarmLevel
-    held_said: tuple[Decided, ...]
-    fitted_said: tuple[Decided, ...]
 
     @property
     def held_name(self) -> str:
@@ -51,28 +47,46 @@ class Outcome:
         """Of all drives held out."""
         return sum(drive.hours for drive in self.held)
 
+
+@frozen
+class Outcome(Recorded):
+    """All that the verdict rests on."""
+
+    bands: BandSettings
+    level: AlarmLevel
+    held_said: tuple[Decided, ...]
+    fitted_said: tuple[Decided, ...]
+
     @property
     def held_together(self) -> Decided:
         """What is said of all drives held out."""
         return together(self.held_said)
 
 
+def early_reasons(recorded: Recorded) -> list[Reason]:
+    """What makes a no-go whatever the rest shows: known before the shoves are simulated."""
+    limits = recorded.request.limits
+    return [
+        *_too_short(recorded, limits),
+        *_left_over(recorded, limits),
+        *_floors(recorded, limits),
+    ]
+
+
 def reasons(outcome: Outcome) -> list[Reason]:
     """Everything that makes a no-go; empty: go."""
     limits = outcome.request.limits
     return [
-        *_too_short(outcome, limits),
-        *_left_over(outcome, limits),
+        *early_reasons(outcome),
         *_apart(outcome, limits),
-        *_floors(outcome, limits),
         *_held_out(outcome, limits),
         *_alarm_rate(outcome),
     ]
 
 
-def _too_short(outcome: Outcome, limits: Limits) -> list[Reason]:
-    minutes = 60.0 * sum(drive.hours for drive in outcome.fitted)
-    held = 60.0 * outcome.held_hours
+def _too_short(recorded: Recorded, limits: Limits) -> list[Reason]:
+    minutes = 60.0 * sum(drive.hours for drive in recorded.fitted)
+    held = 60.0 * recorded.held_hours
     if minutes >= limits.minutes and held >= limits.held_minutes:
         return []
     return [
@@ -84,10 +98,10 @@ def _too_short(outcome: Outcome, limits: Limits) -> list[Reason]:
     ]
 
 
-def _left_over(outcome: Outcome, limits: Limits) -> list[Reason]:
+def _left_over(recorded: Recorded, limits: Limits) -> list[Reason]:
     found = []
-    report = outcome.explained["report"]
-    levels = [line for line in outcome.explained["levels"] if line["unit"] in DRAWN]
+    report = recorded.explained["report"]
+    levels = [line for line in recorded.explained["levels"] if line["unit"] in DRAWN]
     shown = [line for line in levels if line["held_out"]] or levels
     worst = max(shown, key=lambda line: line["level"] or 0.0) if shown else {"level": 0.0}
     score = report["holdout"]
@@ -154,9 +168,9 @@ def _median(values: Array) -> Array:
     return np.array([np.median(column) if len(column) else np.nan for column in known])
 
 
-def _floors(outcome: Outcome, limits: Limits) -> list[Reason]:
+def _floors(recorded: Recorded, limits: Limits) -> list[Reason]:
     """A drive in which the wheels need another torque than in the rest."""
-    drives = (*outcome.fitted, *outcome.held)
+    drives = (*recorded.fitted, *recorded.held)
     if len(drives) < 2:
         return []
     drags = [steady_drag(drive) for drive in drives]
