@@ -70,6 +70,16 @@ def test_the_forces_of_powers_that_are_heard_are_kept() -> None:
     assert used[0] == used[2] == 0.0 < used[1]
 
 
+def test_creep_goes_by_forces_that_are_held_against_the_motion_of_the_wheels() -> None:
+    core = SlipOdometry(ROBOT)
+    core._heard = {"encoders": START} | {f"power {wheel}": START for wheel in range(3)}
+    core._forces = np.array([4.0, 2.0, 0.0])
+    for sample in range(12):  # wheels that stand: nothing turns the robot
+        core._tractions.encoders(START + 10_000_000 * sample, (0.0, 0.0, 0.0))
+    core._keep_forces(1e3)
+    assert core._used.value * core._body.load == pytest.approx([3.0, 1.0, -1.0])
+
+
 def test_without_an_imu_the_force_reported_is_the_one_that_the_slides_speak_for() -> None:
     core = SlipOdometry(ROBOT)
     core._tractive = [Traction(START, 1, 3.0, 2.0, 5.0, ((3.0, -9.0), (2.0, 1.0)), 0.0)]

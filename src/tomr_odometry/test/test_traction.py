@@ -53,6 +53,19 @@ def test_both_currents_leave_the_power_or_are_where_it_is_least(speed: float, dr
         assert power == pytest.approx(max(drawn, lowest), abs=0.01)
 
 
+def test_the_motion_of_the_wheels_is_that_of_the_newest_encoder_sample() -> None:
+    """Angles of 2 t + 3 t^2, -t and 1 rad."""
+    found = Tractions(ROBOT)
+    for sample in range(12):
+        assert (found.motion is None) == (sample < 8)
+        seconds = 0.01 * sample
+        found.encoders(10_000_000 * sample, (2.0 * seconds + 3.0 * seconds**2, -seconds, 1.0))
+    assert found.motion is not None
+    speed, change = found.motion
+    assert speed == pytest.approx([2.0 + 6.0 * 0.11, -1.0, 0.0], abs=1e-9)
+    assert change == pytest.approx([6.0, 0.0, 0.0], abs=1e-6)
+
+
 def test_force_of_a_contact_is_what_accelerates_the_body() -> None:
     # Turning on the spot: each of three wheels gives a third of I alpha / R.
     numbers, laws = laid_out(vehicle_of(ROBOT)).tolist(), plain(tuple(ROBOT.physics))
