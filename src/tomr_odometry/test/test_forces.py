@@ -76,6 +76,8 @@ def test_creep_goes_by_forces_that_are_held_against_the_motion_of_the_wheels() -
     core._forces = np.array([4.0, 2.0, 0.0])
     for sample in range(12):  # wheels that stand: nothing turns the robot
         core._tractions.encoders(START + 10_000_000 * sample, (0.0, 0.0, 0.0))
+    assert core._tractions.motion is not None
+    core._tractive = [Traction(START, 0, 4.0, 2.0, 5.0, ((4.0, -9.0), (2.0, 1.0)), 0.0)]
     core._keep_forces(1e3)
     assert core._used.value * core._body.load == pytest.approx([3.0, 1.0, -1.0])
 

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from attrs import evolve
 
@@ -62,6 +63,8 @@ def test_the_motion_of_the_wheels_is_that_of_the_newest_encoder_sample() -> None
         found.encoders(10_000_000 * sample, (2.0 * seconds + 3.0 * seconds**2, -seconds, 1.0))
     assert found.motion is not None
     speed, change = found.motion
+    found.encoders(120_000_000, (0.0, 0.0, 0.0))
+    assert found.shown == pytest.approx(np.stack([speed, change]))
     assert speed == pytest.approx([2.0 + 6.0 * 0.11, -1.0, 0.0], abs=1e-9)
     assert change == pytest.approx([6.0, 0.0, 0.0], abs=1e-6)
 

@@ -48,6 +48,17 @@ def test_where_a_force_or_the_motion_is_not_known_nothing_is_taken_off() -> None
     assert used([4.0, 2.0, 0.0], None) == pytest.approx([4.0, 2.0, 0.0])
 
 
+def test_friction_stays_until_a_force_is_new_or_one_is_lost() -> None:
+    core = UsedTraction(BODY, RADIUS)
+    for motion in (RESTING, None):
+        core.take(np.array([4.0, 2.0, 0.0]), motion, LONG)
+        assert core.value * BODY.load == pytest.approx([3.0, 1.0, -1.0])
+    core.take(np.array([4.0, 2.0, np.nan]), None, LONG)
+    assert core.value * BODY.load == pytest.approx([4.0, 2.0, 0.0])
+    core.take(np.array([4.0, 2.0, 0.0]), None, LONG)
+    assert core.value * BODY.load == pytest.approx([4.0, 2.0, 0.0])
+
+
 @given(st.lists(st.floats(-20.0, 20.0), min_size=3, max_size=3))
 def test_a_robot_turned_by_120_degrees_uses_the_same_traction(force: list[float]) -> None:
     turned = used([force[2], force[0], force[1]])

@@ -275,7 +275,7 @@ class SlipOdometry:
         for wheel in range(WHEELS):
             if not self._is_fresh(f"power {wheel}", self._heard["encoders"]):
                 self._forces[wheel] = self._force_std[wheel] = math.nan
-        self._used.take(self._forces, self._tractions.motion, dt)
+        self._used.take(self._forces, self._tractions.shown if self._tractive else None, dt)
 
     def _advance(self, time: int, dt: float, rims: Array, inertial: Array) -> None:
         keep = math.exp(-dt / _TRAVEL_TIME)

@@ -25,6 +25,7 @@ from tomr_power_model.slides.particles import Pair
 from tomr_power_model.slides.roughness import Roughness
 
 Triple = tuple[float, float, float]
+Fitted = tuple[list[float], list[float], list[float]]  # angles, speeds, accelerations
 _SPAN_NS = 60_000_000  # of the encoder samples that show speed and acceleration
 _FEWEST = 8  # samples
 _RESTING = 0.3  # rad/s
@@ -90,7 +91,8 @@ class Tractions:
         self._gain = [0.0] * WHEELS
         self._is_commanded = False
         self._rough = [Roughness() for _ in range(WHEELS)]
-        self._fitted: tuple[list[float], list[float], list[float]] | None = None
+        self._fitted: Fitted | None = None  # of the newest sample
+        self._shown: Fitted | None = None  # the last that was asked for
 
     def command(self, stamp_ns: int, twist: Triple) -> None:
         """Take a command [m/s, m/s, rad/s]."""
@@ -121,7 +123,7 @@ class Tractions:
             control(self._numbers, state, given, WHEELS)
             self._now += self._period
 
-    def _fit(self) -> tuple[list[float], list[float], list[float]]:
+    def _fit(self) -> Fitted:
         """Angles [rad], speeds and accelerations at the newest encoder sample, by a parabola."""
         newest, last = self._samples[-1]
         angles = np.array([angle for _, angle in self._samples]) - last
@@ -141,18 +143,26 @@ class Tractions:
         (2, 3); None before there are enough."""
         if len(self._samples) < _FEWEST:
             return None
-        self._fitted = self._fitted or self._fit()
-        return np.array(self._fitted[1:])
+        return np.array(self._newest()[1:])
+
+    @property
+    def shown(self) -> NDArray[np.float64] | None:
+        """The same where a power was last held against it: what costs nothing more to know."""
+        return None if self._shown is None else np.array(self._shown[1:])
+
+    def _newest(self) -> Fitted:
+        if self._fitted is None:
+            self._fitted = self._shown = self._fit()
+        return self._fitted
 
     def _motion(self, time_ns: int) -> list[float] | None:
         """Wheels' speeds and accelerations at some time, as the inverse dynamics take them."""
         if len(self._samples) < _FEWEST:
             return None
-        if self._fitted is None:
-            self._fitted = self._fit()
+        fitted = self._newest()
         ahead = 1e-9 * (time_ns - self._samples[-1][0])
         motion = [math.nan, math.nan]
-        for wheel, (angle, speed, change) in enumerate(zip(*self._fitted, strict=True)):
+        for wheel, (angle, speed, change) in enumerate(zip(*fitted, strict=True)):
             volts = self._state[at.STATE_HEADER + wheel * at.STATE_WHEEL + at.VOLTS]
             held = volts if self._is_commanded else math.nan
             motion += [speed + change * ahead, change, angle, 0.0, 0.0, held]

@@ -30,6 +30,7 @@ class UsedTraction:
         self._body, self._radius = body, radius
         self._arm = body.rows[:, 2].copy()
         self._share = _FRICTION * self._arm / float(self._arm @ self._arm)
+        self._friction = np.zeros(WHEELS)  # N, that was taken for forces
 
     def take(self, force: Array, motion: Array | None, dt: float) -> None:
         """Go on by `dt` [s].
@@ -37,19 +38,20 @@ class UsedTraction:
         Args:
             force: of the contacts [N], (3,); NaN where it is not known: such a wheel has none.
             motion: speeds [rad/s] and accelerations [rad/s^2] of the wheels, (2, 3); None where
-                they are not known.
+                they are not known, or no force is new.
         """
         is_known = np.isfinite(force)
-        if motion is not None and is_known.all():
-            force = self._balanced(force, motion * self._radius)
-        now, keep = np.where(is_known, force, 0.0) / self._body.load, math.exp(-dt / _TIME)
-        self.value = now + keep * (self.value - now)
+        if not is_known.all():
+            self._friction = np.zeros(WHEELS)
+        elif motion is not None:
+            self._friction = self._share * self._off(force, motion * self._radius)
+        now = (np.where(is_known, force, 0.0) - self._friction) / self._body.load
+        self.value = now + math.exp(-dt / _TIME) * (self.value - now)
 
-    def _balanced(self, force: Array, rims: Array) -> Array:
-        """Forces whose moment is nearer to the one that turns the body as it turns [N].
+    def _off(self, force: Array, rims: Array) -> float:
+        """What the forces' moment is more than the one that turns the body as it turns [N m].
 
         rims: their speeds [m/s] and accelerations [m/s^2], (2, 3).
         """
         twist, change = rims @ self._body.to_twist.T
-        off = float(self._arm @ force) - float(moving_wrench(self._body, twist, change)[2])
-        return np.asarray(force - self._share * off)
+        return float(self._arm @ force) - float(moving_wrench(self._body, twist, change)[2])
