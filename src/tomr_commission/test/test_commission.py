@@ -105,7 +105,7 @@ def test_a_sure_no_go_is_said_before_the_long_steps(
         assert capsys.readouterr().err.splitlines() == [
             "no-go: 0.2 minutes to fit to and 0.1 held out are too few: 2.5 and 0.8 are needed",
             "  -> record the drive of tomr_commission plan, and give it as well",
-            "  (the rest is measured for the report; Ctrl-C ends it)",
+            "the rest is measured for the report; Ctrl-C ends it",
             "error: the shoves begin",
         ]
         assert run(tmp_path) == 2

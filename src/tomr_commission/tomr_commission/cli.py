@@ -108,7 +108,7 @@ def _commission(options: argparse.Namespace) -> int:
     from tomr_reality_gap.progress import progress_bar
 
     with progress_bar(options.quiet) as progress:
-        say = (lambda reason: None) if options.quiet else _said_early
+        say = (lambda reasons: None) if options.quiet else _said_early
         found = commission(request, progress, say)
     texts = {"commission.html": page(found), "commission.json": as_json(found)}
     written = write_results(found, texts)
@@ -120,12 +120,14 @@ def _commission(options: argparse.Namespace) -> int:
     return EXIT_OK if found.is_go else EXIT_MISMATCH
 
 
-def _said_early(reason: "Reason") -> None:
+def _said_early(reasons: "Sequence[Reason]") -> None:
     """A no-go takes minutes less to hear of than the report takes to write."""
     from tqdm import tqdm
 
-    tqdm.write(f"no-go: {reason.what}\n  -> {reason.remedy}", sys.stderr)
-    tqdm.write("  (the rest is measured for the report; Ctrl-C ends it)", sys.stderr)
+    for reason in reasons:
+        tqdm.write(f"no-go: {reason.what}\n  -> {reason.remedy}", sys.stderr)
+    if reasons:
+        tqdm.write("the rest is measured for the report; Ctrl-C ends it", sys.stderr)
 
 
 def _plan(arguments: Sequence[str]) -> int:

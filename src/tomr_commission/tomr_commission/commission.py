@@ -49,7 +49,7 @@ from tomr_power_model.robot import (
 from tomr_reality_gap.report.write import write_report
 
 Progress = Callable[[str, float], None]
-Say = Callable[[Reason], object]
+Say = Callable[[Sequence[Reason]], object]
 
 STEPS = "steps"
 _CURRENTS = (
@@ -116,8 +116,7 @@ def commission(request: CommissionRequest, progress: Progress, say: Say) -> Comm
     described = work.description(explained)
     drives = work.observed(described)
     fitted, held = work.divided(drives)
-    for reason in early_reasons(Recorded(request, explained, fitted, held)):
-        say(reason)
+    say(early_reasons(Recorded(request, explained, fitted, held)))
     silent = set.intersection(*(set(drive.silent) for drive in fitted))
     longest = max(held, key=lambda drive: drive.hours)
     classifier, plan = work.classifier(described), Rehearsal(silent=tuple(sorted(silent)))

@@ -66,10 +66,11 @@ class Outcome(Recorded):
 def early_reasons(recorded: Recorded) -> list[Reason]:
     """What makes a no-go whatever the rest shows: known before the shoves are simulated."""
     limits = recorded.request.limits
+    # A drive with a fault in it first: the rest may come of it.
     return [
+        *_floors(recorded, limits),
         *_too_short(recorded, limits),
         *_left_over(recorded, limits),
-        *_floors(recorded, limits),
     ]
 
 
