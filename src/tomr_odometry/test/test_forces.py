@@ -12,7 +12,7 @@ from odometry_drives import ROBOT, START, Recorded, drive, play
 
 from tomr_odometry.creep import Creep
 from tomr_odometry.estimator import SlipOdometry
-from tomr_odometry.kernel import CREEP, RIM
+from tomr_odometry.kernel import CREEP, RIM, WZ
 from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.traction import Traction
 from tomr_odometry.unaided import Unaided
@@ -33,19 +33,18 @@ def without_the_first(time: float, topic: str, message: Any) -> Any:
 
 
 def test_wheels_creep_as_their_traction_and_the_travel_ask() -> None:
-    core, rims = SlipOdometry(ROBOT, SETTINGS), np.array([0.5, 0.5, -0.03])  # m/s
+    """Over ground that goes by at 0.3, -0.3 and 0 m/s the robot travels at sqrt(0.12) m/s."""
+    core = SlipOdometry(ROBOT, SETTINGS)
     for sample in range(6):
-        first, second, third = (0.01 * sample * rims / ROBOT.wheel_radius).tolist()
-        core.encoders(START + 10_000_000 * sample, (first, second, third), (0.0, 0.0, 0.0))
+        core.encoders(START + 10_000_000 * sample, (0.01 * sample,) * 3, (0.0, 0.0, 0.0))
     list(core.due())
-    core._used.value, core._travel = np.array([0.1, 0.2, -0.02]), np.array([0.3, 0.4])
-    core._x[CREEP] = 2.0
-    item = core._estimate(core._time)
-    creep = np.array([0.05, 0.2, -0.03])
+    core._used.value, core._x[CREEP] = np.array([0.1, 0.2, -0.01]), 2.0
+    *core._travel[:], core._x[WZ] = core._body.to_twist @ np.array([0.3, -0.3, 0.0])
+    item, creep = core._estimate(core._time), math.sqrt(0.12) * np.array([0.1, 0.4, -0.03])
     assert item.creeping == pytest.approx(creep)
     assert item.sliding == pytest.approx(creep)
-    # A ratio to next to nothing says nothing.
-    assert item.slip == pytest.approx([0.1, 0.4, 0.0])
+    # Over the larger of rim and ground; a ratio to next to nothing says nothing.
+    assert item.slip == pytest.approx([creep[0] / (0.3 + creep[0]), creep[1] / 0.3, 0.0])
 
 
 def test_a_robot_that_creeps_comes_less_far() -> None:

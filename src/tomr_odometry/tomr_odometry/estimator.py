@@ -37,8 +37,7 @@ _UNKNOWN_WAY = 1e4  # m^2
 _FRESH_NS = to_ns(0.25)  # how long a sensor may be silent
 _NONE_SLIDES = np.zeros(WHEELS, dtype=bool)
 _ALONG, _EACH = np.diag([1.0, 1.0, 0.0]), np.eye(3)
-_TURNING = 0.02  # m/s: below it there is no slip ratio
-_CREEPING = 0.05  # m/s, the same of creep: a ratio to a wheel that hardly turns says nothing
+_TURNING = 0.02  # m/s: below it there is no slip ratio, for next to nothing moves
 _SEEN = 0.01  # m/s, the least sliding that is one
 _SLIDES_ON = 2.0  # s, for which a slide may go on unseen
 _GRID_NS = to_ns(1.0)  # of data, between two maps of the floor
@@ -347,14 +346,14 @@ class SlipOdometry:
         if self._is_aided:
             sliding = self._rims.sliding
             is_seen = is_sliding | (np.abs(sliding) > np.maximum(_SEEN, 2.0 * self._rims.blur))
-            least = np.full(WHEELS, _TURNING)
         else:
-            sliding = np.where(is_sliding, rim - ground, creeps)
-            is_seen, least = np.full(WHEELS, True), np.where(is_sliding, _TURNING, _CREEPING)
+            # Creep is of the way of the last moments, and so is the rim that it is compared with.
+            calm = self._body.rows @ (*self._travel, self._x[WZ]) + creeps
+            sliding, rim = np.where(is_sliding, (rim - ground, rim), (creeps, calm))
+            is_seen = np.full(WHEELS, True)
         larger = np.maximum(np.abs(rim), np.abs(rim - sliding))
-        return sliding, np.where(
-            is_seen & (larger > least), sliding / np.maximum(larger, least), 0.0
-        )
+        is_seen &= larger > _TURNING
+        return sliding, np.where(is_seen, sliding / np.maximum(larger, _TURNING), 0.0)
 
     def _unseen(self) -> Array:
         """Variance of a velocity that nothing but the wheels shows, or an IMU alone."""
