@@ -25,6 +25,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import redirect_stdout
 from functools import partial
+from itertools import compress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import process_time
@@ -164,14 +165,7 @@ def robotino(options: argparse.Namespace) -> int:
             floors[name] = read_floor(folder, name, options.every)
         body = body_of(load_robot(ROBOT))[0]
         for name, floor in floors.items():
-            halves = [
-                [
-                    leg
-                    for leg, even in zip(floor.legs, floor.is_even, strict=True)
-                    if even == is_even
-                ]
-                for is_even in (True, False)
-            ]
+            halves = [list(compress(floor.legs, of)) for of in (floor.is_even, ~floor.is_even)]
             creeps = [fit_creep({name: half}, body) for half in halves]
             found = [errors(half, creep) for half, creep in zip(halves, creeps[::-1], strict=True)]
             title = f"{name}, each half of the headings by the other"
@@ -179,11 +173,8 @@ def robotino(options: argparse.Namespace) -> int:
         for name, floor in floors.items():
             others = {key: item.legs for key, item in floors.items() if key != name}
             creep = fit_creep(others, body)
-            _print(
-                f"{name}, learnt on {' and '.join(others)}",
-                creep,
-                ratio(*errors(floor.legs, creep)),
-            )
+            title = f"{name}, learnt on {' and '.join(others)}"
+            _print(title, creep, ratio(*errors(floor.legs, creep)))
             _print("    the estimator itself", creep, played(floor, creep, Path(scratch)))
     return 0
 

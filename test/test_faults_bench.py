@@ -263,8 +263,8 @@ def test_a_refusal_may_name_the_drive_and_the_wheel() -> None:
         1, 2, "bands are wide: mend", "cc: wheel 2 needs +30 % of the usual torque: look"
     )
     assert (good.is_go, good.names_drive, good.names_wheel) == (False, True, True)
-    other = _spoilt(1, 2, "aa: wheel 22 needs more: look", "motor_3_joint stands")
-    assert (other.names_drive, other.names_wheel) == (False, False)
+    other = _spoilt(1, 2, "cc: wheel 22 needs more: look", "aa: wheel 2 needs more")
+    assert (other.names_drive, other.names_wheel) == (True, False)
     assert _spoilt(2, 3, "cc: motor_3_joint stands: look").names_wheel
     assert _spoilt(0, None, "written: commissioned.yaml").is_go
     assert _spoilt(1, None, "cc: slip is named").names_wheel is None

@@ -39,11 +39,11 @@ class Spoilt:
 
     @property
     def names_wheel(self) -> bool | None:
-        """Whether it names the wheel; None where no single one is at fault."""
+        """Whether it names the wheel with the drive; None where no single one is at fault."""
         if self.wheel is None:
             return None
         called = re.compile(rf"(wheel|motor|fault)[ _]{self.wheel}(?!\d)")
-        return any(called.search(reason) for reason in self.reasons)
+        return any(self.identity in reason and called.search(reason) for reason in self.reasons)
 
 
 def faulty_drives(recordings: Recordings, only: Sequence[str]) -> tuple[Drive, ...]:

@@ -33,18 +33,18 @@ def without_the_first(time: float, topic: str, message: Any) -> Any:
 
 
 def test_wheels_creep_as_their_traction_and_the_travel_ask() -> None:
-    """Over ground that goes by at 0.3, -0.3 and 0 m/s the robot travels at sqrt(0.12) m/s."""
+    """Ground at 0.31, -0.29 and 0.01 m/s: a robot that travels at sqrt(0.12) m/s, and turns."""
     core = SlipOdometry(ROBOT, SETTINGS)
     for sample in range(6):
         core.encoders(START + 10_000_000 * sample, (0.01 * sample,) * 3, (0.0, 0.0, 0.0))
     list(core.due())
     core._used.value, core._x[CREEP] = np.array([0.1, 0.2, -0.01]), 2.0
-    *core._travel[:], core._x[WZ] = core._body.to_twist @ np.array([0.3, -0.3, 0.0])
+    *core._travel[:], core._x[WZ] = core._body.to_twist @ np.array([0.31, -0.29, 0.01])
     item, creep = core._estimate(core._time), math.sqrt(0.12) * np.array([0.1, 0.4, -0.03])
     assert item.creeping == pytest.approx(creep)
     assert item.sliding == pytest.approx(creep)
     # Over the larger of rim and ground; a ratio to next to nothing says nothing.
-    assert item.slip == pytest.approx([creep[0] / (0.3 + creep[0]), creep[1] / 0.3, 0.0])
+    assert item.slip == pytest.approx([creep[0] / (0.31 + creep[0]), creep[1] / 0.29, 0.0])
 
 
 def test_a_robot_that_creeps_comes_less_far() -> None:
@@ -75,7 +75,7 @@ def test_creep_goes_by_forces_that_are_held_against_the_motion_of_the_wheels() -
     core._forces = np.array([4.0, 2.0, 0.0])
     for sample in range(12):  # wheels that stand: nothing turns the robot
         core._tractions.encoders(START + 10_000_000 * sample, (0.0, 0.0, 0.0))
-    assert core._tractions.motion is not None
+    assert core._tractions.speeds is not None
     core._tractive = [Traction(START, 0, 4.0, 2.0, 5.0, ((4.0, -9.0), (2.0, 1.0)), 0.0)]
     core._keep_forces(1e3)
     assert core._used.value * core._body.load == pytest.approx([3.0, 1.0, -1.0])
@@ -85,7 +85,7 @@ def test_without_an_imu_the_force_reported_is_the_one_that_the_slides_speak_for(
     core = SlipOdometry(ROBOT)
     core._tractive = [Traction(START, 1, 3.0, 2.0, 5.0, ((3.0, -9.0), (2.0, 1.0)), 0.0)]
     core._forces = np.array([1.0, 3.0, 1.0])
-    core._tractions = SimpleNamespace(motion=np.zeros((2, 3)))  # type: ignore[assignment]
+    core._tractions = SimpleNamespace(speeds=np.zeros(3))  # type: ignore[assignment]
     core._by_power = SimpleNamespace(  # type: ignore[assignment]
         force=np.full(3, -8.0), step=lambda *given: None
     )

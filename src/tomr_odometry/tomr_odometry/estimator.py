@@ -35,7 +35,7 @@ _LEAST_STEP_NS = to_ns(0.004)  # between encoder samples that are used
 _SILENT_NS = to_ns(0.1)  # of the encoders, from which the IMU alone goes on
 _UNKNOWN_WAY = 1e4  # m^2
 _FRESH_NS = to_ns(0.25)  # how long a sensor may be silent
-_NONE_SLIDES = np.zeros(WHEELS, dtype=bool)
+_NONE_SLIDES, _ALL = np.zeros(WHEELS, dtype=bool), np.ones(WHEELS, dtype=bool)
 _ALONG, _EACH = np.diag([1.0, 1.0, 0.0]), np.eye(3)
 _TURNING = 0.02  # m/s: below it there is no slip ratio, for next to nothing moves
 _SEEN = 0.01  # m/s, the least sliding that is one
@@ -254,11 +254,11 @@ class SlipOdometry:
         """What the contacts slid in a step without an IMU."""
         is_known = self._are_evidence and np.isfinite(self._forces).sum() >= FEWEST_POWERS
         is_asked = is_known and not self._is_aided
-        motion = self._tractions.motion if is_asked else None
-        if motion is None:
+        speeds = self._tractions.speeds if is_asked else None
+        if speeds is None:
             self._by_power.rest()
             return
-        twist, rims = self._x[VX : WZ + 1], motion[0] * self._radius
+        twist, rims = self._x[VX : WZ + 1], speeds * self._radius
         if not max(np.abs(rims).max(), np.abs(self._body.rows @ twist).max()) < _FASTEST:
             self._by_power.rest()  # counts that leap, not a motion
             return
@@ -350,9 +350,9 @@ class SlipOdometry:
             # Creep is of the way of the last moments, and so is the rim that it is compared with.
             calm = self._body.rows @ (*self._travel, self._x[WZ]) + creeps
             sliding, rim = np.where(is_sliding, (rim - ground, rim), (creeps, calm))
-            is_seen = np.full(WHEELS, True)
+            is_seen = _ALL
         larger = np.maximum(np.abs(rim), np.abs(rim - sliding))
-        is_seen &= larger > _TURNING
+        is_seen = is_seen & (larger > _TURNING)
         return sliding, np.where(is_seen, sliding / np.maximum(larger, _TURNING), 0.0)
 
     def _unseen(self) -> Array:

@@ -138,16 +138,14 @@ class Tractions:
         return list(last), wheels.speed.tolist(), wheels.acceleration.tolist()
 
     @property
-    def motion(self) -> NDArray[np.float64] | None:
-        """Speeds [rad/s] and accelerations [rad/s^2] of the wheels at the newest encoder sample,
-        (2, 3); None before there are enough."""
-        if len(self._samples) < _FEWEST:
-            return None
-        return np.array(self._newest()[1:])
+    def speeds(self) -> NDArray[np.float64] | None:
+        """Of the wheels at the newest encoder sample [rad/s]; None before there are enough."""
+        return None if len(self._samples) < _FEWEST else np.array(self._newest()[1])
 
     @property
     def shown(self) -> NDArray[np.float64] | None:
-        """The same where a power was last held against it: what costs nothing more to know."""
+        """Speeds [rad/s] and accelerations [rad/s^2] of the wheels, (2, 3), that a power was last
+        held against: to know them costs nothing more; None before."""
         return None if self._shown is None else np.array(self._shown[1:])
 
     def _newest(self) -> Fitted:
