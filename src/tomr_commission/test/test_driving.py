@@ -68,7 +68,7 @@ def driven(
         angle = angle + 0.01 * now
         one, two, three = angle.tolist()
         a, b, c = now.tolist() if reports_speed else NAN3
-        watch.encoders(time, (one, two, three), (a, b, c))
+        watch.encoders(time, time, (one, two, three), (a, b, c))
         assert watch.problem(time, 0.01) == ""
     return watch
 
@@ -113,7 +113,7 @@ def test_one_wild_sample_is_not_running_away() -> None:
     one, two, three = (twist_to_wheels(ROBOT) @ AHEAD).tolist()
     for number in range(100):
         time = 4.0 + 0.01 * number
-        watch.encoders(time, NAN3, (one, 90.0 if number == 1 else two, three))
+        watch.encoders(time, time, NAN3, (one, 90.0 if number == 1 else two, three))
         assert watch.problem(time, 0.01) == ""
 
 
@@ -124,7 +124,7 @@ def test_what_was_fast_long_ago_excuses_nothing() -> None:
     for number in range(300):
         time = 4.0 + 0.01 * number
         watch.command(time, (0.1 + 1e-4 * number, 0.0, 0.0))
-        watch.encoders(time, NAN3, (one, two, three))
+        watch.encoders(time, time, NAN3, (one, two, three))
         found.add(watch.problem(time, 0.01)[:11])
     assert found == {"", "wheels turn"}
 
@@ -136,5 +136,26 @@ def test_slowing_down_is_not_running_away() -> None:
         time = 4.0 + 0.01 * number
         watch.command(time, STILL)
         one, two, three = (speed * max(0.0, 1.0 - number / 100.0)).tolist()
-        watch.encoders(time, NAN3, (one, two, three))
+        watch.encoders(time, time, NAN3, (one, two, three))
         assert watch.problem(time, 0.01) == ""
+
+
+def test_samples_that_come_in_bursts_are_told_apart_by_their_stamps() -> None:
+    watch = DriveWatch(ROBOT, DriveChoice())
+    speed = twist_to_wheels(ROBOT) @ AHEAD
+    watch.command(0.0, AHEAD)
+    for number in range(400):
+        stamp = 0.01 * number
+        arrival = 0.05 * (number // 5) + 1e-4 * (number % 5)  # five at once
+        one, two, three = (speed * stamp).tolist()
+        watch.encoders(arrival, stamp, (one, two, three), NAN3)
+        assert watch.problem(arrival, 0.01) == ""
+    assert list(watch.mistakes()) == []
+
+
+def test_a_robot_that_stands_from_the_very_start_on() -> None:
+    watch = DriveWatch(ROBOT, DriveChoice())
+    watch.command(0.0, AHEAD)
+    for number in range(200):
+        watch.encoders(0.01 * number, 0.01 * number, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    assert watch.problem(1.6, 0.01).startswith("the robot does not follow cmd_vel")

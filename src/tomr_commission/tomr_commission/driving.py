@@ -98,21 +98,22 @@ class DriveWatch:
         while len(self._commanded) > 2 and self._commanded[1][0] < time - self._choice.pause:
             del self._commanded[0]
 
-    def encoders(self, time: float, position: Triple, velocity: Triple) -> None:
-        """A sample [s, rad, rad/s]; where no velocity is reported it follows from the positions."""
+    def encoders(self, time: float, stamp: float, position: Triple, velocity: Triple) -> None:
+        """A sample that comes at a time, of its stamp [s, s, rad, rad/s]; where no velocity is
+        reported it follows from the positions and stamps: samples may come in bursts."""
         angle, speed = np.array(position), np.array(velocity)
-        if self._before is not None and time > self._before[0]:
-            turned = (angle - self._before[1]) / (time - self._before[0])
+        if self._before is not None and stamp > self._before[0]:
+            turned = (angle - self._before[1]) / (stamp - self._before[0])
             speed = np.where(np.isnan(speed), turned, speed)
-        self._before = time, angle
+        self._before = stamp, angle
         wanted = self._commanded[-1][1]
         must = np.abs(wanted) > self._choice.moves
         stands = np.abs(speed) < self._choice.stands * np.abs(wanted)
-        is_still = must.any() and stands[must].all()
-        self._stands_since = (self._stands_since or time) if is_still else None
+        is_still = bool(must.any() and stands[must].all())
+        self._stands_since = _since(self._stands_since, time, is_still)
         fastest = np.max([np.abs(asked) for _, asked in self._commanded], axis=0)
         runs = np.abs(speed) > self._choice.away * fastest + self._choice.moves
-        self._away_since = (self._away_since or time) if runs.any() else None
+        self._away_since = _since(self._away_since, time, bool(runs.any()))
         steady = must & np.isfinite(speed) & (time - self._changed > self._late)
         self._sums += np.where(steady, [speed * wanted, wanted**2, np.ones(WHEELS)], 0.0)
 
@@ -145,3 +146,10 @@ class DriveWatch:
             answer = float(across[wheel] / square[wheel])
             if abs(answer - 1.0) > self._choice.off:
                 yield f"{name} turns {answer:.2f} times as fast as commanded"
+
+
+def _since(before: float | None, time: float, holds: bool) -> float | None:
+    """Since when something holds [s], None where it does not."""
+    if not holds:
+        return None
+    return time if before is None else before

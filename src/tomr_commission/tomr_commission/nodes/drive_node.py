@@ -170,7 +170,9 @@ class DriveNode(Node):
         self._last = time.monotonic()
         if self._start_ns:
             (a, b, c), (d, e, f) = position, velocity
-            self.watch.encoders(self.seconds, (a, b, c), (d, e, f))
+            now = self.seconds
+            stamp = stamp_ns / NANOSECONDS if stamp_ns else now
+            self.watch.encoders(now, stamp, (a, b, c), (d, e, f))
         return ""
 
     def _listen(self, topic: str, type_name: str, item: Input | None = None) -> None:
