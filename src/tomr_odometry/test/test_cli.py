@@ -14,6 +14,7 @@ from tomr_odometry.creep import Creep
 from tomr_odometry.learn.cli import learnt_text
 from tomr_odometry.settings import OdometrySettings
 from tomr_power_model.robot import load_robot, read_node_sections
+from tomr_power_model.robot.files import robot_file
 
 BAG = Path(__file__).parents[3] / "bags" / "square"
 
@@ -104,6 +105,20 @@ def test_learnt_creep_is_read_again_and_the_rest_stays(tmp_path: Path) -> None:
     given = read_node_sections(file, ["slip_odometry"])
     assert OdometrySettings.given(given, "test").creep == Creep((0.5, 0.5, 0.5), 0.0, 0.1)
     assert again.count("slip_odometry:") == 1
+
+
+@pytest.mark.parametrize("name", ["slip_odometry:  # mine", '"slip_odometry":', "/slip_odometry:"])
+def test_learnt_creep_takes_the_place_of_a_section_however_it_is_written(
+    name: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "robot.yaml"
+    reference = robot_file("reference").read_text()
+    own = f"{name}\n  ros__parameters:\n    use_imu: false\n    creep: {{growth: 9.0}}\n"
+    file.write_text(f"{reference}\n{own}")
+    file.write_text(learnt_text(str(file), Creep((0.1, 0.2, 0.3), 0.4, 0.05), ["a"]))
+    settings = OdometrySettings.given(read_node_sections(file, ["slip_odometry"]), "test")
+    assert settings.creep == Creep((0.1, 0.2, 0.3), 0.4, 0.05)
+    assert not settings.use_imu
 
 
 def test_learning_needs_a_floor_for_each_bag(

@@ -3,7 +3,6 @@
 import argparse
 import json
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +12,11 @@ from tqdm import tqdm
 from tomr_odometry.creep import Creep
 from tomr_odometry.learn.drives import Leg, read_legs
 from tomr_odometry.learn.fit import Batch, fit_creep
+from tomr_power_model.calibration.fitted import sections_text
 from tomr_power_model.cli import EXIT_OK
 from tomr_power_model.errors import InputError
 from tomr_power_model.files import make_folder, write_together
-from tomr_power_model.robot import load_robot, read_node_sections, shipped_robots
+from tomr_power_model.robot import load_robot, read_sections
 from tomr_power_model.slides.body import body_of
 
 ROBOT_FILE, REPORT_FILE, NODE = "robot_learnt.yaml", "learnt.json", "slip_odometry"
@@ -71,32 +71,17 @@ def _floors(options: argparse.Namespace) -> dict[str, list[Path]]:
 
 
 def learnt_text(source: str, creep: Creep, bags: Sequence[str]) -> str:
-    """Text of a robot.yaml with the creep in the node's section; the rest stays as written."""
-    kept = read_node_sections(source, [NODE])
-    values = {name: value for name, value in kept.items() if not name.startswith("creep.")}
-    lines, in_section = [], False
-    for line in _text(source).splitlines():
-        if line[:1] not in ("", " ", "#"):
-            in_section = line.rstrip() == f"{NODE}:"
-        if not in_section:
-            lines.append(line)
-    rounded = ", ".join(f"{value:.5g}" for value in creep.coefficient)
-    lines += [
-        f"{NODE}:",
-        f"  # learnt from {', '.join(bags)}" if bags else "  # learnt",
-        "  ros__parameters:",
-        f"    creep: {{coefficient: [{rounded}], growth: {creep.growth:.5g}, "
-        f"uncertainty: {creep.uncertainty:.3g}}}",
-        *(f"    {name}: {json.dumps(value)}" for name, value in values.items()),
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _text(source: str) -> str:
-    if source in shipped_robots():
-        robots = files("tomr_power_model").joinpath("robots")
-        return robots.joinpath(f"{source}.yaml").read_text(encoding="utf-8")
-    return Path(source).read_text(encoding="utf-8")
+    """Text of a robot.yaml with the creep in the node's section; all else as it was."""
+    sections = read_sections(source)
+    own = {**sections.pop(NODE, {}), **sections.pop(f"/{NODE}", {})}
+    kept = {name: value for name, value in own.items() if not name.startswith("creep.")}
+    learnt = {
+        "creep.coefficient": [float(f"{value:.5g}") for value in creep.coefficient],
+        "creep.growth": float(f"{creep.growth:.5g}"),
+        "creep.uncertainty": float(f"{creep.uncertainty:.3g}"),
+    }
+    header = [f"{source} with creep learnt from {', '.join(bags) or 'its drives'} (tomr_odometry)"]
+    return sections_text({**sections, NODE: {**kept, **learnt}}, header)
 
 
 def _report(floors: Mapping[str, Sequence[Leg]], creep: Creep, body: Any) -> dict[str, Any]:
