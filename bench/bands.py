@@ -22,10 +22,11 @@ from stages import as_arrays, pipeline_of, steps_of
 from tomr_fault_diag.classifier.states import NORMAL
 from tomr_fault_diag.residuals.calibrated import fit_bands
 from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
+from tomr_fault_diag.residuals.widths import moved
 from tomr_power_model.cli import run_main
 from tomr_power_model.robot import shipped_robot
 from tomr_training.drives import random_drive
-from tomr_training.labels import spread
+from tomr_training.labels import LATELY
 from tomr_training.planar.generate import simulate
 
 Array = NDArray[np.float64]
@@ -51,7 +52,7 @@ def simulated(count: int) -> None:
 
     modelled = [drive.compared.modelled for drive in simulated]
     residual = joined(drive.compared.residuals(BandSettings())[0] for drive in simulated)
-    fitted = fit_bands(residual, joined(modelled), joined(map(spread, modelled)))
+    fitted = fit_bands(residual, joined(modelled), joined(moved(each, LATELY) for each in modelled))
     print(yaml.safe_dump({"fitted": rounded(fitted)}, sort_keys=False))
     for name, bands in (("fitted", fitted), ("shipped", BandSettings()), ("paper", PAPER_BANDS)):
         band = joined(drive.compared.residuals(bands)[1] for drive in simulated)
@@ -69,7 +70,7 @@ def recorded(bags: Sequence[Path], robot: str) -> None:
     for bag in bags:
         frames = [frame for _, step in steps_of(bag, pipeline_of(robot)) for frame in step.frames]
         residual, modelled = as_arrays(frames)
-        parts.append((residual, modelled, spread(modelled)))
+        parts.append((residual, modelled, moved(modelled, LATELY)))
         unit = next((f.residuals[1].unit for f in frames if not f.residuals[1].stale), unit)
     first, second, third = (np.concatenate(column) for column in zip(*parts, strict=True))
     bands = rounded(fit_bands(first, second, third, unit))

@@ -40,19 +40,27 @@ from diagnosis_report import NAMES, Codes, Onset, Outcome, publish, report
 from stages import as_arrays
 from tqdm import tqdm
 
-from tomr_commission.observed import bands_around
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import FAULTLESS, NORMAL, SLIP, State
-from tomr_fault_diag.residuals.frame import Residual, ResidualFrame
+from tomr_fault_diag.residuals.frame import RESIDUALS, Residual, ResidualFrame
 from tomr_fault_diag.residuals.settings import PAPER_BANDS, BandSettings
+from tomr_fault_diag.residuals.widths import widths
 from tomr_power_model.cli import run_main
-from tomr_power_model.robot import Robot, shipped_robot
+from tomr_power_model.robot import WHEELS, Robot, shipped_robot
 from tomr_training.drives import Drive, random_drive, severity_of, wheel_of
-from tomr_training.labels import LASTING, SLIPPING, Flags, GroundTruth, Noise, deviates, lasting
+from tomr_training.labels import (
+    LASTING,
+    LATELY,
+    SLIPPING,
+    Flags,
+    GroundTruth,
+    Noise,
+    deviates,
+    lasting,
+)
 from tomr_training.planar.faults import class_of
 from tomr_training.planar.generate import BEYOND, PAPER_OF
-from tomr_training.planar.residuals import widths
 from tomr_training.simulated_drive import LabelledDrive, healthy_twin, simulated_drive
 
 FIRST_SEED = 1_000_000  # of faulty drives; healthy ones follow a million later
@@ -97,10 +105,12 @@ def rebanded(frames: Sequence[ResidualFrame], bands: BandSettings) -> list[Resid
     """The same residuals in other bands than the usual; what was wider for its noise stays so, and
     what an IMU shows keeps the usual bands."""
     _, modelled = as_arrays(frames)
-    usual, band = (widths(modelled, chosen) for chosen in (BandSettings(), bands))
+    usual, band = (
+        widths(modelled, [one.of_residual(place, "W") for place in range(RESIDUALS)], LATELY)
+        for one in (BandSettings(), bands)
+    )
     volts = np.array([[item.modelled for item in frame.voltages] for frame in frames])
-    row = bands.voltage, bands.voltage_relative, bands.voltage_transient
-    held = bands_around(volts, *row).tolist()
+    held = widths(volts, [bands.of_voltage] * WHEELS, LATELY).tolist()
 
     def width(item: Residual, default: float, wanted: float) -> float:
         return max(wanted, item.band) if item.band > _WIDER * default else wanted

@@ -202,7 +202,7 @@ def test_what_is_no_message_is_not_passed_on_as_bytes(drive: list[Raw], tmp_path
         ("band.powr=2.0", ["band.powr is unknown", "did you mean band.power"]),
         ("band.power", ["band.power", "write name=value"]),
         ("band.power=wide", ["band.power", "wide", "number"]),
-        ("decision_rate=0", ["decision_rate", "0", "at least 1"]),
+        ("decision_rate=0", ["decision_rate", "0", "at least 5"]),
         ("confirm_time=.nan", ["confirm_time", "nan", "finite"]),
     ],
 )

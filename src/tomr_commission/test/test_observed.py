@@ -3,9 +3,10 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from attrs import evolve
 
-from tomr_commission.observed import Observed, band_of, frames_of
+from tomr_commission.observed import Observed, band_of, frames_of, observe
 from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
@@ -16,14 +17,17 @@ from tomr_power_model.robot import shipped_robot
 BAG = Path(__file__).resolve().parents[3] / "bags" / "square"
 
 
-def test_frames_with_other_bands_are_those_of_a_pipeline_that_has_them(healthy: Observed) -> None:
+@pytest.mark.parametrize("rate", [10.0, 20.0, 50.0])
+def test_frames_with_other_bands_are_those_of_a_pipeline_that_has_them(rate: float) -> None:
     bands = {"band.power": 0.7, "band.relative": 0.05, "band.speed": 0.03, "band.transient": 0.2}
-    pipeline = Pipeline(shipped_robot("reference"), DiagnosisSettings.of(bands, ""))
+    ticks = {"decision_rate": rate}
+    pipeline = Pipeline(shipped_robot("reference"), DiagnosisSettings.of({**bands, **ticks}, ""))
     with open_recording(BAG) as recording:
         frames = [frame for _, step in diagnose(recording, pipeline) for frame in step.frames]
     own = BandSettings(power=0.7, relative=0.05, speed=0.03, transient=0.2)
-    made = frames_of(healthy, own)
-    assert len(made) == len(frames) > 300
+    usual = DiagnosisSettings.of(ticks, "")
+    made = frames_of(observe(BAG, "square", shipped_robot("reference"), usual), own)
+    assert len(made) == len(frames) > 15 * rate
     for ours, theirs in zip(made, frames, strict=True):
         assert ours.stamp_ns == theirs.stamp_ns
         for one, other in zip(ours.residuals, theirs.residuals, strict=True):

@@ -10,7 +10,6 @@ from tomr_commission.observed import (
     Observed,
     along_bands_of,
     band_of,
-    moved,
     reports_currents,
     voltage_bands_of,
     yaw_band_of,
@@ -19,6 +18,7 @@ from tomr_commission.request import BandChoice
 from tomr_fault_diag.residuals.calibrated import fit_band, fit_bands, widened
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL
 from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_fault_diag.residuals.widths import moved
 from tomr_power_model.robot import WHEELS
 
 Array = NDArray[np.float64]
@@ -82,7 +82,7 @@ def _with_voltages(
 ) -> BandSettings:
     """Bands in which voltages of healthy drivers stay; as they are where these are not known."""
     volts = np.concatenate([drive.volts for drive in drives])
-    change = np.concatenate([moved(drive.volts[:, WHEELS:]) for drive in drives])
+    change = np.concatenate([moved(drive.volts[:, WHEELS:], drive.lately) for drive in drives])
     band = fit_band(volts[:, :WHEELS], volts[:, WHEELS:], change, choice.within)
     if band is None:
         return bands

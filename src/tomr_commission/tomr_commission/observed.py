@@ -21,8 +21,6 @@ from tomr_fault_diag.residuals.frame import (
     NO_IMU,
     NOT_MEASURED,
     RESIDUALS,
-    SPEEDS,
-    TOTAL,
     UNITS,
     Residual,
     ResidualFrame,
@@ -30,13 +28,12 @@ from tomr_fault_diag.residuals.frame import (
     rounded,
 )
 from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_fault_diag.residuals.widths import moved, transient_ticks, widths
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
-
-_TRANSIENT_TICKS = 3  # over which a band grows with the model's change: as in the residual stage
 
 
 @frozen
@@ -86,9 +83,15 @@ class Observed:
         )
 
     @property
+    def lately(self) -> int:
+        """Ticks over which a band grows with the model's change, as in the residual stage."""
+        steps = np.diff(self.stamp_ns)
+        return transient_ticks(round(float(np.median(steps)))) if len(steps) else 1
+
+    @property
     def change(self) -> Array:
-        """How far each modelled value moved over three ticks, (n, 10); 0 where it is not known."""
-        return moved(self.modelled)
+        """How far each modelled value moved lately, (n, 10); 0 where it is not known."""
+        return moved(self.modelled, self.lately)
 
     @property
     def hours(self) -> float:
@@ -138,15 +141,6 @@ class Observed:
         )
 
 
-def moved(values: Array) -> Array:
-    """How far each column moved over three ticks; 0 where it is not known."""
-    low, high = values.copy(), values.copy()
-    for back in range(1, _TRANSIENT_TICKS):
-        low[back:] = np.fmin(low[back:], values[:-back])
-        high[back:] = np.fmax(high[back:], values[:-back])
-    return np.nan_to_num(high - low)
-
-
 def observe(bag: Path, name: str, robot: Robot, settings: DiagnosisSettings) -> Observed:
     """Run a recording through the pipeline of the diagnosis.
 
@@ -170,42 +164,23 @@ def reports_currents(drive: Observed) -> bool:
 
 def band_of(observed: Observed, bands: BandSettings) -> Array:
     """Half widths of the bands, (n, 10): those of the residual stage."""
-    least, relative, transient = (np.empty(RESIDUALS) for _ in range(3))
-    for channel in range(RESIDUALS):
-        floor = bands.power if observed.units[channel] == "W" else bands.current
-        if channel in SPEEDS:
-            row = bands.speed, bands.speed_relative, bands.speed_transient
-        elif channel == TOTAL:
-            row = floor * bands.total_factor, bands.total_relative, bands.transient
-        else:
-            row = floor, bands.relative, bands.transient
-        least[channel], relative[channel], transient[channel] = row
-    width = np.maximum(least, relative * np.abs(np.nan_to_num(observed.modelled)))
-    return np.asarray(width + transient * observed.change)
+    rows = [bands.of_residual(place, UNITS[str(unit)]) for place, unit in enumerate(observed.units)]
+    return widths(observed.modelled, rows, observed.lately)
 
 
 def yaw_band_of(observed: Observed, bands: BandSettings) -> Array:
     """Half widths of the band of the yaw rate [rad/s], (n,)."""
-    row = bands.yaw, bands.yaw_relative, bands.yaw_transient
-    return bands_around(observed.yaw[:, 1:], *row)[:, 0]
+    return widths(observed.yaw[:, 1:], [bands.of_yaw], observed.lately)[:, 0]
 
 
 def along_bands_of(observed: Observed, bands: BandSettings) -> Array:
     """Half widths of the bands of the acceleration along x and y [m/s^2], (n, 2)."""
-    row = bands.along, bands.along_relative, bands.along_transient
-    return bands_around(observed.along[:, 2:], *row)
+    return widths(observed.along[:, 2:], [bands.of_force] * 2, observed.lately)
 
 
 def voltage_bands_of(observed: Observed, bands: BandSettings) -> Array:
     """Half widths of the bands of the drivers' voltages [V], (n, 3)."""
-    row = bands.voltage, bands.voltage_relative, bands.voltage_transient
-    return bands_around(observed.volts[:, WHEELS:], *row)
-
-
-def bands_around(modelled: Array, least: float, relative: float, transient: float) -> Array:
-    """Around what is expected, as what wheels show of what an IMU measures, (n, m) each."""
-    width = np.maximum(least, relative * np.abs(np.nan_to_num(modelled)))
-    return np.asarray(width + transient * moved(modelled))
+    return widths(observed.volts[:, WHEELS:], [bands.of_voltage] * WHEELS, observed.lately)
 
 
 def frames_of(observed: Observed, bands: BandSettings) -> list[ResidualFrame]:

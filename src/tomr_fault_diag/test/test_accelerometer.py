@@ -26,6 +26,7 @@ from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.messages.plain import Level
+from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import GRAVITY, shipped_robot
 
 MS = 1_000_000
@@ -90,6 +91,19 @@ def test_it_agrees_with_wheels_that_turn_and_speed_up(period_ms: int) -> None:
     middle = 2.6 - 0.0005 * (period_ms + max(period_ms, 50))
     assert x.modelled == pytest.approx(-FASTER - TURNING * ACROSS, abs=1e-3)
     assert y.modelled == pytest.approx(TURNING * float(twist(middle)[0]), abs=1e-3)
+
+
+@pytest.mark.parametrize("rate", [5.0, 15.0, 25.0, 30.0, 50.0, 60.0, 75.0, 90.0])
+def test_it_is_known_at_every_rate_of_decisions(rate: float) -> None:
+    period = to_ns(1.0 / rate)
+    watch = AccelerometerWatch(period, 3)
+    found = []
+    for number in range(1, round(4.0 * rate)):
+        tick = number * period
+        for stamp in range(tick - period, tick, 5 * MS):
+            watch.add(stamp + 1, (0.0, 0.0, GRAVITY))
+        found.append(watch.residuals(tick, np.array([0.5, 0.0, 0.0]), BANDS, is_well=True))
+    assert [x.missing for x, _ in found[5:]] == [""] * len(found[5:])
 
 
 def test_what_a_slope_pulls_with_is_the_rest() -> None:
@@ -241,9 +255,10 @@ def test_either_is_left_out_where_the_robot_says_so(turns: bool, forces: bool) -
     stage = Mock(settings=ResidualSettings(watch_gyro=turns, watch_accelerometer=forces))
     taken = [item for item in residual_inputs(ROBOT, stage) if item.topic == "imu/data"]
     assert bool(taken) == (turns or forces)
-    message = Mock(linear_acceleration_covariance=[0.0] * 9)
+    nothing = [0.0] * 9
+    message = Mock(linear_acceleration_covariance=nothing, angular_velocity_covariance=nothing)
     message.header.stamp = Mock(sec=7, nanosec=5)
-    message.angular_velocity.z = 0.7
+    message.angular_velocity = Mock(x=0.0, y=0.0, z=0.7)
     message.linear_acceleration = Mock(x=0.1, y=0.2, z=9.8)
     for item in taken:
         item.take(message, 0)

@@ -218,6 +218,16 @@ def test_a_gap_changes_nothing_and_the_fault_is_found_after_it() -> None:
     assert [name for _, name in changes(classified(named))] == ["normal", FAULT]
 
 
+@pytest.mark.parametrize("report_period", [0.05, 1.0, 60.0])
+def test_frames_that_go_back_by_more_than_a_second_start_afresh(report_period: float) -> None:
+    """Those that come a little late change nothing, however often is said how it is."""
+    late = [*FAULTY[:60], FAULTY[50], *FAULTY[60:]]
+    settings = {"report_period": to_ns(report_period)}
+    assert changes(classified(late, **settings)) == changes(classified(FAULTY, **settings))
+    looped = classified([*FAULTY, *ticks(50, 2000)], **settings)
+    assert changes(looped)[-1][1] == "normal"
+
+
 def test_too_many_gaps_are_not_enough_data() -> None:
     frames = []
     for t in range(50, 6000, 50):

@@ -17,12 +17,10 @@ from tomr_odometry.topics import (
     STATUS_TOPIC,
     TF_TOPIC,
     estimate_messages,
-    imu_of,
     odometry_inputs,
 )
 from tomr_power_model.drive.sources import PowerReading
 from tomr_power_model.messages.bag import bag_header, bag_message, to_bag
-from tomr_power_model.messages.intake import Unusable
 from tomr_power_model.messages.types import TWIST, TWIST_STAMPED
 from tomr_power_model.model.ticks import Arrival
 
@@ -131,15 +129,3 @@ def test_sensors_that_are_not_to_be_used_are_not() -> None:
     assert np.isnan(last.traction).all()
     assert "imu/data" in last.missing
     assert not last.is_carried
-
-
-def test_what_an_imu_says_that_it_does_not_measure_is_not_known() -> None:
-    rate = bag_message("geometry_msgs/msg/Vector3", z=0.5)
-    force = bag_message("geometry_msgs/msg/Vector3", x=1.0, z=9.81)
-    message = bag_message("sensor_msgs/msg/Imu", angular_velocity=rate, linear_acceleration=force)
-    assert imu_of(message) == (0.0, 0.0, 0.5, 1.0, 0.0, 9.81)
-    message.linear_acceleration_covariance[0] = -1.0
-    assert np.isnan(imu_of(message)).tolist() == [False] * 3 + [True] * 3
-    message.angular_velocity_covariance[0] = -1.0
-    with pytest.raises(Unusable):
-        imu_of(message)

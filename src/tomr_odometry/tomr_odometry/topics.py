@@ -1,6 +1,5 @@
 """Which topics the odometry reads, and what it publishes."""
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,13 +10,7 @@ from tomr_odometry.estimate import Estimate
 from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.grip import SIDE, Grid
 from tomr_odometry.settings import OdometrySettings
-from tomr_power_model.messages.intake import (
-    Unusable,
-    WheelFinder,
-    specific_force_of,
-    stamp_of,
-    twist_of,
-)
+from tomr_power_model.messages.intake import WheelFinder, inertial_of, stamp_of, twist_of
 from tomr_power_model.messages.motion import odometry, quaternion, transform_of
 from tomr_power_model.messages.plain import (
     Level,
@@ -66,19 +59,6 @@ class Published:
     message: Plain
 
 
-def imu_of(message: Any) -> tuple[float, ...]:
-    """Angular rates [rad/s] and specific forces [m/s^2] of an Imu; NaN where it says none."""
-    rate, covariance = message.angular_velocity, message.angular_velocity_covariance
-    rates = [float(rate.x), float(rate.y), float(rate.z)]
-    # A covariance that begins with -1 says that the quantity is not measured.
-    if len(covariance) and float(covariance[0]) == -1.0:
-        rates = [math.nan] * 3
-    force = specific_force_of(message)
-    if not math.isfinite(rates[2]) and not math.isfinite(force[0]):
-        raise Unusable("neither the yaw rate nor the acceleration is finite")
-    return (*(value if math.isfinite(value) else math.nan for value in rates), *force)
-
-
 def odometry_inputs(robot: Robot, core: SlipOdometry) -> tuple[Input, ...]:
     """The inputs of a core."""
 
@@ -86,7 +66,8 @@ def odometry_inputs(robot: Robot, core: SlipOdometry) -> tuple[Input, ...]:
         return core.command(stamp_of(message, receive_ns, fallback=True), twist_of(message))
 
     def imu(message: Any, receive_ns: int) -> Arrival:
-        return core.imu(stamp_of(message, receive_ns), imu_of(message))
+        rate, force = inertial_of(message)
+        return core.imu(stamp_of(message, receive_ns), (*rate, *force))
 
     inputs = [Input("cmd_vel", TWIST_STAMPED, guarded(command), (TWIST, TWIST_STAMPED))]
     wheels = WheelFinder(robot.wheel_names)

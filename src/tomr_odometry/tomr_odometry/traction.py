@@ -28,6 +28,7 @@ Triple = tuple[float, float, float]
 Fitted = tuple[list[float], list[float], list[float]]  # angles, speeds, accelerations
 _SPAN_NS = 60_000_000  # of the encoder samples that show speed and acceleration
 _FEWEST = 8  # samples
+_KEPT = 1024  # commands, should no encoder sample come
 _RESTING = 0.3  # rad/s
 _STALE_NS = 250_000_000
 _FOLLOW = 0.05  # of what is missing, by which a driver's sum of errors follows the measured power
@@ -85,10 +86,8 @@ class Tractions:
         self._drawn = [0.0] * (WHEELS * at.POWER_WHEEL)
         self._input = list(no_input(WHEELS))
         self._samples: deque[tuple[int, Triple]] = deque()
-        self._commands: deque[tuple[int, Triple]] = deque()
+        self._commands: deque[tuple[int, Triple]] = deque(maxlen=_KEPT)
         self._now = 0
-        self._speed = [0.0] * WHEELS
-        self._gain = [0.0] * WHEELS
         self._is_commanded = False
         self._rough = [Roughness() for _ in range(WHEELS)]
         self._fitted: Fitted | None = None  # of the newest sample

@@ -77,6 +77,32 @@ def test_the_order_of_arrival_does_not_matter(delays_ms: list[int]) -> None:
     assert _run(event for event, _ in late) == _run(events)
 
 
+def test_whether_a_gyro_s_sample_arrives_late_changes_nothing() -> None:
+    """One stamped after a tick says nothing of it, even if it is there when the tick is decided."""
+    assert _gyrating(late_ms=0) == _gyrating(late_ms=12)
+
+
+def _gyrating(late_ms: int) -> list[Prediction]:
+    """A robot that drives along a circle, the rate that its gyro shows grows all the while."""
+    robot, twist = shipped_robot("reference"), (0.3, 0.0, 0.5)
+    predictor = PowerPredictor(robot, ModelSettings(use_imu=True))
+    speed = twist_to_wheels(robot) @ twist
+    events = [*_events(1000), *((t, "imu") for t in range(1, 1000, 10))]
+    events.sort(key=lambda event: (event[0] + late_ms * (event[1] == "imu"), event))
+    found: list[Prediction] = []
+    for at_ms, kind in events:
+        stamp = BASE + at_ms * MS
+        if kind == "command":
+            predictor.command(stamp, twist)
+        elif kind == "imu":
+            predictor.imu(stamp, 0.5 + 2e-3 * at_ms)
+        else:
+            first, second, third = (speed * at_ms * 1e-3).tolist()
+            predictor.encoders(stamp, (first, second, third), NAN3)
+        found.extend(predictor.due())
+    return found
+
+
 def test_without_a_command_only_the_encoders_speak() -> None:
     last = _run(_events(500, commands=False))[-1]
     assert all(math.isnan(speed) for speed in last.speed)
@@ -297,6 +323,18 @@ class TestEncoderWindow:
         found = window.at(BASE + 400 * MS)
         np.testing.assert_allclose(found.speed, [speed, 20.0, 0.0], atol=0.2 * speed)
         assert found.angle[1] == pytest.approx(angle)
+
+    def test_what_stray_stamps_break_off_is_forgotten_as_well(self) -> None:
+        """Three messages of four are out of order, for minutes."""
+        window = EncoderWindow(to_ns(0.07), to_ns(0.05), to_ns(0.5))
+        for number in range(5000):
+            stamp = BASE + 10 * number * MS
+            window.add(EncoderSample(stamp, (1e-3 * number,) * 3, NAN3))
+            for _ in range(3):
+                window.continuity.precedes(stamp - 5 * MS)
+            if number % 5 == 0:
+                window.at(stamp)
+        assert len(window._samples) < 100
 
     def test_stale_samples_say_nothing(self) -> None:
         samples = [EncoderSample(BASE - at * MS, (1.0,) * 3, NAN3) for at in (450, 440, 430)]

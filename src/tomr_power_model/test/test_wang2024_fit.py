@@ -168,6 +168,17 @@ class TestChoice:
         still = [reading.power for reading in last.from_encoders]
         assert still == pytest.approx([1.0, 1.2, 1.4])
 
+    def test_in_ticks_between_the_drivers_periods_it_says_what_it_said_last(self) -> None:
+        slow = evolve(ROBOT, controller=evolve(ROBOT.controller, rate=50.0))
+        given = self._values(FITTED) | {"power_model": "wang2024", "decision_rate": 100.0}
+        predictor, found = PowerPredictor(slow, self._settings(**given)), []
+        for at_ms in range(3, 2000, 10):
+            predictor.command(10**18 + (at_ms // 50) * 50 * 10**6 + 1, (0.4, 0.0, 0.0))
+            predictor.encoders(10**18 + at_ms * 10**6, (0.0, 0.0, 0.0), (math.nan,) * 3)
+            found += [item.motors[1].power for item in predictor.due()]
+        assert len(found) > 180
+        np.testing.assert_allclose(found[100:], found[-1], rtol=2e-2)
+
     def test_coefficients_go_into_a_file_and_back(self, tmp_path: Path) -> None:
         file = tmp_path / "fitted.yaml"
         FITTED.save(file)

@@ -17,23 +17,25 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_fault_diag.residuals.widths import moved, transient_ticks
+from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+LATELY = transient_ticks(to_ns(0.05))  # ticks of 50 ms, in which a change counts
 _SIGMAS = 3.0
 _POWER_SHARE = 0.15  # of the power of the healthy robot
-_POWER_CHANGE = 0.10  # of its change over three ticks
+_POWER_CHANGE = 0.10  # of its change over those ticks
 _SPEED_LEAST = 0.01  # rad/s
 _SPEED_SHARE = 0.002  # of the speed of the healthy robot
-_SPEED_CHANGE = 0.05  # of its change over three ticks
+_SPEED_CHANGE = 0.05  # of its change over those ticks
 _SAMPLES = 2.5  # of power in a tick
 # Standard deviation of a speed fitted to encoders, per quantum [1/s]: 7 samples in 70 ms.
 _SPEED_PER_QUANTUM = 10.0
 SLIPPING = 0.02  # m/s
 LASTING = 4  # ticks of 50 ms
-_CHANGE_TICKS = 3
 
 
 @frozen
@@ -65,31 +67,22 @@ class Noise:
         )
 
 
-def spread(values: Array) -> Array:
-    """Largest minus least over this tick and the two before, (ticks, ...)."""
-    low, high = values.copy(), values.copy()
-    for back in range(1, _CHANGE_TICKS):
-        low[back:] = np.minimum(low[back:], values[:-back])
-        high[back:] = np.maximum(high[back:], values[:-back])
-    return high - low
-
-
 def deviates(truth: GroundTruth, twin: GroundTruth, noise: Noise) -> Flags:
     """Whether a tick differs measurably from the healthy twin, (ticks,)."""
     power_tolerance = (
         _SIGMAS * noise.power
         + _POWER_SHARE * np.abs(twin.power)
-        + _POWER_CHANGE * spread(twin.power)
+        + _POWER_CHANGE * moved(twin.power, LATELY)
     )
     speed_tolerance = (
         _SIGMAS * noise.speed
         + _SPEED_LEAST
         + _SPEED_SHARE * np.abs(twin.speed)
-        + _SPEED_CHANGE * spread(twin.speed)
+        + _SPEED_CHANGE * moved(twin.speed, LATELY)
     )
-    moved = np.abs(truth.power - twin.power) > power_tolerance
-    moved |= np.abs(truth.speed - twin.speed) > speed_tolerance
-    return np.asarray(moved.any(axis=1))
+    differs = np.abs(truth.power - twin.power) > power_tolerance
+    differs |= np.abs(truth.speed - twin.speed) > speed_tolerance
+    return np.asarray(differs.any(axis=1))
 
 
 def lasting(flags: Flags) -> Flags:

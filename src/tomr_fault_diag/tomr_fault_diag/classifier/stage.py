@@ -36,6 +36,7 @@ from tomr_fault_diag.classifier.states import (
 )
 from tomr_fault_diag.classifier.sufficiency import Sufficiency, SufficiencyWatch
 from tomr_fault_diag.residuals.frame import GAP, MOTORS, NO_COMMAND, ResidualFrame
+from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import Robot
 
 
@@ -61,6 +62,7 @@ _WELL = (STATES[NORMAL], PUSHED)
 # What shows only now and then, as when a wheel has to push.
 _ELUSIVE = (STATES[SLIP], BURDENED, UNKNOWN)
 _QUIET = (None, WAITING, STALE, NOT_ENOUGH, NOT_OBSERVABLE, *_WELL, *POWER_SENSOR)
+_WENT_BACK = to_ns(1.0)  # further than messages overtake each other
 # Where commands that are another's may be told: beside a fault of a motor its wheel strays anyway.
 _WITHOUT_FAULT = (*_QUIET, DISOBEYS, UNKNOWN)
 
@@ -174,7 +176,7 @@ class FaultClassifier:
         back); one that merely repeats or precedes it is ignored.
         """
         if frame.stamp_ns <= self._stamp:
-            if self._stamp - frame.stamp_ns < self.settings.report_period:
+            if self._stamp - frame.stamp_ns < _WENT_BACK:
                 return None
             self.clear()
         elapsed = frame.stamp_ns - self._stamp if self._stamp else 0

@@ -54,9 +54,10 @@ class AccelerometerWatch:
     def __init__(self, period_ns: int, lately: int) -> None:
         """`period_ns` of the ticks; `lately`: so many of them in which a change counts."""
         self._period = period_ns
-        self._window = max(period_ns, _SLOT)
+        ticks = -(-_SLOT // (period_ns + 1))  # a period is rounded to whole nanoseconds
+        self._window = ticks * period_ns
         self._samples: deque[tuple[int, Force]] = deque(maxlen=_KEPT)
-        self._twists: deque[tuple[int, Array]] = deque(maxlen=1 + self._window // period_ns)
+        self._twists: deque[tuple[int, Array]] = deque(maxlen=1 + ticks)
         self._recent: deque[Array] = deque(maxlen=lately)
         self._repeats = RepeatWatch(_REPEATS)
         self._agreed, self._is_doubted = _AGREED, False  # ns so far, and whether it ever ran out
@@ -94,8 +95,9 @@ class AccelerometerWatch:
         if self._repeats.is_stuck(tick_ns, shown, moves=moves) and is_weight:
             return _unknown(IMU_REPEATS)
         beyond = force[:2] - acceleration if is_weight else _UNKNOWN
-        band = np.maximum(bands.along, bands.along_relative * np.abs(acceleration))
-        band += bands.along_transient * self._spread(acceleration)
+        least, relative, transient = bands.of_force
+        band = np.maximum(least, relative * np.abs(acceleration))
+        band += transient * self._spread(acceleration)
         band += _UNSURE * _PRIOR / (_PRIOR + self._count)
         found = beyond - self._bias
         if is_well:

@@ -8,12 +8,13 @@ The shape of the band is fitted to the size of the residuals, its width to a sha
 from collections.abc import Sequence
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import evolve
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, SPEEDS, TOTAL
 from tomr_fault_diag.residuals.settings import LEAST_BAND, LEAST_FACTOR, BandSettings
+from tomr_fault_diag.residuals.widths import Band
 from tomr_power_model.errors import InputError
 
 Array = NDArray[np.float64]
@@ -24,15 +25,6 @@ SPEED_FACTOR = 2.0  # margin of speeds over that: loops of real drivers are not 
 _LEAST = 2000  # residuals to fit to
 
 
-@frozen
-class Band:
-    """max(least, relative |model|) + transient * change of the model."""
-
-    least: float
-    relative: float
-    transient: float
-
-
 def fit_bands(
     residual: Array, modelled: Array, change: Array, unit: str = "W", within: float = WITHIN
 ) -> BandSettings:
@@ -41,7 +33,7 @@ def fit_bands(
     Args:
         residual: of many ticks, (n, 10), NaN where unknown.
         modelled: what they were compared to, (n, 10).
-        change: largest minus least modelled value over three ticks, (n, 10).
+        change: how far the modelled values moved lately (`widths.moved`), (n, 10).
         unit: of the motors' residuals, W or A.
         within: share of the ticks that stay within.
 

@@ -26,9 +26,7 @@ from tomr_power_model.model.ticks import to_ns
 _TURNS = 0.2  # rad/s: slower turning says nothing of how a gyro is mounted
 _AGREED = to_ns(2.0)  # of turning, tick after tick, in which it has to agree
 _STRAYS = 0.5  # bands: a gyro that repeats itself while the wheels' rate changes more is dead
-_MOST_HZ = 60  # samples beyond add nothing
 _KEPT = 1024  # samples, should no tick come
-CLOSEST_NS = to_ns(1.0 / _MOST_HZ)
 
 
 class GyroWatch:
@@ -73,8 +71,8 @@ class GyroWatch:
     ) -> Residual:
         """What it measures at a tick less what the wheels show [rad/s], NaN where that is
         unknown, or the gyro is not believed; `moves`: whether wheels turn."""
-        band = max(bands.yaw, bands.yaw_relative * abs(wheels))
-        band += bands.yaw_transient * self.spread(wheels)
+        least, relative, transient = bands.of_yaw
+        band = max(least, relative * abs(wheels)) + transient * self.spread(wheels)
         if self._repeats.is_stuck(tick_ns, [wheels / (_STRAYS * bands.yaw)], moves=moves):
             return evolve(UNKNOWN_YAW, missing=IMU_REPEATS)
         measured = self.rate(tick_ns)

@@ -5,6 +5,8 @@ from typing import Self, cast
 
 from attrs import field, frozen
 
+from tomr_fault_diag.residuals.frame import SPEEDS, TOTAL, Unit
+from tomr_fault_diag.residuals.widths import Band
 from tomr_power_model.model.settings import TICK_PARAMETERS, tick_settings
 from tomr_power_model.model.ticks import TickSettings, to_ns
 from tomr_power_model.robot.parameters import HARDWARE_ID, NAMELESS, ParameterSpec
@@ -83,6 +85,44 @@ class BandSettings:
     voltage: float = 0.3  # V
     voltage_relative: float = 0.1
     voltage_transient: float = 0.1
+
+    def of_residual(self, place: int, unit: Unit) -> Band:
+        """Of one of a frame's residuals; `unit` of what motors draw."""
+        if place in SPEEDS:
+            return self.of_speed
+        return self.of_total(unit) if place == TOTAL else self.of_motor(unit)
+
+    def least(self, unit: Unit) -> float:
+        """Least band of what a motor draws."""
+        return self.power if unit == "W" else self.current
+
+    def of_motor(self, unit: Unit) -> Band:
+        """Of what a motor draws."""
+        return Band(self.least(unit), self.relative, self.transient)
+
+    def of_total(self, unit: Unit) -> Band:
+        """Of what all draw."""
+        return Band(self.total_factor * self.least(unit), self.total_relative, self.transient)
+
+    @property
+    def of_speed(self) -> Band:
+        """Of a wheel's speed [rad/s]."""
+        return Band(self.speed, self.speed_relative, self.speed_transient)
+
+    @property
+    def of_yaw(self) -> Band:
+        """Of a gyro's yaw rate [rad/s]."""
+        return Band(self.yaw, self.yaw_relative, self.yaw_transient)
+
+    @property
+    def of_force(self) -> Band:
+        """Of an accelerometer's force along an axis [m/s^2]."""
+        return Band(self.along, self.along_relative, self.along_transient)
+
+    @property
+    def of_voltage(self) -> Band:
+        """Of a driver's voltage [V]."""
+        return Band(self.voltage, self.voltage_relative, self.voltage_transient)
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> Self:

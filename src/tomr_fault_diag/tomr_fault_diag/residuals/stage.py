@@ -27,7 +27,7 @@ from tomr_fault_diag.residuals.measured import Measured, SupplyWindow
 from tomr_fault_diag.residuals.scatter import ScatterWatch
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_fault_diag.residuals.voltages import VoltageWatch
-from tomr_fault_diag.residuals.widths import width
+from tomr_fault_diag.residuals.widths import transient_ticks, width
 from tomr_power_model.drive.plausible import PowerLimits, fastest_wheel
 from tomr_power_model.drive.sources import (
     ARRAY_TOPIC,
@@ -51,18 +51,13 @@ from tomr_power_model.model.encoders import (
 from tomr_power_model.model.input_health import InputReporter, InputState
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.repeats import RepeatWatch, Work
-from tomr_power_model.model.ticks import Arrival, TickClock, to_ns
+from tomr_power_model.model.ticks import Arrival, TickClock
 from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
 
 PREDICTIONS = "predictions"
 ENCODERS = "joint_states"
-
-# The model's change over so long, in ticks, widens the band: where power jumps, a lag of a few
-# milliseconds between the streams is a large residual.
-_TRANSIENT = to_ns(0.15)
-_FEWEST = 2  # ticks, of slow decisions
 
 _UNSURE = 1.0  # bands: a speed is not known whose standard deviation is larger
 _TURNS = 0.3  # rad/s: a slower wheel may rest
@@ -120,7 +115,7 @@ class ResidualStage:
         )
         self._has_motor_power = bool(motor_topics(robot))
         self._predictions: dict[int, Prediction] = {}
-        lately = max(_FEWEST, round(_TRANSIENT / period))
+        lately = transient_ticks(period)
         self._recent: deque[_Modelled] = deque(maxlen=lately)
         self._scatter = ScatterWatch(fastest)
         self._inertial = InertialWatch(period, lately)
@@ -288,7 +283,7 @@ class ResidualStage:
         asked = abs(speed.modelled)
         turns = asked > _TURNS or abs(asked + speed.residual) > _TURNS
         expected = self._recent[-1].of_unit(unit)[wheel]
-        return Work(turns, not speed.code, expected, self._least(unit))
+        return Work(turns, not speed.code, expected, self.settings.bands.least(unit))
 
     def _total(self, tick: int, motors: list[Measured], absent: str) -> Residual:
         source = self._robot.measurement.total
@@ -305,24 +300,24 @@ class ResidualStage:
             missing = "no fresh battery_state"
             if value == value and self._flows[TOTAL].is_broken(tick):
                 value, missing = NAN, f"{GAP}{TOTAL_TOPIC}"
-        least = self._least(unit) * self.settings.bands.total_factor
-        relative = self.settings.bands.total_relative
-        return self._residual(value, models, unit, least, missing, absent, relative=relative)
+        band = width(models, self.settings.bands.of_total(unit))
+        reason = _missing(value, models[-1], missing, absent)
+        return _residual(value, models[-1], band, unit, reason)
 
     def _motor(self, wheel: int, measured: Measured, absent: str) -> Residual:
-        models = [past.of_unit(measured.unit)[wheel] for past in self._recent]
-        least = self._least(measured.unit)
-        return self._residual(
-            measured.value, models, measured.unit, least, measured.missing, absent
-        )
+        return self._drawn(wheel, measured, absent, NO_COMMAND)
 
     def _derived(self, wheel: int, measured: Measured, absent: str) -> Residual:
-        models = [past.of_unit(measured.unit)[WHEELS + 1 + wheel] for past in self._recent]
-        least = self._least(measured.unit)
         unmodelled = "no fresh joint_states for the model"
-        return self._residual(
-            measured.value, models, measured.unit, least, measured.missing, absent, unmodelled
-        )
+        return self._drawn(WHEELS + 1 + wheel, measured, absent, unmodelled)
+
+    def _drawn(self, place: int, measured: Measured, absent: str, unmodelled: str) -> Residual:
+        """What a motor draws beside one of the modelled values."""
+        value, unit = measured.value, measured.unit
+        models = [past.of_unit(unit)[place] for past in self._recent]
+        band = width(models, self.settings.bands.of_motor(unit))
+        reason = _missing(value, models[-1], measured.missing, absent, unmodelled)
+        return _residual(value, models[-1], band, unit, reason)
 
     def _speeds(self, tick: int, estimate: WheelEstimate, absent: str) -> list[Residual]:
         bands = self.settings.bands
@@ -340,8 +335,7 @@ class ResidualStage:
             model = models[-1]
             # Against the set direction: "slower than commanded" is negative whichever way it turns.
             sign = -1.0 if model < 0.0 else 1.0
-            row = bands.speed, bands.speed_relative, bands.speed_transient
-            band = width(models, *row)
+            band = width(models, bands.of_speed)
             noise = estimate.gain * max(scatter * max(abs(model), abs(value)), counts)
             unsure = unsure or noise > _UNSURE * band
             missing = _missing(NAN if disorder else value, model, reason, absent)
@@ -358,26 +352,9 @@ class ResidualStage:
             return np.full(3, NAN)
         return np.asarray(self._to_twist @ self._flaws.turned(estimate).speed)
 
-    def _least(self, unit: Unit) -> float:
-        bands = self.settings.bands
-        return bands.power if unit == "W" else bands.current
 
-    def _residual(
-        self,
-        value: float,
-        models: list[float],
-        unit: Unit,
-        least: float,
-        missing: str,
-        absent: str,
-        unmodelled: str = NO_COMMAND,
-        relative: float | None = None,
-    ) -> Residual:
-        bands, model = self.settings.bands, models[-1]
-        share = bands.relative if relative is None else relative
-        band = width(models, least, share, bands.transient)
-        reason = _missing(value, model, missing, absent, unmodelled)
-        return Residual(rounded(value - model), rounded(band), rounded(model), unit, reason)
+def _residual(value: float, model: float, band: float, unit: Unit, missing: str) -> Residual:
+    return Residual(rounded(value - model), rounded(band), rounded(model), unit, missing)
 
 
 def _missing(

@@ -45,8 +45,7 @@ class VoltageWatch:
 
     def _residual(self, wheel: int, held: float, bands: BandSettings) -> Residual:
         models = [past[wheel] for past in self._recent]
-        row = bands.voltage, bands.voltage_relative, bands.voltage_transient
-        model, band = models[-1], width(models, *row)
+        model, band = models[-1], width(models, bands.of_voltage)
         missing = "" if held == held else NO_ENCODERS
         if model != model:
             missing = NO_COMMAND

@@ -1,5 +1,6 @@
 """A recording as a `Drive`: every source of power, one policy for what is missing, dejittered."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -23,9 +24,9 @@ from tomr_power_model.limits import limits, too_large
 from tomr_power_model.messages.intake import (
     MALFORMED,
     WheelFinder,
+    inertial_of,
     stamp_of,
     twist_of,
-    yaw_rate_of,
 )
 from tomr_power_model.recordings import Recording, open_recording, require_topic, resolve_topic
 from tomr_power_model.robot import WHEELS, Robot
@@ -118,7 +119,9 @@ class _Collector:
         self.commands.add(stamp, receive_ns, *twist_of(message))
 
     def _imu(self, message: Any, receive_ns: int) -> None:
-        self.gyro.add(stamp_of(message, receive_ns), receive_ns, yaw_rate_of(message))
+        (_, _, rate), _ = inertial_of(message)
+        if math.isfinite(rate):
+            self.gyro.add(stamp_of(message, receive_ns), receive_ns, rate)
 
     def _power(self, source: PowerTopic) -> Taker:
         def take(message: Any, receive_ns: int) -> None:

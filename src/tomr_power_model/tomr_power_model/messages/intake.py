@@ -27,7 +27,7 @@ class Largest:
     voltage: float = 1e5  # V
     power: float = 1e7  # W
     twist: float = 1e3  # m/s or rad/s
-    yaw_rate: float = 1e3  # rad/s
+    rate: float = 1e3  # rad/s
     force: float = 1e4  # m/s^2
 
 
@@ -71,21 +71,24 @@ def twist_of(message: Any) -> Triple:
     return values
 
 
-def yaw_rate_of(message: Any) -> float:
-    """Yaw rate of an Imu [rad/s]."""
-    rate = float(message.angular_velocity.z)
-    _check(rate, LARGEST.yaw_rate, "the yaw rate")
-    return rate
+def inertial_of(message: Any) -> tuple[Triple, Triple]:
+    """Angular rate [rad/s] and specific force [m/s^2] of an Imu along x, y and z; NaN where it says
+    none. Raises Unusable where it says neither a yaw rate nor a force."""
+    rate = _axes(message.angular_velocity, message.angular_velocity_covariance, LARGEST.rate)
+    force = _axes(
+        message.linear_acceleration, message.linear_acceleration_covariance, LARGEST.force
+    )
+    if not math.isfinite(rate[2]) and not math.isfinite(force[0]):
+        raise Unusable("it measures neither a yaw rate nor a force that can be")
+    return rate, force
 
 
-def specific_force_of(message: Any) -> Triple:
-    """Specific force of an Imu along x, y and z [m/s^2]; NaN where it says none."""
-    covariance, force = message.linear_acceleration_covariance, message.linear_acceleration
+def _axes(vector: Any, covariance: Sequence[float], largest: float) -> Triple:
     # A covariance that begins with -1 says that the quantity is not measured.
     if len(covariance) and float(covariance[0]) == -1.0:
         return _UNKNOWN
-    values = (float(force.x), float(force.y), float(force.z))
-    if any(abs(value) > LARGEST.force for value in values if math.isfinite(value)):
+    values = (float(vector.x), float(vector.y), float(vector.z))
+    if any(abs(value) > largest for value in values if math.isfinite(value)):
         return _UNKNOWN
     x, y, z = (value if math.isfinite(value) else math.nan for value in values)
     return x, y, z

@@ -180,12 +180,12 @@ class EncoderWindow:
 
     def _until(self, tick_ns: int, span: int | None = None) -> list[EncoderSample]:
         """Samples of the window, and the two newest where encoders are slower than it."""
+        while len(self._samples) > 2 and self._samples[1].stamp_ns <= tick_ns - self._stale:
+            self._samples.popleft()
         if self.continuity.is_broken(tick_ns):
             return []
         oldest = tick_ns - (self._span if span is None else span)
         joined = self.continuity.resumed
-        while len(self._samples) > 2 and self._samples[1].stamp_ns <= tick_ns - self._stale:
-            self._samples.popleft()
         window: list[EncoderSample] = []
         for sample in reversed(self._samples):
             if sample.stamp_ns < joined or (len(window) > 2 and sample.stamp_ns <= oldest):

@@ -22,7 +22,7 @@ from tomr_power_model.unmodelled.online import NOTHING, Besides
 from tomr_power_model.wang2024 import WANG2024_PARAMETERS, Coefficients, Wang2024Model
 
 _PARTS = 10  # of a tick, where torque ripples with the wheels' angles
-_KEPT = 600_000_000  # ns, of simulated steps: longer than a sample may be old
+_KEPT = 600_000_000  # ns, of simulated steps
 # Columns of the simulated steps, of the first wheel.
 _UNKNOWN = [math.nan] * WHEELS
 _POWER, _CURRENT, _AT_MOTOR, _TOTAL = 0, WHEELS, 2 * WHEELS, 3 * WHEELS
@@ -226,19 +226,24 @@ class FromMotion:
     def __init__(self, model: PowerModel, step_s: float) -> None:
         self._model = model
         self._step = step_s
+        self.clear()
 
     def clear(self) -> None:
-        """It remembers nothing."""
+        """Forget the last step."""
+        self._last = Means(_UNKNOWN, _UNKNOWN, _UNKNOWN, _UNKNOWN)
 
     def commanded(self, motion: Commanded, windows: Windows) -> Means:
-        """Mean over the steps of the tick."""
+        """Mean over the steps of the tick; as in the last step where none ended in it."""
+        if not motion.rows:
+            return self._last
         speed = np.array([motion.wheels(row, at.OUT_SPEED) for row in motion.rows])
         change = np.empty_like(speed)
         edge = np.array(motion.edge)
         for row, mean in enumerate(speed):
             change[row] = 2.0 * (mean - edge) / self._step
             edge = 2.0 * mean - edge
-        return Means.of(self._model.power(WheelMotion(speed, change)))
+        self._last = Means.of(self._model.power(WheelMotion(speed, change)))
+        return self._last
 
     def measured(self, motion: MeasuredMotion) -> Means:
         """At the middle of the tick."""

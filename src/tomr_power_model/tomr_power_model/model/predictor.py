@@ -104,7 +104,7 @@ class PowerPredictor:
         self._resting.clear()
         self._encoders.clear()
         self._commands.clear()
-        self._gyro: tuple[int, float] | None = None
+        self._gyro: deque[tuple[int, float]] = deque()  # stamps [ns], rad/s
         self._voltages: deque[tuple[int, float, float, float]] = deque()
         self._given: tuple[int, Triple] | None = None  # the newest command
         self._intervals: deque[int] = deque(maxlen=_INTERVALS)  # of the commands [ns]
@@ -153,10 +153,11 @@ class PowerPredictor:
         return arrival
 
     def imu(self, stamp_ns: int, yaw_rate: float) -> Arrival:
-        """Take a gyro's yaw rate [rad/s]; it corrects the omega x v terms if `use_imu`."""
+        """Take a gyro's yaw rate [rad/s], NaN where it says none; it corrects the omega x v terms
+        if `use_imu`."""
         arrival = self._arrive(IMU, stamp_ns)
-        if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
-            self._gyro = (stamp_ns, yaw_rate)
+        if arrival in (Arrival.TAKEN, Arrival.RESTARTED) and not math.isnan(yaw_rate):
+            self._gyro.append((stamp_ns, yaw_rate))
         return arrival
 
     def voltages(self, stamp_ns: int, values: Triple) -> Arrival:
@@ -331,10 +332,8 @@ class PowerPredictor:
 
     def _yaw_rate(self, tick: int) -> float:
         """The gyro's yaw rate [rad/s], NaN where it is not used or stale."""
-        if self._gyro is None or not self.settings.use_imu:
-            return np.nan
-        stamp, rate = self._gyro
-        return rate if tick - stamp < self.settings.stale else np.nan
+        samples = of_tick(self._gyro, tick, self.settings.ticks.period, self.settings.stale)
+        return samples[-1][1] if samples and self.settings.use_imu else np.nan
 
     def _bus_voltage(self, means: Means, power: float) -> float:
         """Supply voltage under a load [V]; sagging to first order where it is not simulated."""

@@ -25,7 +25,7 @@ GAP = _S(
     60.0,
 )
 TICK_PARAMETERS: tuple[ParameterSpec, ...] = (
-    _S("decision_rate", "ticks on the grid of data stamps", "float", 20.0, "Hz", 1.0, 100.0),
+    _S("decision_rate", "ticks on the grid of data stamps", "float", 20.0, "Hz", 5.0, 100.0),
     _S("settle_time", "data time to wait for late messages", "float", 0.02, "s", 0.0, 5.0),
     _S("patience", "silence after which a stream is not waited for", "float", 0.25, "s", 0.0, 5.0),
     GAP,

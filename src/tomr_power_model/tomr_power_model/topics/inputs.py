@@ -23,10 +23,10 @@ from tomr_power_model.messages.intake import (
     Unusable,
     WheelFinder,
     header_stamp_ns,
+    inertial_of,
     numbers_of,
     stamp_of,
     twist_of,
-    yaw_rate_of,
 )
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.messages.types import IMU, JOINT_STATE, MULTI_ARRAY, TWIST, TWIST_STAMPED
@@ -120,7 +120,8 @@ def model_inputs(
         return predictor.command(stamp_of(message, receive_ns, fallback=True), twist_of(message))
 
     def imu(message: Any, receive_ns: int) -> Arrival:
-        return predictor.imu(stamp_of(message, receive_ns), yaw_rate_of(message))
+        (_, _, rate), _ = inertial_of(message)
+        return predictor.imu(stamp_of(message, receive_ns), rate)
 
     def voltages(message: Any, receive_ns: int) -> Arrival:
         first, second, third = numbers_of(message, WHEELS)[:WHEELS]
@@ -139,8 +140,16 @@ def model_inputs(
     if robot.measurement.motor_voltage:
         inputs.append(Input(VOLTAGE_TOPIC, MULTI_ARRAY, guarded(voltages)))
     if predictor.settings.use_imu:
-        inputs.append(Input("imu/data", IMU, guarded(imu)))
+        inputs.append(imu_input(imu))
     return tuple(inputs)
+
+
+def imu_input(take: Take) -> Input:
+    """The IMU of a stage that decides by ticks, and that a robot may well lack: more samples than
+    60 a second add nothing, and their reading costs."""
+    thinning = Thinning(NANOSECONDS // 60)
+    taker = guarded(thinning.around(take))
+    return Input("imu/data", IMU, taker, is_too_close=thinning.is_too_close, is_optional=True)
 
 
 def measured_inputs(

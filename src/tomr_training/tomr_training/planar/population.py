@@ -13,12 +13,13 @@ from attrs import evolve, frozen
 
 from tomr_fault_diag.residuals.calibrated import fit_bands, widened
 from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_fault_diag.residuals.widths import moved
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import Robot
 from tomr_power_model.robot.description import PerWheel
 from tomr_sim_bridge.missions.schema import Phase, TwistPhase
 from tomr_training.drives import DEVIATION, Bump, Drive, another_drive, bumps, random_drive
-from tomr_training.labels import spread
+from tomr_training.labels import LATELY
 from tomr_training.planar.faults import DRY, loaded, random_faults
 from tomr_training.planar.hidden import tuned, with_hidden_physics
 from tomr_training.planar.plant import run_plant
@@ -95,7 +96,7 @@ def bands_of(reference: Robot, number: int) -> BandSettings:
     compared = compare(drive, Signals.of(drive, run_plant(drive)))
     residual, _ = compared.residuals(BandSettings())
     try:
-        fitted = fit_bands(residual, compared.modelled, spread(compared.modelled))
+        fitted = fit_bands(residual, compared.modelled, moved(compared.modelled, LATELY))
     except InputError:  # it stood nearly all the time
         return BandSettings()
     return widened(fitted)

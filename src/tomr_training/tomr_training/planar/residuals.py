@@ -10,7 +10,9 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_fault_diag.residuals.frame import RESIDUALS
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
+from tomr_fault_diag.residuals.widths import widths
 from tomr_power_model.dynamics import layout as at
 from tomr_power_model.dynamics.binding import compiled
 from tomr_power_model.model.encoder_flaws import EncoderFlaws
@@ -18,7 +20,7 @@ from tomr_power_model.model.encoder_path import Rests, alike, at_rest, beside
 from tomr_power_model.model.ticks import NANOSECONDS
 from tomr_power_model.robot import WHEELS
 from tomr_training.drives import Drive
-from tomr_training.labels import spread
+from tomr_training.labels import LATELY
 from tomr_training.planar.believed import Expected, run_believed
 from tomr_training.planar.fits import Fits
 from tomr_training.planar.schedule import TICK, tick_count
@@ -43,18 +45,8 @@ class Compared:
         """Residuals and bands, (ticks, 10), as `ResidualStage` gives them."""
         residual = self.measured - self.modelled
         residual[:, _SPEEDS] *= np.where(self.modelled[:, _SPEEDS] < 0.0, -1.0, 1.0)
-        return residual, widths(self.modelled, bands)
-
-
-def widths(modelled: Array, bands: BandSettings) -> Array:
-    """Half widths of the bands around modelled values, (ticks, 10) each."""
-    motors = [bands.power] * 3
-    floor = np.array([bands.power * bands.total_factor, *motors, *[bands.speed] * 3, *motors])
-    motors = [bands.relative] * 3
-    relative = np.array([bands.total_relative, *motors, *[bands.speed_relative] * 3, *motors])
-    change = np.full(10, bands.transient)
-    change[_SPEEDS] = bands.speed_transient
-    return np.asarray(np.maximum(floor, relative * np.abs(modelled)) + change * spread(modelled))
+        rows = [bands.of_residual(place, "W") for place in range(RESIDUALS)]
+        return residual, widths(self.modelled, rows, LATELY)
 
 
 def compare(drive: Drive, signals: Signals) -> Compared:
