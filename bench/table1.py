@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from attrs import frozen
-from figures.simulated import PAPER_BANDS
+from figures.simulated import SENSOR_BANDS
 from numpy.typing import NDArray
 from tqdm import tqdm
 from wang2024 import record
@@ -67,7 +67,7 @@ CASES = (
 
 def codes_of(bag: Path, case: Case) -> Codes:
     """Codes (n, 10) in the order of our frame, of the ticks in which the fault shows."""
-    pipeline = Pipeline(load_robot("reference"), DiagnosisSettings.of(PAPER_BANDS, "bench"))
+    pipeline = Pipeline(load_robot("reference"), DiagnosisSettings.of(SENSOR_BANDS, "bench"))
     found = []
     with open_recording(bag) as recording:
         for _, step in diagnose(recording, pipeline):

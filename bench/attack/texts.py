@@ -17,7 +17,6 @@ from tomr_power_model.robot.tables import ROBOT_PARAMETERS
 from tomr_power_model.wang2024.coefficients import Coefficients
 
 _ROBOTS = ROOT / "src/tomr_power_model/tomr_power_model/robots"
-_MISSIONS = ROOT / "src/tomr_sim_bridge/tomr_sim_bridge/missions"
 _WEIGHTS = ROOT / "src/tomr_fault_diag/tomr_fault_diag/weights"
 _SHORT = """\
 name: short

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from figures.page import CODE_COLOURS, DERIVED, INK, MEASURED, PHYSICAL, lines, page, titled
 from figures.result import Result
 from figures.simulated import (
-    PAPER_BANDS,
+    SENSOR_BANDS,
     Heard,
     Played,
     driven,
@@ -71,7 +71,7 @@ def fig8(scratch: Path) -> Result:
 
 def fig9(scratch: Path) -> Result:
     """Encoder of motor 1 lost: power solved from encoder data beside modelled and measured."""
-    found = played(_drive("encoder_lost"), reference(), PAPER_BANDS)
+    found = played(_drive("encoder_lost"), reference(), SENSOR_BANDS)
     rows, numbers = [], {}
     for phase, span in PHASES.items():
         inside = found.rows(*span)
@@ -108,7 +108,7 @@ def _drive(fault: str) -> list[Heard]:
 def _experiment(title: str, fault: str) -> Result:
     heard = _drive(fault)
     judged = {name: played(heard, reference(), {"classifier": name}) for name in _JUDGES}
-    found = played(heard, reference(), PAPER_BANDS)
+    found = played(heard, reference(), SENSOR_BANDS)
     numbers: dict[str, Any] = {}
     rows = []
     for phase, span in PHASES.items():

@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from figures.page import CODE_COLOURS, INK, page, titled
 from figures.result import Missing, Result
-from figures.simulated import PAPER_BANDS, driven, played, reference
+from figures.simulated import SENSOR_BANDS, driven, played, reference
 from tomr_fault_diag.classifier.states import STATES
 from tomr_sim_bridge.missions import load_mission
 
@@ -130,7 +130,7 @@ def outputs(network: "nn.Sequential", inputs: Array) -> Array:
 def _tried(mission: str, state: str, network: "nn.Sequential") -> dict[str, Any]:
     """What the network says of a simulated drive, at the ticks whose codes are not all 0."""
     robot = reference()
-    codes = played(driven(load_mission(mission), robot, SEED), robot, PAPER_BANDS).codes
+    codes = played(driven(load_mission(mission), robot, SEED), robot, SENSOR_BANDS).codes
     codes = codes[codes.any(axis=1)] if state != "normal" else codes
     named = Counter(_NAMES[i] for i in outputs(network, codes.astype(np.float64)).argmax(axis=1))
     count = max(len(codes), 1)

@@ -12,6 +12,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.geometry.poses import moved
 from tomr_power_model.messages.intake import Triple
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_sim_bridge.missions.mission import Plan
@@ -62,15 +63,10 @@ def schedule(plan: Plan, choice: DriveChoice) -> tuple[tuple[Command, ...], floa
 
 def reach(commands: Sequence[Command]) -> float:
     """How far the robot gets from where it starts [m], if it does as commanded."""
-    x = y = heading = farthest = 0.0
+    pose, farthest = np.zeros(3), 0.0
     for command, after in pairwise(commands):
-        step = after.time - command.time
-        v_x, v_y, rate = command.twist
-        middle = heading + 0.5 * rate * step
-        x += step * (v_x * math.cos(middle) - v_y * math.sin(middle))
-        y += step * (v_x * math.sin(middle) + v_y * math.cos(middle))
-        heading += rate * step
-        farthest = max(farthest, math.hypot(x, y))
+        pose = moved(pose, (after.time - command.time) * np.array(command.twist))
+        farthest = max(farthest, float(np.hypot(*pose[:2])))
     return farthest
 
 

@@ -73,8 +73,7 @@ def _answers(drives: Sequence[Drive]) -> Array | None:
     for drive in drives:
         if len(drive.command_time) < 2:
             continue
-        index = np.searchsorted(drive.command_time, drive.encoder_time, side="right") - 1
-        held = np.where((index >= 0)[:, None], drive.command[np.maximum(index, 0)], np.nan)
+        held = drive.command_at(drive.encoder_time)
         speed = measured_speed(drive)
         known = np.isfinite(held).all(axis=1) & np.isfinite(speed).all(axis=1)
         known &= np.abs(held).any(axis=1)

@@ -53,7 +53,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="new folder")
     parser.add_argument("--reference", metavar="TOPIC", help="a known pose, to compare with")
     parser.add_argument("--namespace", help="of the robot's topics, if the bag holds several")
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="one parameter, before what robot.yaml says; may be repeated (see --parameters)",
+    )
     parser.add_argument(
         "--parameters",
         action=PrintAndLeave,

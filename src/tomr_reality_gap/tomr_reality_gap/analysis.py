@@ -20,7 +20,7 @@ from tomr_reality_gap.fit.dataset import Dataset
 from tomr_reality_gap.fit.forward_selection import Selection, finding_cost
 from tomr_reality_gap.fit.jacobian import Jacobian, linearise
 from tomr_reality_gap.fit.learnt import with_terms
-from tomr_reality_gap.fit.simulator_baseline import Offsets, SimulatorBaseline
+from tomr_reality_gap.fit.simulator_baseline import Offsets
 from tomr_reality_gap.fit.structure import additions_of, structural_shifts
 from tomr_reality_gap.fit.uncertainty import own_sigma
 from tomr_reality_gap.fit.unmodelled import Unmodelled
@@ -43,7 +43,6 @@ class AnalysisResult:
     source: str  # robot.yaml
     candidates: tuple[Hypothesis, ...]
     basis: BasisResponses
-    baseline: SimulatorBaseline | None = None
     shared: Offsets = ()  # what the user's simulation shows of each finding
     plain: Dataset | None = None  # without the unnamed term; None: there is none
     unmodelled: Unmodelled | None = None

@@ -168,7 +168,6 @@ def _analysed(
         str(request.robot),
         candidates,
         basis,
-        baseline,
         shared,
         plain,
         effect,

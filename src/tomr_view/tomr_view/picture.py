@@ -17,6 +17,7 @@ from tomr_fault_diag.residuals.frame import (
     residual_names,
 )
 from tomr_power_model.geometry.kinematics import wheel_angles, wheels_to_twist
+from tomr_power_model.geometry.poses import moved
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.robot import WHEELS, Robot
 from tomr_sim_bridge.faults import all_parameters, fault_ids
@@ -124,12 +125,9 @@ class Gatherer:
 
     def _move(self, seconds: float) -> None:
         """Where the wheels have taken the robot, as they turned."""
-        x, y, yaw = self._pose
-        v_x, v_y, omega = wheels_to_twist(self.robot) @ np.array(self._speeds)
-        middle = yaw + 0.5 * omega * seconds
-        x += seconds * (v_x * math.cos(middle) - v_y * math.sin(middle))
-        y += seconds * (v_x * math.sin(middle) + v_y * math.cos(middle))
-        self._pose = (float(x), float(y), float(yaw + omega * seconds))
+        twist = wheels_to_twist(self.robot) @ np.array(self._speeds)
+        x, y, yaw = moved(np.array(self._pose), seconds * twist).tolist()
+        self._pose = (x, y, yaw)
 
     def picture(self) -> Json | None:
         """The moment of the last residuals; None before the first ones."""

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from tomr_fault_diag.diagnosis.labels import TRUTH_TOPIC
 from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import STAGE_NODES, DiagnosisSettings
@@ -10,8 +11,6 @@ from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.recordings import Recording, open_recording, resolve_topic
 from tomr_power_model.robot import Robot, load_robot, read_node_sections
 from tomr_view.picture import PICTURE_PERIOD, Gatherer, Json, Status, described, spells
-
-TRUTH = "ground_truth/faults"
 
 
 def pictures_of(
@@ -62,7 +61,7 @@ class _Truth:
     """A simulator's word on its faults, as far as it was recorded."""
 
     def __init__(self, recording: Recording, namespace: str | None) -> None:
-        topic = resolve_topic(recording, TRUTH, namespace)
+        topic = resolve_topic(recording, TRUTH_TOPIC, namespace)
         self._messages = iter(recording.messages([topic]) if topic else ())
         self._next = next(self._messages, None)
 

@@ -2,13 +2,12 @@
 
 import hashlib
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 
 from tomr_fault_diag.classifier.settings import ClassifierSettings
+from tomr_fault_diag.classifier.stored import shipped_weights
 from tomr_power_model.robot import Robot, digest_of, suite_version
 
-_SHIPPED = {"window": "window.npz", "wang2024": "wang2024.npz"}
 _DIGITS = 8
 
 
@@ -42,9 +41,5 @@ def _now(settings: ClassifierSettings, robot: Robot) -> tuple[str, str, str]:
 @cache
 def _weights(classifier: str, path: str) -> str:
     """A short name of the weights in use."""
-    if path:
-        data = Path(path).read_bytes()
-    else:
-        shipped = files("tomr_fault_diag").joinpath("weights").joinpath(_SHIPPED[classifier])
-        data = shipped.read_bytes()
+    data = (Path(path) if path else shipped_weights(classifier)).read_bytes()
     return hashlib.sha256(data).hexdigest()[:_DIGITS]

@@ -41,7 +41,8 @@ class LossSettings:
     least: float = 1.0  # V, of a driver that says how its motor turns
 
 
-def _nowhere() -> Flags:
+def nowhere() -> Flags:
+    """No wheel, (3,)."""
     return np.zeros(WHEELS, dtype=np.bool_)
 
 
@@ -53,7 +54,7 @@ class Losses:
     counts: Flags
 
 
-UNEXPLAINED = Losses(_nowhere(), _nowhere())
+UNEXPLAINED = Losses(nowhere(), nowhere())
 
 
 class LossWatch:

@@ -19,7 +19,7 @@ _SHAPES = {
     "output_weight": (len(STATES), 30),
     "output_bias": (len(STATES),),
 }
-_STORED = Stored("wang2024.npz", "a network", tuple(_SHAPES), lambda found: _SHAPES)
+_STORED = Stored("wang2024", "a network", tuple(_SHAPES), lambda found: _SHAPES)
 
 
 @frozen

@@ -23,7 +23,7 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import NDArray
 
-from tomr_fault_diag.classifier.losses import UNEXPLAINED, Losses, LossWatch
+from tomr_fault_diag.classifier.losses import UNEXPLAINED, Losses, LossWatch, nowhere
 from tomr_fault_diag.classifier.motors import Motors
 from tomr_fault_diag.residuals.frame import (
     ENCODERS,
@@ -63,18 +63,14 @@ class ParitySettings:
     unsettled: int = to_ns(0.35)  # for which wheels still do what nobody seems to have asked for
 
 
-def _nowhere() -> Flags:
-    return np.zeros(WHEELS, dtype=np.bool_)
-
-
 @frozen
 class Parity:
     """Of each motor, (3,); neither where it is not known."""
 
-    holds: Flags = field(factory=_nowhere)
-    broken: Flags = field(factory=_nowhere)  # or was of late
-    breaks: Flags = field(factory=_nowhere)  # and did hold before ...
-    broke: Flags = field(factory=_nowhere)  # ... or broke a moment ago
+    holds: Flags = field(factory=nowhere)
+    broken: Flags = field(factory=nowhere)  # or was of late
+    breaks: Flags = field(factory=nowhere)  # and did hold before ...
+    broke: Flags = field(factory=nowhere)  # ... or broke a moment ago
     beyond: float = 0.0  # by how much those are off, in parts of what is allowed, beyond it
     misled: bool = False  # drivers obeyed what is not known, a moment ago
     losses: Losses = UNEXPLAINED  # which alone explain that it breaks
@@ -97,11 +93,11 @@ class ParityWatch:
         # Since when each holds, agrees while the wheel turns, is broken, and agrees [ns].
         self._since = np.full((4, WHEELS), _NOT_YET)
         self._broken = np.full(WHEELS, NEVER)  # ns, when each last was, unless it held since
-        self._is_known = _nowhere()  # whether its driver's law says a motor's voltage, ...
+        self._is_known = nowhere()  # whether its driver's law says a motor's voltage, ...
         self._doubt = np.zeros(WHEELS)  # ... but for so much [V]
         # Whether it has agreed for long: by chance it does for a moment, where a wheel turns back.
-        self._is_proven = _nowhere()
-        self._misled = _nowhere()  # drivers that obeyed what is not known, ...
+        self._is_proven = nowhere()
+        self._misled = nowhere()  # drivers that obeyed what is not known, ...
         self._misled_at = NEVER  # ... since when they do, the last time [ns]
         self._beyond = np.zeros(WHEELS)  # by how much each was off when last broken, see `Parity`
         self._newest = 0  # ns

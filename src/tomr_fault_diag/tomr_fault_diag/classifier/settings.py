@@ -5,6 +5,7 @@ from typing import Self, cast
 
 from attrs import frozen
 
+from tomr_fault_diag.classifier.stored import SHIPPED
 from tomr_fault_diag.residuals.frame import INPUT_ORDERS
 from tomr_power_model.errors import InputError
 from tomr_power_model.model.ticks import to_ns
@@ -25,7 +26,7 @@ CLASSIFIER_PARAMETERS: tuple[ParameterSpec, ...] = (
         "window: continuous residuals of the last 0.4 s; wang2024: the paper's codes and network",
         "str",
         "window",
-        choices=("window", "wang2024"),
+        choices=tuple(SHIPPED),
     ),
     _S("weights", "file of network weights; empty: the shipped ones", "str", ""),
     _S(

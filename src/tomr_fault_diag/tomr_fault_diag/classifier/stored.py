@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from importlib.resources import as_file, files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +15,20 @@ from tomr_power_model.files import read_arrays
 Array = NDArray[np.float64]
 Shapes = Mapping[str, tuple[int, ...]]
 
+# Files of the weights that are shipped, by the name of their classifier.
+SHIPPED: Mapping[str, str] = {"window": "window.npz", "wang2024": "wang2024.npz"}
+
+
+def shipped_weights(classifier: str) -> Traversable:
+    """The file that comes with the package."""
+    return files("tomr_fault_diag").joinpath("weights").joinpath(SHIPPED[classifier])
+
 
 @frozen
 class Stored:
     """How the weights of one kind of network are stored."""
 
-    shipped: str  # file name
+    classifier: str  # whose
     network: str  # in words
     names: tuple[str, ...]
     shapes: Callable[[Mapping[str, Array]], Shapes]  # that the arrays must have together
@@ -29,7 +38,7 @@ class Stored:
         """Arrays of a file, or the shipped ones; raises InputError if they do not fit."""
         if path:
             return self._read(Path(path))
-        with as_file(files("tomr_fault_diag").joinpath("weights").joinpath(self.shipped)) as file:
+        with as_file(shipped_weights(self.classifier)) as file:
             return self._read(file)
 
     def _read(self, path: Path) -> dict[str, Array]:

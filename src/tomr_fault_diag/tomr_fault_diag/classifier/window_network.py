@@ -43,7 +43,7 @@ def _shapes(found: Mapping[str, Array]) -> Shapes:
 
 
 _STORED = Stored(
-    "window.npz",
+    "window",
     "the window network",
     _NAMES,
     _shapes,

@@ -92,7 +92,13 @@ def _parser() -> argparse.ArgumentParser:
         "--labels", metavar="PATH", help=f"score against a file, a folder of them, or `{RECORDED}`"
     )
     parser.add_argument("--html", type=Path, metavar="DIR", help="write a time line of each here")
-    parser.add_argument("--jobs", type=int, default=0, metavar="N", help="recordings side by side")
+    parser.add_argument(
+        "--jobs",
+        type=int,
+        default=0,
+        metavar="N",
+        help="recordings side by side (default: one per core)",
+    )
     parser.add_argument("--out", type=Path, help="write the suite's messages to this new bag")
     parser.add_argument("--namespace", help="of the robot's topics, if the bag holds several")
     parser.add_argument(

@@ -23,7 +23,7 @@ def summary_lines(summary: Summary, start_ns: int) -> Iterator[str]:
         yield f"  {100 * share:5.1f} %  {name}"
     stale = max(summary.stale_shares)
     if stale:
-        yield f"  up to {100 * stale:.1f} % of a residual without an input"
+        yield f"  an input of a residual was missing in up to {100 * stale:.1f} % of the decisions"
     for change in summary.conditions:
         yield f"  changed: {change.words}"
     for episode in summary.episodes:

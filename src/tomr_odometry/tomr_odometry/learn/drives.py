@@ -12,6 +12,7 @@ from tomr_odometry.offline import estimates
 from tomr_odometry.reference import Path2D, reference_of
 from tomr_odometry.settings import OdometrySettings
 from tomr_power_model.errors import InputError
+from tomr_power_model.geometry import poses
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import Robot
 from tomr_power_model.topics.inputs import Complaints
@@ -83,10 +84,8 @@ def leg_of(
     if len(path) < 2 or np.hypot(*np.diff(path[:, :2], axis=0).T).max() > _JUMP:
         return None
     start, end = reference.at(stamps[[0, -1]])
-    c, s = np.cos(start[2] + turned), np.sin(start[2] + turned)
-    x, y, yaw = end - start
     way = float(np.hypot(*np.diff(path[::6, :2], axis=0).T).sum())
     if way < _LEAST_WAY:
         return None
-    moved = np.array([c * x + s * y, c * y - s * x, yaw])
+    moved = poses.turned(end - start, -(start[2] + turned))
     return Leg(np.diff(rims, axis=0), used[1:], moved, way)

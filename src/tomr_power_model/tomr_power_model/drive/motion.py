@@ -13,7 +13,7 @@ Mask = NDArray[np.bool_]
 _CHUNK = 20_000  # rows worked out at a time, which bounds the memory
 LEAST_PERIODS = 5  # in a fit: fewer amplify the encoder's quanta too much
 _GAP = 3.0  # periods without a sample are a gap; no motion is known next to it
-_SPEED, _ACCELERATION = 1, 2
+_SPEED = 1
 
 
 def median_period(time: Array) -> float:

@@ -153,7 +153,7 @@ def _geometry(item: Drive, robot: Robot) -> Iterator[Finding]:
     """Wheels that answer to other headings than their places in robot.yaml say."""
     if len(item.command_time) < 2:
         return
-    speed, asked = measured_speed(item), _held(item)
+    speed, asked = measured_speed(item), item.command_at(item.encoder_time)
     rows = np.isfinite(asked).all(axis=1) & np.isfinite(speed).all(axis=1)
     rows &= np.abs(asked).any(axis=1)
     if np.count_nonzero(rows) < 50 or np.linalg.cond(asked[rows][:, :2]) > 10.0:
@@ -180,18 +180,12 @@ def _geometry(item: Drive, robot: Robot) -> Iterator[Finding]:
             )
 
 
-def _held(item: Drive) -> Array:
-    """The command in force at each encoder sample, NaN before the first, (n, 3)."""
-    index = np.searchsorted(item.command_time, item.encoder_time, side="right") - 1
-    return np.where((index >= 0)[:, None], item.command[np.maximum(index, 0)], np.nan)
-
-
 def _frozen_encoder(item: Drive, robot: Robot) -> Iterator[Finding]:
     """Encoders that stand still while their motor works and the command asks the wheel to turn."""
     time = item.encoder_time
     asked = np.full((len(time), WHEELS), np.inf)
     if len(item.command_time):
-        asked = np.abs(_held(item) @ twist_to_wheels(robot, nominal=True).T)
+        asked = np.abs(item.command_at(item.encoder_time) @ twist_to_wheels(robot, nominal=True).T)
     for wheel, name in enumerate(robot.wheel_names):
         angle = item.position[:, wheel]
         if np.isnan(angle).all():

@@ -33,6 +33,11 @@ class Drive:
     start_ns: int = 0  # stamp of time 0
     notes: tuple[str, ...] = ()
 
+    def command_at(self, time: Array) -> Array:
+        """The command in force at some times [s], NaN before the first, (m, 3)."""
+        latest = np.searchsorted(self.command_time, time, side="right")
+        return np.concatenate([np.full((1, 3), np.nan), self.command])[latest]
+
     @property
     def duration(self) -> float:
         """From the first to the last encoder sample [s]."""

@@ -83,7 +83,8 @@ class Continuity:
         self._ahead.append((stamp_ns, 0))
 
     def precedes(self, stamp_ns: int) -> None:
-        """Take note of a message that is ignored: it repeats or precedes a stamp, or has none."""
+        """Take note of an ignored message: it repeats an earlier stamp or precedes one, or has
+        none."""
         if self._read > stamp_ns > 0:
             self._ahead.append((self._read, self._read - stamp_ns))
         else:
@@ -116,7 +117,8 @@ class Continuity:
         return self.is_silent(tick_ns) or tick_ns < self._until or self._is_disordered()
 
     def _is_disordered(self) -> bool:
-        """Whether hardly any of the last messages could be placed: each may be sent twice."""
+        """Whether hardly any of the last messages could be placed; repeats do not count, as some
+        robots send each message twice."""
         return 3 * sum(self._in_order) < len(self._in_order)
 
     def is_silent(self, tick_ns: int) -> bool:

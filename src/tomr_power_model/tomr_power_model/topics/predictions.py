@@ -51,7 +51,6 @@ class PredictionAssembler:
     """Puts the messages of one stamp together again; older unfinished ones are given up."""
 
     def __init__(self, robot: Robot) -> None:
-        self._robot = robot
         self._parts: dict[int, dict[str, Any]] = {}
         self._topics = prediction_topics(robot)
         self._supplies = _supply_topics(robot)

@@ -67,7 +67,7 @@ def additions_of(
     """
     best, last = found.best, found.rounds[-1].jacobian
     model = best.model
-    free = _free(jacobian, best.sensors)
+    free = _free(jacobian)
     columns = [jacobian.matrix[:, free], last.matrix[:, last.kept :]]
     units = units_of(model, best.sensors)[free]
     gram = _gram(columns, dataset.value - best.value, units, found.noise.weight)
@@ -89,7 +89,7 @@ def additions_of(
         yield Addition(item, gain, (after.mean[own] - before.mean[own]) * std)
 
 
-def _free(jacobian: Jacobian, sensors: Array) -> list[int]:
+def _free(jacobian: Jacobian) -> list[int]:
     """Columns of the best model but for nuisances that are held at the edge of their tolerance."""
     model = jacobian.model
     low, high = bounds(model.nuisances)

@@ -13,6 +13,7 @@ from rclpy.parameter_client import AsyncParameterClient
 
 from tomr_fault_diag.classifier.messages import NAME
 from tomr_fault_diag.classifier.messages import TOPIC as DIAGNOSTICS
+from tomr_fault_diag.diagnosis.labels import TRUTH_TOPIC
 from tomr_fault_diag.residuals.messages import TOPIC as RESIDUALS
 from tomr_fault_diag.residuals.messages import frame_of
 from tomr_power_model.errors import InputError
@@ -21,7 +22,6 @@ from tomr_power_model.nodes.stage_node import STAGE_QOS, run_node
 from tomr_power_model.robot import Robot, load_robot
 from tomr_sim_bridge.faults import all_parameters, check_settings, fault_ids
 from tomr_view.picture import Gatherer, Json, Status, described, fault_buttons
-from tomr_view.recording import TRUTH
 from tomr_view.server import Server
 
 PERIOD = 0.1  # s between two pictures
@@ -46,7 +46,7 @@ class ViewNode(Node):
         for topic, take in (
             (RESIDUALS, self._residuals),
             (DIAGNOSTICS, self._diagnosis),
-            (TRUTH, self._truth),
+            (TRUTH_TOPIC, self._truth),
         ):
             self._listen(topic, take)
         self._simulator = AsyncParameterClient(self, _SIMULATOR)
