@@ -29,16 +29,9 @@ def residuals(plant: Robot, believed: Robot) -> NDArray[np.float64]:
     phases = [TwistPhase((0.0, 0.0, 0.0), 1.0), *(TwistPhase(turn, 2.0) for turn in TURNS)]
     mission = Mission(
         name="flawed",
-        description="",
-        robot="",
-        command_rate=20.0,
-        repeat=1,
-        payload=0.0,
         floor_friction=0.8,
-        stamp_jitter=0.0,
         seed=3,
         phases=tuple(phases),
-        faults=(),
     )
     frames = simulated_drive(Drive(3, plant, believed, mission)).frames
     values = np.array([[item.residual for item in frame.residuals] for frame in frames])

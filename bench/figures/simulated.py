@@ -46,16 +46,8 @@ def plain_mission(name: str, phases: Sequence[TwistPhase | CirclePhase]) -> Miss
     """A drive of the robot as described, without load, faults or jitter."""
     return Mission(
         name=name,
-        description="",
-        robot=ROBOT,
-        command_rate=20.0,
-        repeat=1,
-        payload=0.0,
-        floor_friction=0.0,
-        stamp_jitter=0.0,
         seed=0,
         phases=tuple(phases),
-        faults=(),
     )
 
 

@@ -1,9 +1,8 @@
 """The drive to record for a commissioning: a mission file, and what to see to."""
 
-import yaml
-
 from tomr_power_model.effects.base import Phase
 from tomr_power_model.effects.missions import PAUSE, move, spin
+from tomr_power_model.files import plain_yaml
 from tomr_power_model.robot import Robot
 
 _GOLDEN = 137.508  # degrees: headings that never repeat
@@ -42,11 +41,4 @@ def mission_text(robot: Robot, top_speed: float) -> str:
         "description": "Headings, speeds, spins, starts, stops and rest.",
         "phases": phases,
     }
-    return yaml.dump(mission, Dumper=_Plain, sort_keys=False, default_flow_style=None)
-
-
-class _Plain(yaml.SafeDumper):
-    """Phases that occur again are written out."""
-
-    def ignore_aliases(self, data: object) -> bool:
-        return True
+    return plain_yaml(mission)

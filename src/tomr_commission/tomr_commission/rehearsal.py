@@ -160,16 +160,11 @@ def shoved_drive(robot: Robot, usage: Usage, plan: Rehearsal, seed: int) -> Driv
     )
     mission = Mission(
         name=f"rehearsal_{seed}",
-        description="",
-        robot="",
-        command_rate=20.0,
-        repeat=1,
         payload=float(random.uniform(0.0, plan.payload) * robot.mass),
         floor_friction=float(random.uniform(*plan.friction)),
         stamp_jitter=0.0005,
         seed=seed,
         phases=(_stop(1.0), phase, _stop(length)) if stands else (_stop(1.0), phase),
-        faults=(),
     )
     plant = every_value(
         robot, lambda value: float(value * random.uniform(1.0 - plan.off, 1.0 + plan.off))

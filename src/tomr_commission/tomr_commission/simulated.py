@@ -135,11 +135,6 @@ def simulated_fault(robot: str, usage: Usage, case: SimulatedCase, size: float) 
     phase = RandomPhase(_PHASES, usage.speed, usage.yaw_rate, (0.8, 1.2), 0.0)
     mission = Mission(
         name=kind.fault,
-        description="",
-        robot="",
-        command_rate=20.0,
-        repeat=1,
-        payload=0.0,
         floor_friction=0.8,
         stamp_jitter=0.0005,
         seed=case.seed,

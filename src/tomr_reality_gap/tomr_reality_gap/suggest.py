@@ -2,11 +2,10 @@
 
 from collections.abc import Sequence
 
-import yaml
-
 from tomr_power_model.effects import EFFECTS
 from tomr_power_model.effects.base import Phase
 from tomr_power_model.effects.missions import INERTIAL, PAUSE, STAND, VARIED
+from tomr_power_model.files import plain_yaml
 from tomr_reality_gap.explanation import Finding
 
 # What shows a wrong parameter, by the beginning of its key.
@@ -33,19 +32,8 @@ def suggested(findings: Sequence[Finding]) -> str:
                 "description": f"Distinguishes {names[0]} from {', '.join(names[1:])}.",
                 "phases": phases,
             }
-            return str(_Plain.dump(mission))
+            return plain_yaml(mission)
     return ""
-
-
-class _Plain(yaml.SafeDumper):
-    """Phases that two effects share are written out for each."""
-
-    def ignore_aliases(self, data: object) -> bool:
-        return True
-
-    @classmethod
-    def dump(cls, mission: object) -> object:
-        return yaml.dump(mission, Dumper=cls, sort_keys=False, default_flow_style=None)
 
 
 def _phases(name: str) -> Sequence[Phase]:

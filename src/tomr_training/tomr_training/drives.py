@@ -119,10 +119,7 @@ def _mission(believed: Robot, seed: int, kind: str | None, random: np.random.Gen
     payload = float(random.uniform(0.0, PAYLOAD) * believed.mass) if random.random() < 0.5 else 0.0
     return Mission(
         name=f"drive_{seed}",
-        description="",
-        robot="reference",
         command_rate=float(random.choice([10.0, 20.0, 50.0])),
-        repeat=1,
         payload=payload,
         floor_friction=float(random.uniform(0.6, 1.0)),
         stamp_jitter=float(random.choice([0.0, 0.0005, 0.001])),

@@ -102,3 +102,13 @@ def load_yaml(text: str, place: str) -> Any:
         line = f" line {mark.line + 1}:" if mark is not None else ""
         problem = getattr(error, "problem", None) or getattr(error, "reason", None) or "not YAML"
         raise InputError(f"{place}:{line} {problem}: mend the YAML") from None
+
+
+def plain_yaml(document: object) -> str:
+    """Text of a document, in order; what occurs again in it is written out again."""
+    return str(yaml.dump(document, Dumper=_Plain, sort_keys=False, default_flow_style=None))
+
+
+class _Plain(yaml.SafeDumper):
+    def ignore_aliases(self, data: object) -> bool:
+        return True

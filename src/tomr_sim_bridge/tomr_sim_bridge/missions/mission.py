@@ -48,16 +48,16 @@ class Mission:
     """A mission as its file describes it."""
 
     name: str
-    description: str
-    robot: str
-    command_rate: float  # Hz
-    repeat: int
-    payload: float  # kg
-    floor_friction: float  # 0: that of the robot
-    stamp_jitter: float  # s
-    seed: int  # of random phases, -1: that of the run
     phases: tuple[Phase, ...]
-    faults: tuple[PlannedFault, ...]
+    faults: tuple[PlannedFault, ...] = ()
+    description: str = ""
+    robot: str = "reference"
+    command_rate: float = 20.0  # Hz
+    repeat: int = 1
+    payload: float = 0.0  # kg
+    floor_friction: float = 0.0  # 0: that of the robot
+    stamp_jitter: float = 0.0  # s
+    seed: int = -1  # of random phases, -1: that of the run
 
     def plan(self, robot: Robot, seed: int = 0) -> "Plan":
         """Turn the phases into pieces with a duration each."""
