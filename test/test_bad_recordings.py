@@ -152,7 +152,7 @@ BAD: dict[str, tuple[Callable[[list[Raw], Path], Path], list[str]]] = {
         ["tables", "damaged", "record it again"],
     ),
     "no joint_states": (_of(_without("/joint_states")), ["no joint_states", "holds /battery"]),
-    "no power": (_of(_without(*POWER)), ["none of battery_state, wheel_1/power", "robot.yaml"]),
+    "no power": (_of(_without(*POWER)), ["none of wheel_1/power", "robot.yaml"]),
     "power elsewhere": (
         _of(lambda drive: _without("/battery_state")(list(_renamed("wheel_", "motor_")(drive)))),
         ["wheel_1/power", "/motor_1/power", "robot.yaml"],

@@ -14,6 +14,7 @@ from attrs import frozen
 from tomr_fault_diag.cli.diagnose import main
 from tomr_power_model.messages.bag import jazzy_typestore
 from tomr_power_model.recordings import RecordingWriter, open_recording
+from tomr_power_model.robot.files import robot_file
 
 BAGS = Path(__file__).parents[1] / "bags"
 FAULTY, HEALTHY = BAGS / "circle_encoder_lost", BAGS / "square"
@@ -93,10 +94,11 @@ def test_labels_score_recordings(tmp_path: Path, capsys: pytest.CaptureFixture[s
     path = tmp_path / "labels.csv"
     path.write_text(
         "bag,state,wheel,onset,end\n"
-        f"{FAULTY.name},motor system fault,3,8.0,14.0\n{HEALTHY.name},,,,\n"
+        f"{FAULTY.name},motor system fault,3,8.0,14.0\n{HEALTHY.name},,,,\nnosuchbag,,,,\n"
     )
-    code, found, _ = run(capsys, FAULTY, HEALTHY, "--labels", path)
+    code, found, notes = run(capsys, FAULTY, HEALTHY, "--labels", path)
     assert code == 1
+    assert "none of the recordings is nosuchbag" in notes
     scores = found["scores"]
     assert scores["false_alarms"]["count_by_phase"] == [0]
     motor = scores["faults"]["motor system fault"]
@@ -197,7 +199,45 @@ UNDECIDED: dict[str, tuple[Callable[[], Iterable[_Raw]], str]] = {
     ),
     "no stamps": (lambda: _restamped(lambda stamp: 0), "has no stamp"),
     "too short": (lambda: _drive()[:20], "ends before the first decision"),
+    "at rest": (
+        lambda: (raw for raw in _drive() if raw.stamp_ns < _drive()[0].stamp_ns + 900_000_000),
+        "the robot stands still throughout",
+    ),
+    "commands with a clock that is behind": (
+        lambda: _restamped(lambda stamp: stamp - 200_000_000, "/cmd_vel"),
+        "cmd_vel comes 0.20 s later after its stamps than joint_states",
+    ),
 }
+
+
+def test_commands_that_act_as_late_as_described_are_waited_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag, robot = tmp_path / "bag", tmp_path / "robot.yaml"
+    with RecordingWriter(bag) as writer:
+        for raw in _restamped(lambda stamp: stamp - 200_000_000, "/cmd_vel"):
+            writer.write_raw(raw.topic, raw.type_name, raw.data, raw.stamp_ns)
+    text = robot_file("reference").read_text()
+    robot.write_text(text.replace("    controller:\n", "    controller:\n      delay: 0.2\n"))
+    code, found, notes = run(capsys, bag, "--robot", robot)
+    assert code == 0
+    assert found["shares"]["normal"] > 0.7
+    assert "cmd_vel comes 0.20 s later" in notes
+
+
+def test_power_topics_that_are_called_otherwise_are_bad_input(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = tmp_path / "bag"
+    with RecordingWriter(bag) as writer:
+        for raw in _drive():
+            topic = raw.topic.replace("/wheel_", "/motor_")
+            writer.write_raw(topic, raw.type_name, raw.data, raw.stamp_ns)
+    assert main([str(bag)]) == 2
+    line = capsys.readouterr().err
+    assert "none of wheel_1/power, wheel_2/power, wheel_3/power" in line
+    assert "set measurement.source: total_only" in line
+    assert "/motor_1/power" in line
 
 
 @pytest.mark.parametrize("case", UNDECIDED)

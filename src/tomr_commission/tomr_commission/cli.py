@@ -102,14 +102,19 @@ def _request(options: argparse.Namespace) -> CommissionRequest:
 def _commission(options: argparse.Namespace) -> int:
     request = _request(options)
     # What follows takes seconds to import: --help does without.
-    from tomr_commission.commission import commission, write_results
+    from tomr_commission.commission import STEPS, commission, write_results
     from tomr_commission.report.page import page
     from tomr_commission.report.plain import as_json, lines
     from tomr_reality_gap.progress import progress_bar
 
     with progress_bar(options.quiet) as progress:
         say = (lambda reasons: None) if options.quiet else _said_early
-        found = commission(request, progress, say)
+        try:
+            found = commission(request, progress, say)
+        except KeyboardInterrupt:
+            if not options.quiet and (options.out / STEPS).is_dir():
+                print(f"{options.out}: the same command goes on from here", file=sys.stderr)
+            raise
     texts = {"commission.html": page(found), "commission.json": as_json(found)}
     written = write_results(found, texts)
     if not options.quiet:

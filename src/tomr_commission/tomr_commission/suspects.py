@@ -186,13 +186,11 @@ def check_values(drive: Drive, values: Mapping[str, object], place: str) -> None
         for error, (key, factor) in zip(others, tried, strict=True)
         if error < _ALIKE * least
     )
-    _, key, factor = alike[0]
-    rivals = [f"{_VALUES[other]} {_times(size)}" for _, other, size in alike[1:]]
-    more = f" (hardly worse: {', '.join(rivals)})" if rivals else ""
+    suspects = " or ".join(f"{_VALUES[key]} {_times(factor)}" for _, key, factor in alike)
+    checks = " and ".join(f"{key} = {values[key]}" for _, key, _ in alike)
     raise InputError(
-        f"{place}: {_VALUES[key]} seems {_times(factor)} what is described: simulated power is "
-        f"{100 * described:.0f} % off as described, {100 * least:.0f} % so{more}: check {key} = "
-        f"{values[key]}"
+        f"{place}: {suspects} what is described: simulated power is {100 * described:.0f} % off "
+        f"as described, {100 * least:.0f} % so: check {checks}"
     )
 
 

@@ -143,7 +143,7 @@ def test_scores_of_phases_count_each_recording_once() -> None:
     assert found["faults"]["all"]["count"] == 4
     assert found["faults"]["slip"]["found"]["share"] == 1.0
     assert found["faults"]["slip"]["found"]["ci95"][0] == pytest.approx(0.025**0.25, abs=1e-4)
-    assert found["faults"]["slip"]["delay_s"]["median"] == 0.3
+    assert found["faults"]["slip"]["delay_s"]["median"] == 0.25  # between both phases
 
 
 @pytest.mark.parametrize(

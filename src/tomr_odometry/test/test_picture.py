@@ -1,6 +1,7 @@
 """What the picture of a drive shows."""
 
 import numpy as np
+import pytest
 from odometry_drives import drive, play
 
 from tomr_odometry.grip import Grid
@@ -10,6 +11,7 @@ from tomr_odometry.summary import estimated_path
 from tomr_power_model.canvas import sheet
 
 
+@pytest.mark.filterwarnings("error")
 def test_the_whole_of_each_path_is_seen_whatever_was_learnt_of_the_floor() -> None:
     items = list(play(drive(length=2.0)))[::20]
     ours = estimated_path(items)

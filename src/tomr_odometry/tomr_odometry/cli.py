@@ -30,6 +30,7 @@ _EPILOG = """\
 examples:
   tomr_odometry drive --robot my_robot.yaml --out corrected
   tomr_odometry drive --robot my_robot.yaml --out corrected --reference ground_truth/odom
+  tomr_odometry learn lab1 lab2 --robot my_robot.yaml --reference map_pose --out learnt
 
 OUT/bag holds odom_slip (nav_msgs/Odometry), slip (JointState: slip ratios as positions, sliding
 [m/s] as velocities, traction [N] as efforts) and /diagnostics; OUT/odometry.json and

@@ -384,7 +384,10 @@ class SlipOdometry:
         if "imu/data" in missing and self._by_power.is_at_work:
             found.append("wheels slide as the motors' power shows: less surely than an IMU would")
         elif "imu/data" in missing:
-            found.append("wheels do not slide: without an IMU and power nothing shows that they do")
+            found.append(
+                "wheels do not slide: to show that takes an IMU, or cmd_vel and the power of two "
+                "motors, with its sign"
+            )
         return tuple(found)
 
     def _learnt(self) -> tuple[tuple[str, float], ...]:

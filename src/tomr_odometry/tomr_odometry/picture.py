@@ -87,10 +87,11 @@ def _draw_slip(over_time: Axes, robot: Robot, items: Sequence[Estimate]) -> None
 def _show_paths(plane: Axes, points: Array) -> None:
     """All points of the paths, (n, 2), however far ellipses and cells of the floor reach."""
     low, high = points.min(axis=0), points.max(axis=0)
-    margin = _MARGIN * max(float((high - low).max()), SIDE)
-    plane.set_xlim(low[0] - margin, high[0] + margin)
-    plane.set_ylim(low[1] - margin, high[1] + margin)
-    plane.set_aspect("equal", adjustable="datalim")
+    half = (0.5 + _MARGIN) * max(float((high - low).max()), SIDE)
+    (x, y) = 0.5 * (low + high)
+    plane.set_xlim(x - half, x + half)
+    plane.set_ylim(y - half, y + half)
+    plane.set_aspect("equal", adjustable="box")
 
 
 def _draw_floor(plane: Axes, floor: Grid) -> None:

@@ -1,6 +1,8 @@
 """Calibration on drives whose truth is known: values, intervals, what is not determined."""
 
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from scipy.ndimage import maximum_filter1d
 
 from tomr_power_model.calibration.calibrate import Result, Timing, align, calibrate
 from tomr_power_model.calibration.fit import fit
+from tomr_power_model.calibration.identify import warnings_of
 from tomr_power_model.calibration.parameters import Choice, choose
 from tomr_power_model.calibration.problem import Problem, determined, modelled_power
 from tomr_power_model.calibration.samples import Samples, samples_of
@@ -209,6 +212,16 @@ def test_what_the_drives_do_not_determine_is_said(make_drive: MakeDrive) -> None
     assert any(
         "robot.inertia_z: not determined" in line and "spins" in line for line in result.warnings
     )
+
+
+def test_what_is_not_determined_and_yet_far_off_is_no_value_to_stay_with() -> None:
+    (mass,) = choose(VALUES, ROBOT.wheel_names, Choice(keys=("robot.mass",)), "test")
+    uncertainty = SimpleNamespace(shrinkage=[0.9], correlation=np.eye(1))
+    for off, words in ((1.0, "stays near the description"), (5.0, "run tomr_gap explain")):
+        number = mass.prior_mean + off * mass.prior_std
+        fitted: Any = SimpleNamespace(uncertainty=uncertainty, numbers=[number], converged=True)
+        (line,) = warnings_of([mass], fitted, ROBOT.wheel_names)
+        assert words in line
 
 
 def test_motor_currents_without_sign_and_total_power_alone(make_drive: MakeDrive) -> None:

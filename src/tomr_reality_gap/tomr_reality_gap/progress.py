@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from shutil import get_terminal_size
 
 from tqdm import tqdm
 
@@ -14,7 +15,12 @@ _FORMAT = "{desc:<20} {percentage:3.0f} % {bar} {elapsed}"
 def progress_bar(quiet: bool) -> Iterator[Progress]:
     """Progress on a terminal; nothing in a pipe or where quiet is asked for."""
     with tqdm(
-        total=1.0, bar_format=_FORMAT, leave=False, delay=0.5, disable=True if quiet else None
+        total=1.0,
+        bar_format=_FORMAT,
+        leave=False,
+        delay=0.5,
+        disable=True if quiet else None,
+        ncols=get_terminal_size().columns - 1,  # some terminals say 0
     ) as bar:
 
         def show(stage: str, part: float) -> None:

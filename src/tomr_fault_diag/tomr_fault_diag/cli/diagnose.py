@@ -144,6 +144,9 @@ def _tasks(options: argparse.Namespace) -> list[Task]:
         raise InputError(f"--out {options.out}: give one recording with it, not {len(bags)}")
     is_file = options.labels and options.labels != RECORDED
     labels = load_labels(Path(options.labels)) if is_file else Labels(())
+    strangers = labels.strangers(bags)
+    if strangers:
+        _report(f"note: --labels: none of the recordings is {', '.join(strangers)}")
     pages: Sequence[Path | None] = [None] * len(bags)
     if options.html is not None:
         make_folder(options.html)  # before hours of work

@@ -11,6 +11,7 @@ from tomr_power_model.messages.intake import header_stamp_ns
 from tomr_power_model.messages.plain import NANOSECONDS
 
 _APART = NANOSECONDS  # stamps of two inputs that have no time in common
+_OUT_OF_STEP = 0.1  # s, between commands and encoders, of which diagnoses suffer
 
 
 @define
@@ -20,7 +21,8 @@ class Stream:
     first: Any = None
     last: Any = None
     count: int = 0
-    last_ns: int = 0  # receive stamp
+    first_ns: int = 0  # receive stamps
+    last_ns: int = 0
     silence_ns: int = 0  # longest time without a message
 
     @property
@@ -28,6 +30,15 @@ class Stream:
         """Header stamps of the first message and the last, None where there is none."""
         first, last = header_stamp_ns(self.first), header_stamp_ns(self.last)
         return (first, last) if first and last else None
+
+    @property
+    def late_s(self) -> float | None:
+        """How long after its stamp the first message came, or the last one if that is less [s];
+        None without stamps."""
+        stamps = self.stamps_ns
+        if stamps is None:
+            return None
+        return min(self.first_ns - stamps[0], self.last_ns - stamps[1]) / NANOSECONDS
 
 
 @define
@@ -40,7 +51,8 @@ class Heard:
         """Count a message."""
         stream = self.streams.get(topic)
         if stream is None:
-            stream = self.streams[topic] = Stream(message, last_ns=receive_ns)
+            stream = Stream(message, first_ns=receive_ns, last_ns=receive_ns)
+            self.streams[topic] = stream
         stream.count += 1
         silence = receive_ns - stream.last_ns
         if silence > stream.silence_ns:
@@ -63,7 +75,7 @@ def why_undecided(
     silent = [topic for topic in wanted if topic not in heard.streams and topic != "imu/data"]
     if silent:
         return f"no {', '.join(dict.fromkeys(silent))} in the recording"
-    clocks = _backwards(heard) or _apart(heard)
+    clocks = _backwards(heard) or _apart(heard) or out_of_step(heard)
     if clocks:
         return clocks
     for (topic, problem), count in sorted(complaints.items(), key=lambda item: -item[1]):
@@ -80,6 +92,23 @@ def _backwards(heard: Heard) -> str:
     spans = [(name, stream.stamps_ns) for name, stream in heard.streams.items()]
     names = [name for name, span in spans if span is not None and span[1] < span[0]]
     return f"the stamps of {', '.join(sorted(names))} run backwards" if names else ""
+
+
+def out_of_step(heard: Heard) -> str:
+    """What to see to where commands reach the recording sooner or later after their stamps than
+    the encoders do; empty where they do not, or are not stamped."""
+    commands, encoders = (
+        heard.streams[name].late_s if name in heard.streams else None
+        for name in ("cmd_vel", "joint_states")
+    )
+    if commands is None or encoders is None or abs(commands - encoders) < _OUT_OF_STEP:
+        return ""
+    names = ("cmd_vel", "joint_states") if commands > encoders else ("joint_states", "cmd_vel")
+    return (
+        f"{names[0]} comes {abs(commands - encoders):.2f} s later after its stamps than "
+        f"{names[1]}: clocks differ, or messages are held up: synchronise the clocks, or describe "
+        "how late commands act as controller.delay (tomr_gap check finds it)"
+    )
 
 
 def _apart(heard: Heard) -> str:

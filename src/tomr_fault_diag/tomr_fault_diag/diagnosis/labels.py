@@ -149,6 +149,11 @@ class Labels:
         found = [label for label in self._labels if _ends_with(parts, label.bag)]
         return tuple(found) if found else None
 
+    def strangers(self, bags: Iterable[Path]) -> list[str]:
+        """Names of which none of the recordings is one."""
+        known = {label for bag in bags for label in self.of(bag) or ()}
+        return sorted({label.bag for label in self._labels} - {label.bag for label in known})
+
 
 def _ends_with(parts: Sequence[str], name: str) -> bool:
     wanted = Path(name).parts

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from tomr_fault_diag.diagnosis.pipeline import Pipeline, Step
+from tomr_power_model.drive.sources import TOTAL_TOPIC
 from tomr_power_model.errors import InputError
 from tomr_power_model.recordings import Recording
 from tomr_power_model.topics.inputs import Input
@@ -24,10 +25,13 @@ def find_topics(
         topic: item.topic for topic, item in recorded_inputs(recording, inputs, namespace).items()
     }
     power = {item.topic for item in inputs} - {"joint_states", "cmd_vel", "imu/data"}
-    if power and not power & set(found.values()):
+    motors = power - {TOTAL_TOPIC} or power
+    if motors and not motors & set(found.values()):
+        alone = ": set measurement.source: total_only" if TOTAL_TOPIC in found.values() else ""
         raise InputError(
-            f"{recording.path}: none of {', '.join(sorted(power))}: are the wheels named "
-            f"otherwise in robot.yaml? The recording holds {', '.join(recording.topics)}"
+            f"{recording.path}: none of {', '.join(sorted(motors))}: are the wheels named "
+            f"otherwise in robot.yaml, or is only the whole robot's power known{alone}? The "
+            f"recording holds {', '.join(recording.topics)}"
         )
     return found
 

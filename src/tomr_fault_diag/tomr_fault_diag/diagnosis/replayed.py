@@ -13,12 +13,13 @@ from attrs import evolve, field, frozen
 from tomr_fault_diag.classifier.commissioned import commissioned_words
 from tomr_fault_diag.classifier.messages import diagnosis_message, evidence_of
 from tomr_fault_diag.classifier.stage import Diagnosis
-from tomr_fault_diag.diagnosis.heard import Heard, Stream, why_undecided
+from tomr_fault_diag.classifier.states import WAITING
+from tomr_fault_diag.diagnosis.heard import Heard, Stream, out_of_step, why_undecided
 from tomr_fault_diag.diagnosis.labels import Label, recorded_labels
 from tomr_fault_diag.diagnosis.offline import replay
 from tomr_fault_diag.diagnosis.pipeline import Pipeline, Step
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
-from tomr_fault_diag.diagnosis.summary import Summariser, Summary
+from tomr_fault_diag.diagnosis.summary import LACKING, Summariser, Summary
 from tomr_fault_diag.diagnosis.track import Track, Tracker
 from tomr_power_model.errors import InputError
 from tomr_power_model.files import make_folder, write_text
@@ -133,10 +134,14 @@ def replay_one(task: Task, progress: Progress | None = None) -> Replayed:
         start_ns, end_ns = recording.start_ns, recording.end_ns
     first = listeners[0].pipeline
     phases = tuple(item.phase(share) for item, share in zip(listeners, shares, strict=True))
-    complaints, undecided = first.complaints.counts, ""
-    if not any(phase.summary.is_decided for phase in phases):
+    complaints, undecided, clocks = first.complaints.counts, "", out_of_step(heard)
+    # Commands that come too late for their ticks leave the robot waiting for them.
+    lacking = LACKING | {WAITING.name} if clocks else LACKING
+    if not any(phase.summary.is_decided(lacking) for phase in phases):
         wanted = [item.topic for item in first.inputs]
         undecided = why_undecided(heard, wanted, complaints, phases[0].summary)
+    elif clocks:
+        notes = (*notes, clocks)
     for stream in heard.streams.values():
         stream.first = stream.last = None  # messages need not travel between processes
     found = Replayed(task, start_ns, end_ns, phases, heard.streams, notes, complaints, undecided)

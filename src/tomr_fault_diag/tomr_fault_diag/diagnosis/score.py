@@ -243,7 +243,7 @@ def delays(values: Sequence[float], phases: int = 1) -> dict[str, Any]:
 
     median, late = quantile(0.5), quantile(0.95)
     return {
-        "median": median[0],
+        "median": _finite(np.median(ordered)),
         "median_ci95": median[1:],
         "p95": late[0],
         "p95_ci95": late[1:],

@@ -1,6 +1,7 @@
 """What a whole recording amounts to: shares of states, and the episodes of each."""
 
 from collections import Counter
+from collections.abc import Collection
 
 from attrs import evolve, field, frozen
 
@@ -14,9 +15,13 @@ from tomr_fault_diag.classifier.states import (
     WAITING,
 )
 from tomr_fault_diag.residuals.frame import RESIDUALS, ResidualFrame
+from tomr_power_model.model.ticks import to_ns
 
 # States in which nothing was decided, not even that all is well.
 UNDECIDED = frozenset({NOT_OBSERVABLE.name, STALE.name, WAITING.name, NOT_ENOUGH.name})
+# Of these, the ones in which data was missing that should have been there.
+LACKING = frozenset({STALE.name, NOT_ENOUGH.name})
+_LEAST_NS = to_ns(1.0)  # every start at rest is called normal for a moment
 
 
 @frozen
@@ -58,10 +63,15 @@ class Summary:
         """Whether anything was named that is wrong."""
         return any(name not in FAULTLESS for name in self.shares)
 
-    @property
-    def is_decided(self) -> bool:
-        """Whether anything at all was said of the robot."""
-        return any(name not in UNDECIDED for name in self.shares)
+    def is_decided(self, lacking: Collection[str] = LACKING) -> bool:
+        """Whether enough was said of the robot: a fault, or for a second at least, and for longer
+        than `lacking` states stood, that all is well."""
+        stood: Counter[str] = Counter()
+        for episode in self.episodes:
+            stood[episode.state] += episode.end_ns - episode.start_ns
+        decided = sum(time for name, time in stood.items() if name not in UNDECIDED)
+        missed = sum(stood[name] for name in lacking)
+        return self.has_fault or decided >= max(_LEAST_NS, missed)
 
     @property
     def faults(self) -> tuple[Episode, ...]:

@@ -108,7 +108,7 @@ def score_lines(scores: dict[str, Any]) -> Iterator[str]:
         low, high = alarms["ci95_per_hour"]
         yield (
             f"false alarms: {alarms['per_hour']:g} per hour (95 %: {low:g} to {high:g}), "
-            f"{'/'.join(map(str, alarms['count_by_phase']))} in {alarms['hours']:.3f} h"
+            f"{' and '.join(map(str, alarms['count_by_phase']))} in {alarms['hours']:.3f} h"
         )
         for state, count in alarms["states"].items():
             yield f"{count:6d}  {state}"

@@ -141,7 +141,7 @@ class ResidualStage:
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
             if not self._encoders.add(EncoderSample(stamp_ns, position, velocity)):
                 self._encoders.continuity.refuse()
-                return "no wheel can turn so far so fast; the sample is ignored"
+                return "by robot.yaml no wheel can turn so far so fast; the sample is ignored"
         else:
             self._encoders.continuity.precedes(stamp_ns)
         return arrival
@@ -308,7 +308,7 @@ class ResidualStage:
         return self._drawn(wheel, measured, absent, NO_COMMAND)
 
     def _derived(self, wheel: int, measured: Measured, absent: str) -> Residual:
-        unmodelled = "no fresh joint_states for the model"
+        unmodelled = "the model has no motion of the encoders, or no fresh cmd_vel"
         return self._drawn(WHEELS + 1 + wheel, measured, absent, unmodelled)
 
     def _drawn(self, place: int, measured: Measured, absent: str, unmodelled: str) -> Residual:

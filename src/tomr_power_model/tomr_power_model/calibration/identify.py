@@ -12,11 +12,14 @@ from tomr_power_model.estimation.parameter import Parameter
 HARDLY = 0.5  # of the prior's deviation is left: the value counts as not determined
 _TOGETHER = 0.95  # correlation
 _AT_BOUND = 1e-3  # prior standard deviations
+_FAR = 3.0  # prior standard deviations
 
 
 def warnings_of(parameters: Sequence[Parameter], fitted: Fit, wheels: Sequence[str]) -> list[str]:
     """One line per kind of value that the data do not determine, with the drive that would."""
-    at_end, open_ones = [], []
+    at_end: list[Parameter] = []
+    open_ones: list[Parameter] = []
+    strayed: list[Parameter] = []
     for item, shrinkage, number in zip(
         parameters, fitted.uncertainty.shrinkage, fitted.numbers, strict=True
     ):
@@ -24,7 +27,8 @@ def warnings_of(parameters: Sequence[Parameter], fitted: Fit, wheels: Sequence[s
         if number - item.lower < near or item.upper - number < near:
             at_end.append(item)
         elif shrinkage > HARDLY:
-            open_ones.append(item)
+            far = abs(number - item.prior_mean) > _FAR * item.prior_std
+            (strayed if far else open_ones).append(item)
     found = [
         f"{name} is at the end of its range: the drives do not show it, or other physics is missing"
         for name, _ in _by_kind(at_end, wheels)
@@ -33,6 +37,11 @@ def warnings_of(parameters: Sequence[Parameter], fitted: Fit, wheels: Sequence[s
         f"{name}: not determined, it stays near the description. To determine it: "
         f"{drive_for(general)}"
         for name, general in _by_kind(open_ones, wheels)
+    ]
+    found += [
+        f"{name}: not determined, and yet far from the description: something else that it holds "
+        "is wrong, as a gear ratio or a radius, or physics is missing: run tomr_gap explain"
+        for name, _ in _by_kind(strayed, wheels)
     ]
     found += _pairs(parameters, fitted, wheels)
     if not fitted.converged:

@@ -85,6 +85,7 @@ class PowerPredictor:
             given.encoder_window, given.ticks.period, given.stale, fastest_wheel(robot)
         )
         self._commands = Continuity(COMMAND_TOLERANCE)
+        self._delay = to_ns(robot.controller.delay)
         self._health = InputReporter()
         self._window = to_ns(robot.sensors.power_window)
         self._reads_motor = robot.measurement.quantity == "motor_current"
@@ -109,7 +110,7 @@ class PowerPredictor:
         self._given: tuple[int, Triple] | None = None  # the newest command
         self._intervals: deque[int] = deque(maxlen=_INTERVALS)  # of the commands [ns]
         self._begun: int | None = None  # the first tick, in motion, of which not all is known
-        self._losses: deque[int] = deque()  # stamps of commands before which one was lost
+        self._losses: deque[int] = deque()  # when commands act [ns] before which one was lost
         self._heading = 0.0  # at the start of the next tick, against the first [rad]
         self._model.clear()
         self._stamps: list[deque[tuple[int]]] = [deque() for _ in range(WHEELS + 1)]
@@ -121,9 +122,9 @@ class PowerPredictor:
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
             self._look_for_losses(stamp_ns, twist)
             self._path.command(stamp_ns, twist)
-            self._commands.take(stamp_ns)
+            self._commands.take(stamp_ns + self._delay)  # a pause counts from when it acts on
         elif arrival is Arrival.REPEATED:
-            self._commands.precedes(stamp_ns)
+            self._commands.precedes(stamp_ns + self._delay)
         return arrival
 
     def _look_for_losses(self, stamp_ns: int, twist: Triple) -> None:
@@ -133,7 +134,7 @@ class PowerPredictor:
             interval, known = stamp_ns - before, self._intervals
             is_late = len(known) == _INTERVALS and interval > _LOST * median(known)
             if is_late and twist != same:
-                self._losses.append(stamp_ns)
+                self._losses.append(stamp_ns + self._delay)
             known.append(interval)
         self._given = stamp_ns, twist
 

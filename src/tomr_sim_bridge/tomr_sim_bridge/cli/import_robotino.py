@@ -26,7 +26,7 @@ EPILOG = """\
 examples:
   tomr_import_robotino datasets.tar.gz --out robotino_bags
   tomr_import_robotino datasets --out gray_bags --surface gray
-  tomr_diagnose robotino_bags/gray/exp05 --robot robotino_v2
+  tomr_diagnose robotino_bags/gray/exp05 --robot robotino_v2_gray
 
 The data set is BrOleg5/research-wheel-slippage on GitHub (Apache-2.0), folder `datasets`.
 
