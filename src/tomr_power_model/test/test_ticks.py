@@ -1,5 +1,6 @@
 """The grid of decisions: what it waits for, what it refuses, when it starts afresh."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -80,6 +81,23 @@ def test_sparse_streams_are_not_waited_for() -> None:
     clock.arrive("commands", BASE + 20 * MS, periodic=False)
     clock.arrive("a", BASE + 80 * MS)
     assert _ms(clock) == [50]
+
+
+@pytest.mark.parametrize("ahead", [0, 15, 400, 900])
+def test_commands_that_are_ahead_do_not_leave_the_sensors_behind(ahead: int) -> None:
+    """Every tick has the samples up to it; ticks go on where sensors die and commands do not."""
+    clock, early = TickClock(SETTINGS), []
+    for at in range(0, 6000, 10):
+        if at % 50 == 0:
+            clock.arrive("commands", BASE + (at + ahead) * MS, periodic=False)
+        if at < 4000:
+            clock.arrive("a", BASE + (at + 5) * MS)
+            clock.arrive("b", BASE + at * MS)
+        early += [(tick, at) for tick in _ms(clock)]
+    late = [(tick, at) for tick, at in early if 1500 < at < 4000]
+    assert len(late) >= 49
+    assert all(tick <= at for tick, at in late)
+    assert 5700 <= early[-1][0] <= 6000
 
 
 def test_refused_stamps() -> None:

@@ -6,6 +6,8 @@ not depend on the order in which topics happen to arrive. It is given as soon as
 - every live periodic stream has a stamp at or past t_k, and some stream is `settle` past it,
   which leaves sparse streams (commands) that long to arrive; or
 - some stream is `patience` past it: a stream that silent is not live and not waited for.
+
+Commands that are always ahead of the periodic streams, by another clock, count by so much less.
 """
 
 import math
@@ -18,6 +20,7 @@ from attrs import frozen
 
 NANOSECONDS = 1_000_000_000
 NEVER = -3600 * NANOSECONDS  # before any stamp: a simulated clock begins at 0
+_SLOWLY = 50  # samples over which a larger lead of the commands is believed
 
 
 def to_ns(seconds: float) -> int:
@@ -73,6 +76,7 @@ class TickClock:
         self._newest: dict[str, int] = {}
         self._periodic: set[str] = set()
         self._watermark = 0
+        self._lead = 0
         self._resumed = 0  # stamp at which all streams went on after a silence
         self._next = 0  # stamp of the next tick, 0: not started
 
@@ -92,16 +96,28 @@ class TickClock:
         self._newest[stream] = stamp_ns
         if periodic:
             self._periodic.add(stream)
+            self._measure_lead()
+        else:
+            ahead -= self._lead
         if ahead > self.settings.period:
             self._resumed = stamp_ns
         if ahead > 0:
-            self._watermark = stamp_ns
+            self._watermark += ahead
         return Arrival.TAKEN
+
+    def _measure_lead(self) -> None:
+        """How far the others are ahead of the periodic streams: commands whose clock is ahead, or
+        that come sooner, say nothing of the time that has passed. Less counts at once."""
+        latest = max(self._newest[name] for name in self._periodic)
+        others = [stamp for name, stamp in self._newest.items() if name not in self._periodic]
+        lead = max(0, max(others, default=latest) - latest)
+        self._lead = min(lead, self._lead + (lead - self._lead) // _SLOWLY)
 
     def _start(self, stream: str, stamp_ns: int, periodic: bool) -> None:
         self._newest = {stream: stamp_ns}
         self._periodic = {stream} if periodic else set()
         self._watermark = self._resumed = stamp_ns
+        self._lead = 0  # ns
         period, phase = self.settings.period, self.settings.phase
         self._next = ((stamp_ns - phase) // period + 1) * period + phase
 
