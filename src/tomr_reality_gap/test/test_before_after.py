@@ -132,3 +132,18 @@ def test_maps_show_before_and_after_by_bin() -> None:
     )
     np.testing.assert_allclose(found.before[0], [1.0] * 6 + [9.0] * 6, atol=0.1)
     np.testing.assert_allclose(found.after[0], np.ones(12))
+
+
+def test_maps_take_a_channel_of_all_recordings_together() -> None:
+    """The first shows a residual where it is slow, the second one where it is fast."""
+    speed = np.linspace(0.0, 9.0, 1000)
+    slow, fast = np.where(speed > 4.5, 1.0, 3.0), np.where(speed > 4.5, 3.0, 1.0)
+    (found,) = maps_of(
+        [_power(1000), _power(1000)],
+        np.concatenate([slow, fast]),
+        np.ones(2000),
+        np.ones(2000),
+        variables={"speed [rad/s]": np.tile(speed, 2)},
+    )
+    assert found.channels == ("wheel_1/power",)
+    np.testing.assert_allclose(found.before[0], 5.0, atol=0.2)

@@ -181,6 +181,7 @@ def test_a_concealed_friction_and_a_late_command_are_named(tmp_path: Path, robot
     assert held.sigma == fitted.sigma  # the sensors', not what is left of each drive
 
 
+@pytest.mark.timeout(600)  # three recordings of the real robot, on a busy machine
 def test_the_rollers_of_the_real_robot_drag_on_its_floor(tmp_path: Path) -> None:
     """Wheels that turned freely on the bench: the floor adds most of the current."""
     dataset = default_dataset()

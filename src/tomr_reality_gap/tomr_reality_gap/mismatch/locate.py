@@ -121,26 +121,26 @@ def maps_of(
     *,
     variables: Mapping[str, Array],
 ) -> tuple[Map, ...]:
-    """Mean squares of whitened residuals over each variable, before and after."""
-    kept = [
-        (channel, part)
-        for channel, part in zip(channels, rows_of(channels), strict=True)
-        if channel.kind in DRAWN_KINDS
-    ]
+    """Mean squares of whitened residuals over each variable, before and after: of each channel in
+    all recordings together."""
+    kept: dict[str, Array] = {}  # rows of each channel
+    for channel, part in zip(channels, rows_of(channels), strict=True):
+        if channel.kind in DRAWN_KINDS:
+            own = np.arange(part.start, part.stop)
+            kept[channel.name] = np.append(kept.get(channel.name, own[:0]), own)
     maps = []
     for name, values in variables.items():
-        known = np.concatenate([values[part] for _, part in kept])
+        known = values[np.concatenate(list(kept.values()))] if kept else values[:0]
         known = known[np.isfinite(known)]
         if not len(known) or np.ptp(known) <= 0.0:
             continue
         low, high = float(np.quantile(known, 0.005)), float(np.quantile(known, 0.995))
         edges = np.linspace(low, high, _BINS + 1)
         rows = [
-            [_binned(values[part], (left[part] / sigma[part]) ** 2, edges) for _, part in kept]
+            [_binned(values[own], (left[own] / sigma[own]) ** 2, edges) for own in kept.values()]
             for left in (before, after)
         ]
-        names = tuple(channel.name for channel, _ in kept)
-        maps.append(Map(name, edges, names, np.array(rows[0]), np.array(rows[1])))
+        maps.append(Map(name, edges, tuple(kept), np.array(rows[0]), np.array(rows[1])))
     return tuple(maps)
 
 
