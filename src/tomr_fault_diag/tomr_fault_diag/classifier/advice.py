@@ -16,7 +16,8 @@ CHECKS: Mapping[str, str] = {
     "power sensor fault": "the power sensor's plug and its bus; the motor itself may be well",
     "external load": "what the robot pushes or tows, and what leans on it",
     "does not follow its commands": "e-stop, contactor, the drivers' supply, a collision monitor "
-    "between cmd_vel and the drivers; where it moves, who else commands it, and the base's limits",
+    "between cmd_vel and the drivers; where it moves, who else commands it, and the base's limits; "
+    "of a robot that was described a moment ago, robot.yaml",
     "low supply": "the battery's charge, its plugs and its fuse; charge it",
     "unknown": "what the evidence names, and whether robot.yaml still describes this robot",
     "stale": "whether the sensors' drivers and the other two nodes run",
@@ -24,6 +25,7 @@ CHECKS: Mapping[str, str] = {
 }
 
 
-def check_first(state: State) -> str:
-    """What to look at first, empty where nothing is wrong."""
-    return CHECKS.get(re.sub(r" \d$", "", state.name), "")
+def check_first(state: State | str) -> str:
+    """What to look at first, by a state or its name; empty where nothing is wrong."""
+    name = state if isinstance(state, str) else state.name
+    return CHECKS.get(re.sub(r" \d$", "", name), "")

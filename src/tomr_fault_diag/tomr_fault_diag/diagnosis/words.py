@@ -5,6 +5,7 @@ from typing import Any
 
 from attrs import asdict
 
+from tomr_fault_diag.classifier.advice import check_first
 from tomr_fault_diag.diagnosis.replayed import Failed, Phase, Replayed
 from tomr_fault_diag.diagnosis.summary import Episode, Summary
 from tomr_power_model.errors import one_line
@@ -37,6 +38,8 @@ def summary_lines(summary: Summary, start_ns: int) -> Iterator[str]:
             yield f"{'':26}{episode.severity.words}"
         for line in episode.evidence:
             yield f"{'':26}{line}"
+    for state in dict.fromkeys(episode.state for episode in summary.faults):
+        yield f"check first, for {state}: {check_first(state)}"
 
 
 def phases_line(replayed: Replayed) -> str:

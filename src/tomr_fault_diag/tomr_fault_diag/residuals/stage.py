@@ -59,6 +59,7 @@ Array = NDArray[np.float64]
 PREDICTIONS = "predictions"
 ENCODERS = "joint_states"
 
+_NO_PREDICTION = "no prediction: power_model does not run, or waits for what it reads"
 _UNSURE = 1.0  # bands: a speed is not known whose standard deviation is larger
 _TURNS = 0.3  # rad/s: a slower wheel may rest
 
@@ -233,7 +234,7 @@ class ResidualStage:
             del self._predictions[stamp]
         known = self._predictions.pop(tick, None)
         self._recent.append(_Modelled.of(known or _no_prediction(tick)))
-        absent = "" if known else "no prediction: is the power_model node running?"
+        absent = "" if known else _NO_PREDICTION
         estimate = self._encoders.at(tick)
         speeds = self._speeds(tick, estimate, absent)
         motors = [self._supply(tick, wheel, speeds[wheel]) for wheel in range(WHEELS)]

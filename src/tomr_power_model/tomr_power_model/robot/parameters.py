@@ -147,15 +147,28 @@ def check_all(
     the table does not know are left to the caller.
     """
     checked: dict[str, Value] = {}
+    specs = tuple(specs)
     for spec in specs:
         if spec.name in values:
             checked[spec.name] = spec.check(values[spec.name], place)
         elif spec.default is None:
             unit = f" [{spec.unit}]" if spec.unit else ""
-            raise InputError(f"{place}: {spec.name} is missing: add it ({spec.description}{unit})")
+            unknown = values.keys() - {spec.name for spec in specs}
+            raise InputError(
+                f"{place}: {spec.name} is missing: add it ({spec.description}{unit})"
+                f"{_mistyped(spec.name, unknown)}"
+            )
         else:
             checked[spec.name] = spec.default
     return checked
+
+
+def _mistyped(name: str, unknown: Iterable[str]) -> str:
+    """What may have been meant by it, if anything; empty else."""
+    import difflib
+
+    found = difflib.get_close_matches(name, sorted(unknown), n=1, cutoff=0.8)
+    return f"; is {found[0]} meant to be it?" if found else ""
 
 
 def parse_assignments(assignments: Iterable[str]) -> dict[str, object]:

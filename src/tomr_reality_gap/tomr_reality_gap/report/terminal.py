@@ -11,13 +11,13 @@ from tomr_reality_gap.report.words import (
     place_words,
 )
 
-_WIDTH = 120  # characters; a table that is cut off says nothing
+_WIDTH, _WIDTH_OF_PIPE = 120, 240  # characters; a table that is cut off says nothing
 
 
 def print_explanation(explanation: Explanation) -> None:
     """The verdict, the findings, and what is to be heeded."""
     console = Console(highlight=False, soft_wrap=True, markup=False)
-    console.width = max(console.width, _WIDTH)
+    console.width = max(console.width, _WIDTH if console.is_terminal else _WIDTH_OF_PIPE)
     console.print(f"{explanation.verdict}: {explanation.sentence}")
     if explanation.findings:
         console.print(_table(explanation))
