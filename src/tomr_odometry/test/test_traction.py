@@ -91,6 +91,13 @@ def test_nothing_is_said_without_a_command_or_power() -> None:
     assert tractions.power(200_000_000, 0, 5.0) is not None
 
 
+def test_commands_without_encoders_are_forgotten_in_time() -> None:
+    tractions = Tractions(ROBOT)
+    for number in range(5000):
+        tractions.command(50_000_000 * number, (0.3, 0.0, 0.0))
+    assert len(tractions._commands) < 2000
+
+
 def _started(robot: Robot, last: int, change: float = 20.0) -> Tractions:
     """Wheels at 10 rad/s that change their speed from 0.8 s on [rad/s^2], until `last` [10 ms]."""
     tractions = Tractions(robot)

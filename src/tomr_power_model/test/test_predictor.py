@@ -79,13 +79,15 @@ def test_the_order_of_arrival_does_not_matter(delays_ms: list[int]) -> None:
 
 def test_whether_a_gyro_s_sample_arrives_late_changes_nothing() -> None:
     """One stamped after a tick says nothing of it, even if it is there when the tick is decided."""
-    assert _gyrating(late_ms=0) == _gyrating(late_ms=12)
+    found = _gyrating(late_ms=0)
+    assert found == _gyrating(late_ms=12)
+    assert found[10].from_encoders != _gyrating(late_ms=0, use_imu=False)[10].from_encoders
 
 
-def _gyrating(late_ms: int) -> list[Prediction]:
+def _gyrating(late_ms: int, *, use_imu: bool = True) -> list[Prediction]:
     """A robot that drives along a circle, the rate that its gyro shows grows all the while."""
     robot, twist = shipped_robot("reference"), (0.3, 0.0, 0.5)
-    predictor = PowerPredictor(robot, ModelSettings(use_imu=True))
+    predictor = PowerPredictor(robot, ModelSettings(use_imu=use_imu))
     speed = twist_to_wheels(robot) @ twist
     events = [*_events(1000), *((t, "imu") for t in range(1, 1000, 10))]
     events.sort(key=lambda event: (event[0] + late_ms * (event[1] == "imu"), event))

@@ -16,11 +16,14 @@ from tomr_power_model.drive.quality import sensor_faults
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
+from tomr_power_model.messages.bag import jazzy_typestore
+from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import read_description, shipped_robot
 
 MakeDrive = Callable[..., Drive]
 WriteBag = Callable[..., Path]
 ROBOT = shipped_robot("reference")
+BAG = Path(__file__).parents[3] / "bags" / "square"
 CHOICE = Choice(keys=("robot.mass", "physics.friction.coulomb.torque"), shared=("all",))
 
 
@@ -164,3 +167,22 @@ def test_power_of_a_whole_robot_without_its_voltage_is_refused_in_these_words(
     bag = write_bag(drive, tmp_path / "tour", voltage=float("nan"))
     with pytest.raises(InputError, match=r"battery_state: the voltage of the whole supply is miss"):
         read_drive(bag, alone)
+
+
+@pytest.mark.parametrize("is_measured", [True, False])
+def test_an_imu_without_a_gyro_shows_no_yaw_rate(tmp_path: Path, is_measured: bool) -> None:
+    store, kind = jazzy_typestore(), "sensor_msgs/msg/Imu"
+    with (
+        open_recording(BAG) as recording,
+        RecordingWriter(tmp_path / "tour") as writer,
+    ):
+        for topic, type_name, data, stamp_ns in recording.raw_messages():
+            if type_name == kind and not is_measured:
+                message = store.deserialize_cdr(data, kind)
+                message.angular_velocity_covariance = np.array([-1.0, *[0.0] * 8])
+                writer.write_raw(topic, kind, bytes(store.serialize_cdr(message, kind)), stamp_ns)
+            else:
+                writer.write_raw(topic, type_name, data, stamp_ns)
+    found = read_drive(tmp_path / "tour", ROBOT)
+    assert (len(found.yaw_rate) > 0) is is_measured
+    assert not any("imu" in note for note in found.notes)

@@ -100,6 +100,22 @@ def test_commands_that_are_ahead_do_not_leave_the_sensors_behind(ahead: int) -> 
     assert 5700 <= early[-1][0] <= 6000
 
 
+def test_a_lead_that_is_gone_counts_no_more() -> None:
+    """Clocks that were set: from then on a command is as good as a sample again."""
+    for restarts in (False, True):
+        clock = TickClock(SETTINGS)
+        for at in range(0, 2000, 10):
+            clock.arrive("commands", BASE + (at + 400) * MS, periodic=False)
+            clock.arrive("a", BASE + at * MS)
+        begin = 60_000 if restarts else 2500
+        if not restarts:
+            clock.arrive("a", BASE + begin * MS)
+        clock.arrive("commands", BASE + (begin + 90) * MS, periodic=False)
+        list(clock.due())
+        clock.arrive("commands", BASE + (begin + 500) * MS, periodic=False)
+        assert _ms(clock)[-1] == begin + 450
+
+
 def test_refused_stamps() -> None:
     clock = _clock(10, 60)
     assert clock.arrive("a", 0) is Arrival.UNSTAMPED
