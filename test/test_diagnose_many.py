@@ -162,12 +162,12 @@ class _Raw:
     stamp_ns: int
 
 
-def _drive() -> list[_Raw]:
-    """Three seconds of motion."""
+def _drive(seconds: float = 3.0) -> list[_Raw]:
+    """A start: rest, and after a second motion."""
     with open_recording(HEALTHY) as recording:
         messages = [_Raw(*message) for message in recording.raw_messages()]
     begin = messages[0].stamp_ns
-    return [m for m in messages if m.stamp_ns < begin + 3_000_000_000]
+    return [m for m in messages if m.stamp_ns < begin + round(1e9 * seconds)]
 
 
 def _restamped(change: Callable[[int], int], *topics: str) -> Iterable[_Raw]:
@@ -200,7 +200,7 @@ UNDECIDED: dict[str, tuple[Callable[[], Iterable[_Raw]], str]] = {
     "no stamps": (lambda: _restamped(lambda stamp: 0), "has no stamp"),
     "too short": (lambda: _drive()[:20], "ends before the first decision"),
     "at rest": (
-        lambda: (raw for raw in _drive() if raw.stamp_ns < _drive()[0].stamp_ns + 900_000_000),
+        lambda: _drive(0.9),
         "the robot stands still throughout",
     ),
     "commands with a clock that is behind": (

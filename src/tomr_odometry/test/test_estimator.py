@@ -105,7 +105,7 @@ def test_where_one_power_is_left_the_wheels_are_taken_for_gripping(slippery: Rec
 
     items = list(play(slippery, without))
     assert not any(item.probability.any() for item in items)
-    assert "without an IMU and power" in items[-1].assumed[-1]
+    assert "the power of two motors" in items[-1].assumed[-1]
 
 
 def test_power_alone_shows_slides(slippery: Recorded, gripping: Recorded) -> None:
