@@ -225,6 +225,20 @@ def test_commands_that_act_as_late_as_described_are_waited_for(
     assert "cmd_vel comes 0.20 s later" in notes
 
 
+def test_to_wait_for_late_commands_most_of_the_time_is_to_decide_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tomr_fault_diag.diagnosis.summary._LEAST_NS", 1)
+    for late, code in ((200_000_000, 3), (0, 0)):
+        bag = tmp_path / str(late)
+        with RecordingWriter(bag) as writer:
+            for raw in _restamped(lambda stamp, late=late: stamp - late, "/cmd_vel"):  # type: ignore[misc]
+                writer.write_raw(raw.topic, raw.type_name, raw.data, raw.stamp_ns)
+        found = run(capsys, bag)
+        assert found[0] == code
+        assert found[1]["shares"]["normal"] > 0.1
+
+
 def test_power_topics_that_are_called_otherwise_are_bad_input(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -44,11 +44,7 @@ _START_NS = 1_700_000_000 * NANOSECONDS
 
 def plain_mission(name: str, phases: Sequence[TwistPhase | CirclePhase]) -> Mission:
     """A drive of the robot as described, without load, faults or jitter."""
-    return Mission(
-        name=name,
-        seed=0,
-        phases=tuple(phases),
-    )
+    return Mission(name, tuple(phases), seed=0)
 
 
 @frozen

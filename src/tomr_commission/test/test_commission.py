@@ -339,3 +339,14 @@ def test_as_many_of_the_last_drives_are_held_out_as_last_a_minute(
 def test_of_a_single_drive_the_last_third_is_held_out() -> None:
     split = Split.of([Path("tour")], [300.0], 52.8)
     assert (split.fitted, split.held, split.cut) == ((Path("tour"),), (Path("tour"),), 200.0)
+
+
+def test_after_an_interruption_it_says_where_to_go_on(
+    steps: dict[str, Mock], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    with patch(f"{HERE}.rehearse", side_effect=KeyboardInterrupt):
+        code = main([str(BAGS / "square"), "--robot", "reference", "--out", str(out)])
+    assert code == 130
+    said = capsys.readouterr().err.splitlines()
+    assert said[-2:] == [f"{out}: the same command goes on from here", "interrupted"]

@@ -34,8 +34,11 @@ from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.messages.plain import Level
 from tomr_power_model.messages.readings import SupplyReading
 from tomr_power_model.model.prediction import Prediction
+from tomr_power_model.model.predictor import PowerPredictor
+from tomr_power_model.model.settings import ModelSettings
 from tomr_power_model.model.ticks import TickSettings
 from tomr_power_model.robot import GRAVITY, Robot, shipped_robot
+from tomr_power_model.topics.inputs import model_inputs
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
@@ -279,6 +282,18 @@ def test_it_is_left_out_where_the_robot_says_so() -> None:
         item for item in residual_inputs(ROBOT, ResidualStage(ROBOT)) if item.topic == "imu/data"
     )
     assert gyro.is_optional
+
+
+def test_model_and_residuals_take_the_same_samples_of_an_imu() -> None:
+    predictor = PowerPredictor(ROBOT, ModelSettings(use_imu=True))
+    inputs = (*model_inputs(ROBOT, predictor), *residual_inputs(ROBOT, ResidualStage(ROBOT)))
+    one, other = (item.is_too_close for item in inputs if item.topic == "imu/data")
+    assert one is not None
+    assert other is not None
+    stamps = range(100 * MS, 1100 * MS, 5 * MS)  # 200 Hz
+    kept = [not one(stamp) for stamp in stamps]
+    assert kept == [not other(stamp) for stamp in stamps]
+    assert sum(kept) == 50
 
 
 def test_it_travels_with_the_residuals() -> None:

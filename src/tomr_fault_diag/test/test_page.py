@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from tomr_fault_diag.classifier.advice import CHECKS
 from tomr_fault_diag.classifier.severity import Severity
 from tomr_fault_diag.classifier.stage import Diagnosis
 from tomr_fault_diag.classifier.states import STATES
@@ -157,7 +158,9 @@ def test_a_fault_is_named_with_the_joint_that_it_concerns() -> None:
     assert fault["state"] == "control system fault"
     assert verdict(found) == "control system fault (left_joint) at 1.00 s"
     words = "control system fault (left_joint)"
-    assert any(line.endswith(words) for line in summary_lines(found.phases[0].summary, START))
+    said = list(summary_lines(found.phases[0].summary, START))
+    assert any(line.endswith(words) for line in said)
+    assert said[-1] == f"check first, for {fault['state']}: {CHECKS['control system fault']}"
     page = time_line(found, [track()], [], WHEELS)
     assert words in page.partition("What was said")[2]
 

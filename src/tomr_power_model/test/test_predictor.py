@@ -358,15 +358,24 @@ def test_after_a_lost_command_drivers_are_not_compared(
     monkeypatch: pytest.MonkeyPatch, lost: tuple[int, ...], turning: bool, doubted: int, early: int
 ) -> None:
     """Half a second from the next one's stamp on, and only where the command changed meanwhile."""
-    assert _doubted(monkeypatch, lost, turning, early) == doubted
+    assert len(_doubted(monkeypatch, lost, turning, early)) == doubted
 
 
 def test_while_commands_pause_drivers_are_not_compared(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert _doubted(monkeypatch, tuple(range(20, 30)), False) > 10
+    assert len(_doubted(monkeypatch, tuple(range(20, 30)), False)) > 10
 
 
 def test_a_lost_command_is_forgotten_where_the_clock_leaps(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert _doubted(monkeypatch, (20,), True, passes=(1200, 3000)) == 3
+    assert len(_doubted(monkeypatch, (20,), True, passes=(1200, 3000))) == 3
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.3])
+def test_a_lost_command_is_doubted_from_when_it_would_have_acted_on(
+    monkeypatch: pytest.MonkeyPatch, delay: float
+) -> None:
+    found = [at for at in _doubted(monkeypatch, (20,), True, delay=delay) if at > 500]
+    assert len(found) == 11
+    assert found[0] == pytest.approx(1050 + 1000 * delay, abs=50)
 
 
 def _doubted(
@@ -375,26 +384,30 @@ def _doubted(
     turning: bool,
     early: int = 0,
     passes: tuple[int, ...] = (3000,),
-) -> int:
-    """In how many ticks the drivers' sums are forgotten; commands are lost in the first pass.
+    delay: float = 0.0,
+) -> list[int]:
+    """When the drivers' sums are forgotten [ms]; commands are lost in the first pass.
 
     `passes`: length of each [ms]; the clock begins anew with it.
     """
-    predictor = PowerPredictor(shipped_robot("reference"))
-    forgotten: list[bool] = []
-    monkeypatch.setattr(predictor._resting, "forget", lambda: forgotten.append(True))
+    robot = shipped_robot("reference")
+    robot = evolve(robot, controller=evolve(robot.controller, delay=delay))
+    predictor, now = PowerPredictor(robot), 0
+    forgotten: list[int] = []
+    monkeypatch.setattr(predictor._resting, "forget", lambda: forgotten.append(now))
     for number, end in enumerate(passes):
         missing = [50 * place for place in lost] if number == 0 else []
         events = [(t - early, t, True) for t in range(0, end, 50) if t not in missing]
         events += [(t, t, False) for t in range(0, end, 10)]
         for _, at_ms, is_command in sorted(events):
+            now = at_ms
             if is_command:
                 speed = 2e-4 * at_ms if turning else 0.1
                 predictor.command(BASE + at_ms * MS, (speed, 0.0, 0.0))
             else:
                 predictor.encoders(BASE + at_ms * MS, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
             predictor.due()
-    return len(forgotten)
+    return forgotten
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from tomr_reality_gap.explanation import Estimate, Explanation, Learnt, Shape
 from tomr_reality_gap.report.html import channel_lines, picture_count, report_page
 from tomr_reality_gap.report.json import report_json
 from tomr_reality_gap.report.showing import best_view
+from tomr_reality_gap.report.terminal import print_explanation
 from tomr_reality_gap.report.words import (
     effect_words,
     estimate_words,
@@ -240,3 +241,13 @@ def test_what_a_description_names_is_escaped(mismatch: Explanation) -> None:
     page = report_page(named, "my_robot.yaml")
     assert "<script>x" not in page
     assert "&lt;script&gt;x" in page
+
+
+def test_in_a_pipe_no_cell_of_a_finding_is_broken(
+    mismatch: Explanation, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, *others = mismatch.findings
+    regime = "4.62 < |omega| < 16.4 rad/s while the robot speeds up, and heads for its start"
+    shown = evolve(first, located=evolve(first.located, regime=regime))
+    print_explanation(evolve(mismatch, findings=(shown, *others)))
+    assert regime in capsys.readouterr().out

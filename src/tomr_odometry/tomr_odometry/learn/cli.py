@@ -71,10 +71,11 @@ def _floors(options: argparse.Namespace) -> dict[str, list[Path]]:
 
 
 def learnt_text(source: str, creep: Creep, bags: Sequence[str]) -> str:
-    """Text of a robot.yaml with the creep in the node's section; all else as it was."""
+    """Text of a robot.yaml with the creep in the node's section, all other values as they were."""
     sections = read_sections(source)
-    own = {**sections.pop(NODE, {}), **sections.pop(f"/{NODE}", {})}
-    kept = {name: value for name, value in own.items() if not name.startswith("creep.")}
+    slashed, own = sections.pop(f"/{NODE}", {}), sections.pop(NODE, {})
+    given = own or slashed  # as `read_node_sections` takes them
+    kept = {name: value for name, value in given.items() if not name.startswith("creep.")}
     learnt = {
         "creep.coefficient": [float(f"{value:.5g}") for value in creep.coefficient],
         "creep.growth": float(f"{creep.growth:.5g}"),

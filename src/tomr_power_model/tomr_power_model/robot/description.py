@@ -10,7 +10,13 @@ from attrs import frozen
 from tomr_power_model.effects import EFFECTS
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot.held import too_steep
-from tomr_power_model.robot.parameters import SHARED_PARAMETERS, ParameterSpec, Value, check_all
+from tomr_power_model.robot.parameters import (
+    SHARED_PARAMETERS,
+    ParameterSpec,
+    Value,
+    check_all,
+    nearest,
+)
 from tomr_power_model.robot.tables import MOTOR_PARAMETERS, ROBOT_PARAMETERS
 from tomr_power_model.unmodelled import LearntTerm
 from tomr_power_model.unmodelled.described import PREFIX, terms_of
@@ -333,7 +339,5 @@ def _reject_unknown(values: Mapping[str, object], names: tuple[str, ...], place:
 
 def closest(word: str, known: list[str]) -> str:
     """A hint for a mistyped word."""
-    import difflib
-
-    found = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    return f"did you mean {found[0]}?" if found else "remove it"
+    found = nearest(word, known)
+    return f"did you mean {found}?" if found else "remove it"

@@ -11,6 +11,7 @@ from tomr_power_model.files import load_yaml
 
 Value = float | int | bool | str | tuple[float, ...] | tuple[str, ...]
 Kind = Literal["float", "int", "bool", "str", "floats", "strs"]
+_MISTYPED = 0.8  # how much a key has to look like the one that is missing
 
 
 @frozen
@@ -154,21 +155,21 @@ def check_all(
         elif spec.default is None:
             unit = f" [{spec.unit}]" if spec.unit else ""
             unknown = values.keys() - {spec.name for spec in specs}
+            meant = nearest(spec.name, sorted(unknown), _MISTYPED)
             raise InputError(
                 f"{place}: {spec.name} is missing: add it ({spec.description}{unit})"
-                f"{_mistyped(spec.name, unknown)}"
+                + (f"; is {meant} meant to be it?" if meant else "")
             )
         else:
             checked[spec.name] = spec.default
     return checked
 
 
-def _mistyped(name: str, unknown: Iterable[str]) -> str:
-    """What may have been meant by it, if anything; empty else."""
+def nearest(word: str, others: Sequence[str], alike: float = 0.6) -> str:
+    """Which of some words it looks like, by `alike` at least (0 to 1); empty: none."""
     import difflib
 
-    found = difflib.get_close_matches(name, sorted(unknown), n=1, cutoff=0.8)
-    return f"; is {found[0]} meant to be it?" if found else ""
+    return next(iter(difflib.get_close_matches(word, others, n=1, cutoff=alike)), "")
 
 
 def parse_assignments(assignments: Iterable[str]) -> dict[str, object]:
