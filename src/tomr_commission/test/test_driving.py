@@ -158,4 +158,4 @@ def test_a_robot_that_stands_from_the_very_start_on() -> None:
     watch.command(0.0, AHEAD)
     for number in range(200):
         watch.encoders(0.01 * number, 0.01 * number, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    assert watch.problem(1.6, 0.01).startswith("the robot does not follow cmd_vel")
+    assert watch.problem(1.505, 0.01).startswith("the robot does not follow cmd_vel")

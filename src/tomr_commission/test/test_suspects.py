@@ -1,6 +1,7 @@
 """Gross mistakes in a description are named."""
 
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -116,5 +117,16 @@ def test_value_twice_too_large(key: str) -> None:
     assert isinstance(value, float)
     drive = read_drive(BAG, load_robot("reference"))
     check_values(drive, VALUES, "robot.yaml")
-    with pytest.raises(InputError, match=rf"half what is described.*{key}"):
+    with pytest.raises(InputError, match=rf"seems half what is described.*{key}"):
         check_values(drive, {**VALUES, key: 2.0 * value}, "robot.yaml")
+
+
+def test_values_that_fit_as_well_are_all_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tomr_commission.suspects._ALIKE", 2.0)
+    drive = read_drive(BAG, load_robot("reference"))
+    key = "motor.gear_ratio"
+    with pytest.raises(InputError) as error:
+        check_values(drive, {**VALUES, key: 2.0 * cast(float, VALUES[key])}, "robot.yaml")
+    seems, checks = str(error.value).split(": check ")
+    assert "the gear ratio seems half or the " in seems
+    assert checks.startswith("motor.gear_ratio = 40.0 and ")

@@ -186,7 +186,7 @@ def check_values(drive: Drive, values: Mapping[str, object], place: str) -> None
         for error, (key, factor) in zip(others, tried, strict=True)
         if error < _ALIKE * least
     )
-    suspects = " or ".join(f"{_VALUES[key]} {_times(factor)}" for _, key, factor in alike)
+    suspects = " or ".join(f"{_VALUES[key]} seems {_times(factor)}" for _, key, factor in alike)
     checks = " and ".join(f"{key} = {values[key]}" for _, key, _ in alike)
     raise InputError(
         f"{place}: {suspects} what is described: simulated power is {100 * described:.0f} % off "

@@ -6,6 +6,7 @@ import pytest
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.calibrated import fit_band, fit_bands
 from tomr_fault_diag.residuals.settings import LEAST_BAND, LEAST_FACTOR, BandSettings
+from tomr_fault_diag.residuals.widths import moved, transient_ticks
 from tomr_power_model.errors import InputError
 
 COUNT = 20_000
@@ -85,3 +86,16 @@ def test_a_least_band_of_nothing_is_refused(name: str) -> None:
     lowest = LEAST_FACTOR if name == "total_factor" else LEAST_BAND
     bands = DiagnosisSettings.of({key: lowest}, "").residuals.bands
     assert getattr(bands, name) == lowest
+
+
+@pytest.mark.parametrize(
+    ("milliseconds", "ticks"), [(10, 15), (20, 8), (50, 3), (100, 2), (200, 2)]
+)
+def test_a_change_counts_over_as_many_ticks_as_it_takes(milliseconds: int, ticks: int) -> None:
+    assert transient_ticks(milliseconds * 1_000_000) == ticks
+
+
+def test_how_far_a_model_moved_is_of_the_last_ticks_and_of_what_is_known() -> None:
+    values = np.array([[0.0], [1.0], [np.nan], [4.0], [4.0], [4.0]])
+    assert moved(values, 3)[:, 0].tolist() == [0.0, 1.0, 1.0, 3.0, 0.0, 0.0]
+    assert moved(values, 2)[:, 0].tolist() == [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
