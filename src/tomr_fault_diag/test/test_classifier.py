@@ -16,7 +16,7 @@ from tomr_fault_diag.classifier.settings import CLASSIFIER_PARAMETERS, Classifie
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
 from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STALE, STATES, WAITING
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
-from tomr_fault_diag.residuals.frame import NO_COMMAND, Residual, ResidualFrame
+from tomr_fault_diag.residuals.frame import NO_COMMAND, SCATTER, Residual, ResidualFrame
 from tomr_fault_diag.residuals.settings import ResidualSettings
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.plain import Level
@@ -159,6 +159,11 @@ def test_a_robot_that_has_not_been_commanded_anything_waits() -> None:
     lost = Residual(nan, nan, nan, missing="no fresh wheel_1/power")
     (stale,) = _classify([ResidualFrame(BASE + 50 * MS, (unknown, lost, *(unknown,) * 8))])
     assert stale.state is STALE
+    status = diagnosis_message(robot, stale, "").statuses[0]
+    assert status.message == "stale: no fresh cmd_vel for the model, wheel_1/power"
+    other = Residual(nan, nan, nan, missing=SCATTER)
+    (stale,) = _classify([ResidualFrame(BASE + 50 * MS, (other, lost, *(other,) * 8))])
+    assert diagnosis_message(robot, stale, "").statuses[0].message == f"stale: {SCATTER}"
 
 
 def test_the_message_says_when_the_robot_was_commissioned() -> None:

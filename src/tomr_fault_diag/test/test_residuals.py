@@ -322,6 +322,39 @@ def test_an_input_that_sends_what_cannot_be_used_says_so(
     assert set(said.values()) == {"as it should be"}
 
 
+@pytest.mark.parametrize("topic", ["joint_states", "wheel_2/power", "imu/data"])
+def test_an_input_of_another_clock_is_left_out_and_says_so(topic: str) -> None:
+    robot = _robot()
+    stage, frames = ResidualStage(robot), []
+    takers = {item.topic: item.take for item in residual_inputs(robot, stage)}
+    feed = {**ALL, "imu/data": _imu}
+    said: dict[str, str] = {}
+    for step in range(150):
+        stamp = BASE + step * 10 * MS
+        if step % 5 == 0:
+            stage.prediction(_prediction(stamp))
+        for name, make in feed.items():
+            takers[name](make(stamp - 7_500 * MS * (name == topic)), stamp)
+        frames += stage.due()
+        for report in stage.reports():
+            said.update({status.name: status.message for status in report.statuses})
+    words = "stamped 7.5 s behind the other inputs: synchronise the clocks"
+    assert said.pop(f"inputs: {topic}") == words
+    assert set(said.values()) == {"as it should be"}
+    assert [frame.stamp_ns for frame in frames] == [BASE + 50 * MS * n for n in range(1, 30)]
+
+
+def _imu(stamp: int) -> Any:
+    rate = bag_message("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=0.1)
+    force = bag_message("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=9.81)
+    return bag_message(
+        "sensor_msgs/msg/Imu",
+        header=bag_header(stamp),
+        angular_velocity=rate,
+        linear_acceleration=force,
+    )
+
+
 def test_samples_that_come_in_another_order_are_a_gap_until_the_clock_begins_anew() -> None:
     stage, found = ResidualStage(_robot()), []
     takers = {item.topic: item.take for item in residual_inputs(_robot(), stage)}

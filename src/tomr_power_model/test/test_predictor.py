@@ -256,6 +256,49 @@ def test_a_clock_that_goes_back_starts_afresh() -> None:
         assert found[-1] == BASE + 1950 * MS
 
 
+@pytest.mark.parametrize(
+    ("ahead_ms", "delay", "words"),
+    [
+        (0, 0.0, "as it should be"),
+        (200, 0.0, "as it should be"),
+        (400, 0.0, "stamped 0.4 s ahead of the sensors: synchronise the clocks"),
+        (
+            -200,
+            0.0,
+            "comes 0.2 s after its stamps: synchronise the clocks, or set controller.delay",
+        ),
+        (-200, 0.2, "as it should be"),
+        (5000, 0.0, "stamped 5.0 s ahead of the other inputs: synchronise the clocks"),
+        (-5000, 0.2, "stamped 5.0 s behind the other inputs: synchronise the clocks"),
+    ],
+)
+def test_commands_that_another_clock_stamps_say_so(ahead_ms: int, delay: float, words: str) -> None:
+    reference = shipped_robot("reference")
+    robot = evolve(reference, controller=evolve(reference.controller, delay=delay))
+    predictor, said = PowerPredictor(robot), []
+    for at_ms, kind in _events(3000):
+        stamp = BASE + at_ms * MS
+        if kind == "command":
+            predictor.command(stamp + ahead_ms * MS, (0.0, 0.0, 0.0))
+        else:
+            predictor.encoders(stamp, (0.0, 0.0, 0.0), NAN3)
+        predictor.due()
+        said += [report.statuses[0].message for report in predictor.reports()]
+    assert said[-1] == words
+
+
+def test_of_sensors_that_died_commands_are_not_ahead() -> None:
+    predictor, said = PowerPredictor(shipped_robot("reference")), []
+    for at_ms, kind in _events(6000):
+        if kind == "command":
+            predictor.command(BASE + at_ms * MS, (0.0, 0.0, 0.0))
+        elif at_ms < 3000:
+            predictor.encoders(BASE + at_ms * MS, (0.0, 0.0, 0.0), NAN3)
+        predictor.due()
+        said += [report.statuses[0].message for report in predictor.reports()]
+    assert set(said) == {"as it should be"}
+
+
 class TestEncoderWindow:
     """Speed and acceleration from quantised angles or from speeds."""
 

@@ -47,7 +47,7 @@ def test_a_silent_stream_is_not_waited_for() -> None:
 
 def test_what_is_waited_for_may_be_later_than_a_gap() -> None:
     """A stream that two stages of `patience` 5 s wait for comes up to 10 s late."""
-    for late, arrival in ((9_900, Arrival.TAKEN), (10_100, Arrival.RESTARTED)):
+    for late, arrival in ((9_900, Arrival.TAKEN), (10_100, Arrival.FOREIGN)):
         clock = TickClock(TickSettings(patience=5_000 * MS, gap=1_000 * MS))
         clock.arrive("a", BASE + 20_000 * MS)
         assert clock.arrive("b", BASE + (20_000 - late) * MS) is arrival
@@ -133,6 +133,67 @@ def test_jumps_start_afresh_either_way() -> None:
     assert clock.arrive("a", BASE + 10 * MS) is Arrival.RESTARTED
     clock.arrive("a", BASE + 90 * MS)
     assert _ms(clock) == [50]
+
+
+def _arrivals(clock: TickClock, *heard: tuple[str, int]) -> list[Arrival]:
+    return [
+        clock.arrive(stream, BASE + at * MS, periodic=stream != "commands") for stream, at in heard
+    ]
+
+
+@pytest.mark.parametrize("ahead", [-30_000, 30_000])
+def test_commands_of_another_clock_are_left_out(ahead: int) -> None:
+    """Whichever comes first; the sensors go on."""
+    clock, found, ticks = TickClock(SETTINGS), set(), []
+    for at in range(0, 2000, 10):
+        if at % 50 == 0:
+            found.add(clock.arrive("commands", BASE + (at + ahead) * MS, periodic=False))
+            assert at < 50 or clock.off("commands") == pytest.approx(ahead * MS, abs=10 * MS)
+        assert clock.arrive("a", BASE + at * MS) is (Arrival.TAKEN if at else Arrival.RESTARTED)
+        ticks += _ms(clock)
+    assert found == {Arrival.TAKEN, Arrival.FOREIGN}
+    assert ticks == list(range(50, 1951, 50))
+
+
+def test_a_sensor_of_another_clock_is_left_out() -> None:
+    """Most sensors say what time it is, whichever came first."""
+    clock = TickClock(SETTINGS)
+    assert _arrivals(clock, ("imu", 70_000), ("a", 0)) == [Arrival.TAKEN, Arrival.FOREIGN]
+    assert _arrivals(clock, ("b", 1), ("imu", 70_010)) == [Arrival.RESTARTED, Arrival.FOREIGN]
+    assert _arrivals(clock, ("a", 10), ("b", 11)) == [Arrival.TAKEN] * 2
+    assert _arrivals(clock, ("imu", 90_000)) == [Arrival.FOREIGN]  # it has leapt, and nobody else
+    assert _arrivals(clock, ("imu", 20)) == [Arrival.TAKEN]  # its clock was set
+
+
+def test_where_one_clock_is_set_the_others_go_on() -> None:
+    clock = TickClock(SETTINGS)
+    _arrivals(clock, ("a", 0), ("b", 1), ("c", 2), ("a", 10))
+    heard = ("c", 9_000), ("a", 20), ("c", 9_010), ("b", 21), ("a", 30)
+    restarted, taken, foreign = Arrival.RESTARTED, Arrival.TAKEN, Arrival.FOREIGN
+    assert _arrivals(clock, *heard) == [restarted, restarted, foreign, taken, taken]
+
+
+def test_a_loop_is_followed_though_some_of_the_old_comes_late() -> None:
+    clock = TickClock(SETTINGS)
+    _arrivals(clock, ("a", 60_000), ("b", 60_001), ("c", 60_002), ("commands", 60_003))
+    _arrivals(clock, ("commands", 5), ("a", 0), ("c", 60_010), ("b", 1), ("c", 2), ("a", 10))
+    heard = ("commands", 55), ("a", 20), ("b", 21), ("c", 22)
+    assert _arrivals(clock, *heard) == [Arrival.TAKEN] * 4
+
+
+def test_commands_that_drift_away_or_were_held_up_disturb_nobody() -> None:
+    clock, found = TickClock(SETTINGS), []
+    for at in range(0, 10_000, 50):
+        found += _arrivals(clock, ("a", at), ("commands", at + at // 4))
+    assert found.count(Arrival.RESTARTED) == 0
+    assert found[-1] is Arrival.FOREIGN
+    clock = TickClock(SETTINGS)
+    _arrivals(clock, ("commands", 0), ("a", 0))
+    found = [
+        *_arrivals(clock, *(("a", at) for at in range(500, 9_000, 500))),
+        *_arrivals(clock, ("commands", 5_000)),
+    ]
+    assert found == [Arrival.TAKEN] * 17 + [Arrival.FOREIGN]
 
 
 @given(st.permutations(range(24)))

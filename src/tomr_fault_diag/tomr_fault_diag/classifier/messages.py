@@ -18,6 +18,7 @@ from tomr_fault_diag.classifier.states import (
 )
 from tomr_fault_diag.residuals.frame import (
     GAP,
+    NO_FRESH,
     RESIDUALS,
     YAW,
     Residual,
@@ -86,6 +87,14 @@ def six_state(state: State) -> str:
     return UNKNOWN.name if state.paper is None else STATES[state.paper].name
 
 
+def _lacking(frame: ResidualFrame) -> str:
+    """What is missing: all inputs of which nothing fresh came, else the first reason."""
+    reasons = dict.fromkeys(r.missing for r in frame.residuals if r.stale)
+    silent = [reason.removeprefix(NO_FRESH) for reason in reasons if reason.startswith(NO_FRESH)]
+    first = next(iter(reasons), "too little seen")
+    return NO_FRESH + ", ".join(silent) if first.startswith(NO_FRESH) else first
+
+
 def _headline(robot: Robot, diagnosis: Diagnosis) -> str:
     said = _said(robot, diagnosis)
     is_held = not diagnosis.usable and diagnosis.state not in (STALE, NOT_ENOUGH, WAITING)
@@ -95,8 +104,7 @@ def _headline(robot: Robot, diagnosis: Diagnosis) -> str:
 def _said(robot: Robot, diagnosis: Diagnosis) -> str:
     state = diagnosis.state
     if state == STALE:
-        missing = next((r.missing for r in diagnosis.frame.residuals if r.stale), "too little seen")
-        return f"{state.name}: {missing}"
+        return f"{state.name}: {_lacking(diagnosis.frame)}"
     if state == NOT_ENOUGH:
         gaps = [r.missing for r in diagnosis.frame.residuals if r.missing.startswith(GAP)]
         return f"{state.name}: {gaps[0] if gaps else 'gaps a moment ago'}"

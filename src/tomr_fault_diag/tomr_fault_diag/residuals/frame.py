@@ -26,13 +26,14 @@ YAW = "residuals: yaw rate against the gyro"
 ALONG = tuple(f"residuals: acceleration along {axis} against the accelerometer" for axis in "xy")
 
 # Why a residual is unknown: until the first command, and on robots without power of single motors.
-NO_COMMAND = "no fresh cmd_vel for the model"
+NO_FRESH = "no fresh "  # and which input
+NO_COMMAND = f"{NO_FRESH}cmd_vel for the model"
 NOT_MEASURED = "not measured on this robot"
 GAP = "a gap in "  # and which stream: it paused, or went on only just before
 SCATTER = "the stamps of joint_states scatter too much to measure a speed"
 NOT_BELIEVED = "it has not agreed with the wheels for long enough yet"
-NO_IMU = "no fresh imu/data"
-NO_ENCODERS = "no fresh joint_states"
+NO_IMU = f"{NO_FRESH}imu/data"
+NO_ENCODERS = f"{NO_FRESH}joint_states"
 NO_WEIGHT = "imu/data does not feel gravity along z"
 IMU_REPEATS = "imu/data repeats itself while the robot moves"
 FROZEN = " repeats itself while the motor works"  # and before it which stream

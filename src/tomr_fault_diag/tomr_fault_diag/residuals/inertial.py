@@ -29,16 +29,18 @@ class InertialWatch:
         self._accelerometer.clear()
         self._flow.leap()
 
-    def add(self, arrival: Arrival, stamp_ns: int, yaw_rate: float, force: Force) -> None:
+    def add(self, stamp_ns: int, yaw_rate: float, force: Force) -> None:
         """Take a yaw rate [rad/s] and a specific force [m/s^2], NaN for what is not measured."""
         if not yaw_rate and not any(force):  # a bus that answers with zeros
             self._flow.refuse()
-        elif arrival in (Arrival.TAKEN, Arrival.RESTARTED):
-            self._flow.take(stamp_ns)
-            self._gyro.add(stamp_ns, yaw_rate)
-            self._accelerometer.add(stamp_ns, force)
-        else:
-            self._flow.precedes(stamp_ns)
+            return
+        self._flow.take(stamp_ns)
+        self._gyro.add(stamp_ns, yaw_rate)
+        self._accelerometer.add(stamp_ns, force)
+
+    def ignore(self, arrival: Arrival, stamp_ns: int, ahead_ns: int) -> None:
+        """Take note of a sample that is left out; one of another clock is so far ahead."""
+        self._flow.ignore(arrival, stamp_ns, ahead_ns)
 
     def residuals(
         self,
@@ -60,4 +62,5 @@ class InertialWatch:
         IMU."""
         repeats = IMU_REPEATS in (frame.yaw.missing, frame.along[0].missing)
         ailment = IMU_REPEATS.removeprefix(f"{IMU} ") if repeats else ""
-        return [InputState(IMU, self._flow, ailment)] if self._flow.last(tick_ns) else []
+        was_heard = self._flow.last(tick_ns) or self._flow.ahead
+        return [InputState(IMU, self._flow, ailment)] if was_heard else []

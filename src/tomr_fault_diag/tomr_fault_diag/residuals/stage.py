@@ -15,6 +15,7 @@ from tomr_fault_diag.residuals.frame import (
     MOTORS,
     NO_COMMAND,
     NO_ENCODERS,
+    NO_FRESH,
     NOT_MEASURED,
     SCATTER,
     Residual,
@@ -144,7 +145,7 @@ class ResidualStage:
                 self._encoders.continuity.refuse()
                 return "by robot.yaml no wheel can turn so far so fast; the sample is ignored"
         else:
-            self._encoders.continuity.precedes(stamp_ns)
+            self._encoders.continuity.ignore(arrival, stamp_ns, self._clock.off(ENCODERS))
         return arrival
 
     def power(self, reading: PowerReading) -> Arrival | str:
@@ -164,14 +165,18 @@ class ResidualStage:
             if supply != TOTAL:
                 self._repeats[supply].take(stamp, (reading.voltage, reading.current, reading.power))
         else:
-            self._flows[supply].precedes(stamp)
+            ahead = self._clock.off(self._supplies[supply])
+            self._flows[supply].ignore(arrival, stamp, ahead)
         return arrival
 
     def imu(self, stamp_ns: int, yaw_rate: float, force: Triple = (NAN, NAN, NAN)) -> Arrival:
         """Take a gyro's yaw rate [rad/s] and an accelerometer's specific force [m/s^2], NaN for
         what is not measured."""
         arrival = self._arrive(IMU, stamp_ns)
-        self._inertial.add(arrival, stamp_ns, yaw_rate, force)
+        if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
+            self._inertial.add(stamp_ns, yaw_rate, force)
+        else:
+            self._inertial.ignore(arrival, stamp_ns, self._clock.off(IMU))
         return arrival
 
     def refused(self, topic: str) -> None:
@@ -269,7 +274,7 @@ class ResidualStage:
         frozen = self._repeats[wheel].is_frozen(tick, self._work(wheel, speed, measured.unit))
         if not self._has_motor_power:
             return Measured(NAN, "W", NOT_MEASURED)
-        missing = f"no fresh {self._topics[wheel]}/power"
+        missing = f"{NO_FRESH}{self._topics[wheel]}/power"
         if self._flows[wheel].is_misplaced(tick):
             missing = f"{GAP}{self._topics[wheel]}/power: its stamps do not fit"
         if measured.value == measured.value:
@@ -294,11 +299,11 @@ class ResidualStage:
             unit = units.pop() if len(units) == 1 else "W"
             value = math.fsum(motor.value for motor in motors) if not units else NAN
             models = [math.fsum(past.of_unit(unit)[:WHEELS]) for past in self._recent]
-            missing = "no fresh power of every motor"
+            missing = f"{NO_FRESH}power of every motor"
         else:
             value = self._windows[TOTAL].at(tick).value if source == "battery_state" else NAN
             models = [past.power[WHEELS] for past in self._recent]
-            missing = "no fresh battery_state"
+            missing = f"{NO_FRESH}{TOTAL_TOPIC}"
             if value == value and self._flows[TOTAL].is_broken(tick):
                 value, missing = NAN, f"{GAP}{TOTAL_TOPIC}"
         band = width(models, self.settings.bands.of_total(unit))

@@ -54,6 +54,30 @@ def test_a_gap_is_a_warning_for_a_while() -> None:
     assert (stream.gaps, stream.refused) == (1, 0)
 
 
+def test_what_comes_too_rarely_to_be_compared_says_so_steadily() -> None:
+    stream, said_at = Continuity(POWER_TOLERANCE), []
+    for t in range(0, 8000, 50):
+        if t % 1000 == 0:
+            stream.take(BASE + t * MS)
+        if t >= 3000:
+            assert stream.is_broken(BASE + t * MS)
+            said_at.append(said(InputState("x", stream), t))
+    words = "comes every 1.0 s: too rarely to be compared"
+    assert set(said_at) == {(Level.WARN, words)}
+    assert said(InputState("x", stream), 17_100) == (Level.WARN, "silent for 10.1 s")
+    for t in range(18_000, 18_200, 20):
+        stream.take(BASE + t * MS)
+    assert not stream.is_broken(BASE + 18_190 * MS)
+
+
+def test_a_usual_interval_between_gaps_is_no_rare_stream() -> None:
+    stream = Continuity(POWER_TOLERANCE)
+    for t in range(0, 8000, 1000):
+        stream.take(BASE + t * MS)
+        stream.take(BASE + (t + 300) * MS)
+    assert not stream.is_broken(BASE + 7500 * MS)
+
+
 @pytest.mark.parametrize(("ms", "level"), [(480, Level.WARN), (520, Level.OK), (60_000, Level.OK)])
 def test_commands_that_end_and_begin_anew_are_no_gap_to_warn_of(ms: int, level: Level) -> None:
     stream = flow(1000)

@@ -11,12 +11,13 @@ from statistics import median
 
 from attrs import frozen
 
-from tomr_power_model.model.ticks import to_ns
+from tomr_power_model.model.ticks import Arrival, to_ns
 
 _USUAL = 3.0  # intervals: a longer silence is a gap
 _KEPT = 31  # intervals to take the usual one from
 _FEWEST = 5
 _EVERY = 8  # samples: how often it is taken anew, after the first time
+_RARE = 3  # gaps in a row: samples do not come more often
 _STRAYS = 3  # messages in a row that precede: fewer are late ones
 _RATED = to_ns(2.0)  # time over which a rate is counted
 
@@ -63,6 +64,7 @@ class Continuity:
         self._tolerated = self._tolerance.longest
         self._back, self._strays, self._misplaced = 0, 0, 0
         self._excused = 0
+        self.ahead = 0  # by another clock [ns]
         self.refused = 0  # messages up to the last tick
         self.refused_at = 0  # newest stamp before the last of them, 0: there was none
         self.refused_since = 0  # the newest sample
@@ -70,6 +72,7 @@ class Continuity:
         self.resumed = 0  # first stamp after the last gap, 0: there was none
         self.silence = 0  # how long that was [ns]
         self._until = 0
+        self._pauses = 0  # gaps without a usual interval in between
 
     def leap(self) -> None:
         """Forget the stream where its stamps leap, but for having been heard."""
@@ -94,6 +97,14 @@ class Continuity:
         """Take note of a message whose stamp is none, repeated, or too old to be of use."""
         self._ahead.append((self._read, _MISPLACED))
 
+    def ignore(self, arrival: Arrival, stamp_ns: int, ahead_ns: int) -> None:
+        """Take note of an ignored message; one of another clock is so far ahead of the others."""
+        if arrival is Arrival.FOREIGN:
+            self.ahead = ahead_ns
+            self.misplace()
+        else:
+            self.precedes(stamp_ns)
+
     def refuse(self) -> None:
         """Take note of a message that cannot be used."""
         self._ahead.append((self._read, _REFUSED))
@@ -113,8 +124,15 @@ class Continuity:
         return self._last
 
     def is_broken(self, tick_ns: int) -> bool:
-        """Whether at a tick the stream pauses, went on only just before, or is in no order."""
-        return self.is_silent(tick_ns) or tick_ns < self._until or self._is_disordered()
+        """Whether at a tick the stream pauses, went on only just before, is in no order, or has
+        too few samples for any of them to be held against a tick."""
+        pauses = self.is_silent(tick_ns) or tick_ns < self._until
+        return pauses or self.is_rare or self._is_disordered()
+
+    @property
+    def is_rare(self) -> bool:
+        """Whether, up to the last tick, samples came one by one, with gaps between them."""
+        return self._pauses >= _RARE
 
     def _is_disordered(self) -> bool:
         """Whether hardly any of the last messages could be placed; repeats do not count, as some
@@ -150,9 +168,12 @@ class Continuity:
         elif silence > self._tolerated:
             if stamp - self._excused > self._tolerated:
                 self._break_off(stamp, silence)
+                self._pauses += 1
         elif silence:
             self._intervals.append(silence)
+            self._pauses = 0
         self._back, self._strays, self._misplaced, self._last = 0, 0, 0, stamp
+        self.ahead = 0
         self.refused_since = 0
         self._count += 1
         self._in_order.append(True)

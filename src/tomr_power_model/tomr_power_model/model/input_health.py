@@ -12,7 +12,14 @@ from tomr_power_model.model.ticks import to_ns
 TOPIC = "/diagnostics"
 _MANY = 3  # messages in a row that cannot be used
 _PAUSE = to_ns(0.5)  # of the commands: who is silent for so long has ended, and begun anew
+_LOST = to_ns(10.0)  # what comes rarely has ended
 _RECENT = to_ns(2.0)  # in which a gap or a refused message is worth a warning
+
+
+def apart(ahead_ns: int) -> str:
+    """What to say of a stream whose stamps are so far ahead of those of the others [ns]."""
+    way = "ahead of" if ahead_ns > 0 else "behind"
+    return f"stamped {1e-9 * abs(ahead_ns):.1f} s {way} the other inputs: synchronise the clocks"
 
 
 @frozen
@@ -29,12 +36,15 @@ class InputState:
         flow, last = self.flow, self.flow.last(tick_ns)
         age = tick_ns - last
         if flow.is_misplaced(tick_ns):
-            return Level.WARN, "its stamps do not fit"
+            return Level.WARN, apart(flow.ahead) if flow.ahead else "its stamps do not fit"
         if flow.refused_since >= _MANY:
             return Level.WARN, "sends what cannot be used"
+        if flow.is_rare and age < _LOST:
+            return Level.WARN, f"comes every {1e-9 * flow.silence:.1f} s: too rarely to be compared"
         if not last:
             return (Level.OK, "waiting") if self.is_optional else (Level.STALE, "no message yet")
-        if flow.is_silent(tick_ns):
+        # What is always late seems to be silent for as long.
+        if flow.is_silent(tick_ns) and (age > _PAUSE or not self.ailment):
             level = Level.OK if self.is_optional else Level.WARN
             return level, f"silent for {1e-9 * age:.1f} s"
         if self.ailment:

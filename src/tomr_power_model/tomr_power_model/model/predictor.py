@@ -15,6 +15,7 @@ from tomr_power_model.dynamics.body import Body
 from tomr_power_model.dynamics.vehicle import plant_numbers, vehicle_of
 from tomr_power_model.messages.outgoing import DiagnosticMessage
 from tomr_power_model.messages.readings import NAN, UNKNOWN_READING, SupplyReading
+from tomr_power_model.model.command_clock import CommandClock
 from tomr_power_model.model.commanded import Commanded, CommandPath, CommandTiming, Seen
 from tomr_power_model.model.continuity import COMMAND_TOLERANCE, Continuity
 from tomr_power_model.model.encoder_flaws import EncoderFlaws
@@ -86,6 +87,7 @@ class PowerPredictor:
         )
         self._commands = Continuity(COMMAND_TOLERANCE)
         self._delay = to_ns(robot.controller.delay)
+        self._command_clock = CommandClock(self._delay)
         self._health = InputReporter()
         self._window = to_ns(robot.sensors.power_window)
         self._reads_motor = robot.measurement.quantity == "motor_current"
@@ -105,6 +107,7 @@ class PowerPredictor:
         self._resting.clear()
         self._encoders.clear()
         self._commands.clear()
+        self._command_clock.clear()
         self._gyro: deque[tuple[int, float]] = deque()  # stamps [ns], rad/s
         self._voltages: deque[tuple[int, float, float, float]] = deque()
         self._given: tuple[int, Triple] | None = None  # the newest command
@@ -123,8 +126,9 @@ class PowerPredictor:
             self._look_for_losses(stamp_ns, twist)
             self._path.command(stamp_ns, twist)
             self._commands.take(stamp_ns + self._delay)  # a pause counts from when it acts on
-        elif arrival is Arrival.REPEATED:
-            self._commands.precedes(stamp_ns + self._delay)
+            self._command_clock.take(stamp_ns, self._clock.sensors)
+        else:
+            self._commands.ignore(arrival, stamp_ns + self._delay, self._clock.off(COMMANDS))
         return arrival
 
     def _look_for_losses(self, stamp_ns: int, twist: Triple) -> None:
@@ -181,7 +185,7 @@ class PowerPredictor:
         for tick in self._clock.due():
             found.append(self._predict(tick))
             states: list[InputState | TermsState] = [
-                InputState(COMMANDS, self._commands, is_optional=True)
+                InputState(COMMANDS, self._commands, self._command_clock.ailment(), True)
             ]
             if self._robot.unmodelled:
                 states.append(TermsState(self._path.besides.outside))

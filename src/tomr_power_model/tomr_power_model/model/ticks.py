@@ -8,6 +8,9 @@ not depend on the order in which topics happen to arrive. It is given as soon as
 - some stream is `patience` past it: a stream that silent is not live and not waited for.
 
 Commands that are always ahead of the periodic streams, by another clock, count by so much less.
+
+A stream whose stamps leap begins anew, and all with it. One that is far from the others without
+having leapt is of another clock and left out, unless more sensors are of its clock than of theirs.
 """
 
 import math
@@ -61,6 +64,7 @@ class Arrival(Enum):
     UNSTAMPED = "has no stamp"
     REPEATED = "repeats or precedes an earlier stamp"
     RESTARTED = "jumps"
+    FOREIGN = "is of another clock than the other topics'"
 
 
 class TickClock:
@@ -75,6 +79,9 @@ class TickClock:
         self._settle = settings.settle
         self._newest: dict[str, int] = {}
         self._periodic: set[str] = set()
+        # Of streams that are left out: by another clock, or not heard since time leapt.
+        self._elsewhere: dict[str, int] = {}
+        self._sensors: set[str] = set()  # the periodic ones, once another was far from them
         self._watermark = 0
         self._lead = 0
         self._resumed = 0  # stamp at which all streams went on after a silence
@@ -89,11 +96,12 @@ class TickClock:
             return Arrival.TAKEN
         ahead = stamp_ns - self._watermark
         if abs(ahead) > self._gap:
-            self._start(stream, stamp_ns, periodic)
-            return Arrival.RESTARTED
+            return self._far(stream, stamp_ns, periodic)
         if stamp_ns <= self._newest.get(stream, 0):
             return Arrival.REPEATED
         self._newest[stream] = stamp_ns
+        if self._elsewhere:
+            self._elsewhere.pop(stream, None)
         if periodic:
             self._periodic.add(stream)
             self._measure_lead()
@@ -105,6 +113,35 @@ class TickClock:
             self._watermark += ahead
         return Arrival.TAKEN
 
+    @property
+    def sensors(self) -> int:
+        """Newest stamp of a periodic stream [ns], 0 before the first."""
+        return max((self._newest[name] for name in self._periodic), default=0)
+
+    def off(self, stream: str) -> int:
+        """How far a FOREIGN stream is ahead of the others [ns]."""
+        return self._elsewhere.get(stream, self._watermark) - self._watermark
+
+    def _far(self, stream: str, stamp_ns: int, periodic: bool) -> Arrival:
+        """Whether a stamp far from the others' means that time leapt, or only another clock."""
+        before = self._newest.pop(stream, None)
+        # A command that was held up is between the last one and what sensors have come to.
+        leaps = before is not None and (
+            stamp_ns < before - self._gap or stamp_ns > max(before + self._gap, self._watermark)
+        )
+        self._elsewhere[stream] = stamp_ns
+        self._sensors |= self._periodic | ({stream} if periodic else set())
+        self._periodic.discard(stream)
+        if not leaps and self._sensors_about(stamp_ns) <= self._sensors_about(self._watermark):
+            return Arrival.FOREIGN
+        self._start(stream, stamp_ns, periodic)
+        return Arrival.RESTARTED
+
+    def _sensors_about(self, stamp_ns: int) -> int:
+        """How many sensors were not far from a stamp when they were heard last."""
+        newest = self._elsewhere | self._newest
+        return sum(abs(newest[name] - stamp_ns) <= self._gap for name in self._sensors)
+
     def _measure_lead(self) -> None:
         """How far the others are ahead of the periodic streams: commands whose clock is ahead, or
         that come sooner, say nothing of the time that has passed. Less counts at once."""
@@ -114,6 +151,8 @@ class TickClock:
         self._lead = min(lead, self._lead + (lead - self._lead) // _SLOWLY)
 
     def _start(self, stream: str, stamp_ns: int, periodic: bool) -> None:
+        self._elsewhere |= self._newest
+        self._elsewhere.pop(stream, None)
         self._newest = {stream: stamp_ns}
         self._periodic = {stream} if periodic else set()
         self._watermark = self._resumed = stamp_ns

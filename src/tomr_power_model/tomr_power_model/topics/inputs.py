@@ -108,6 +108,8 @@ def _complaint(arrival: Arrival | str | None) -> str | None:
         return arrival
     if arrival is Arrival.RESTARTED:
         return "the stamp jumps against the other topics: started afresh"
+    if arrival is Arrival.FOREIGN:
+        return f"the stamp {arrival.value}; the message is ignored: synchronise the clocks"
     return f"the stamp {arrival.value}; the message is ignored"
 
 
