@@ -344,6 +344,24 @@ def test_an_input_of_another_clock_is_left_out_and_says_so(topic: str) -> None:
     assert [frame.stamp_ns for frame in frames] == [BASE + 50 * MS * n for n in range(1, 30)]
 
 
+@pytest.mark.parametrize(
+    ("topic", "place"), [("battery_state", TOTAL), ("wheel_2/power", MOTORS[1])]
+)
+def test_what_is_measured_once_a_second_is_not_compared(topic: str, place: int) -> None:
+    stage, missing = ResidualStage(_robot()), []
+    takers = {item.topic: item.take for item in residual_inputs(_robot(), stage)}
+    for step in range(600):
+        stamp = BASE + step * 10 * MS
+        if step % 5 == 0:
+            stage.prediction(_prediction(stamp))
+        for name, make in ALL.items():
+            if name != topic or step % 100 == 0:
+                takers[name](make(stamp), stamp)
+        missing += [frame.residuals[place].missing for frame in stage.due()]
+    words = f"a gap in {topic}: it comes too rarely to be compared"
+    assert set(missing[60:]) == {words}
+
+
 def _imu(stamp: int) -> Any:
     rate = bag_message("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=0.1)
     force = bag_message("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=9.81)

@@ -274,16 +274,22 @@ class ResidualStage:
         frozen = self._repeats[wheel].is_frozen(tick, self._work(wheel, speed, measured.unit))
         if not self._has_motor_power:
             return Measured(NAN, "W", NOT_MEASURED)
-        missing = f"{NO_FRESH}{self._topics[wheel]}/power"
-        if self._flows[wheel].is_misplaced(tick):
-            missing = f"{GAP}{self._topics[wheel]}/power: its stamps do not fit"
-        if measured.value == measured.value:
-            missing = ""
-            if self._flows[wheel].is_broken(tick):
-                missing = f"{GAP}{self._topics[wheel]}/power"
-            if frozen:
-                missing = f"{self._topics[wheel]}/power{FROZEN}"
+        missing = self._gap(tick, wheel, measured.value)
+        if measured.value == measured.value and frozen:
+            missing = f"{self._topics[wheel]}/power{FROZEN}"
         return evolve(measured, value=NAN, missing=missing) if missing else measured
+
+    def _gap(self, tick: int, supply: int, value: float) -> str:
+        """Why a measured value does not count at a tick, or there is none; empty if it counts."""
+        topic = TOTAL_TOPIC if supply == TOTAL else f"{self._topics[supply]}/power"
+        flow, is_known = self._flows[supply], value == value
+        if flow.is_rare(tick):
+            return f"{GAP}{topic}: it comes too rarely to be compared"
+        if not is_known and flow.is_misplaced(tick):
+            return f"{GAP}{topic}: its stamps do not fit"
+        if is_known:
+            return f"{GAP}{topic}" if flow.is_broken(tick) else ""
+        return f"{NO_FRESH}{topic}"
 
     def _work(self, wheel: int, speed: Residual, unit: Unit) -> Work:
         asked = abs(speed.modelled)
@@ -303,9 +309,8 @@ class ResidualStage:
         else:
             value = self._windows[TOTAL].at(tick).value if source == "battery_state" else NAN
             models = [past.power[WHEELS] for past in self._recent]
-            missing = f"{NO_FRESH}{TOTAL_TOPIC}"
-            if value == value and self._flows[TOTAL].is_broken(tick):
-                value, missing = NAN, f"{GAP}{TOTAL_TOPIC}"
+            missing = self._gap(tick, TOTAL, value)
+            value = NAN if missing else value
         band = width(models, self.settings.bands.of_total(unit))
         reason = _missing(value, models[-1], missing, absent)
         return _residual(value, models[-1], band, unit, reason)

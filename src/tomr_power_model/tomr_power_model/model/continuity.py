@@ -18,6 +18,7 @@ _KEPT = 31  # intervals to take the usual one from
 _FEWEST = 5
 _EVERY = 8  # samples: how often it is taken anew, after the first time
 _RARE = 3  # gaps in a row: samples do not come more often
+_ENDED = 3  # times the last gap: what comes rarely does no more
 _STRAYS = 3  # messages in a row that precede: fewer are late ones
 _RATED = to_ns(2.0)  # time over which a rate is counted
 
@@ -127,12 +128,12 @@ class Continuity:
         """Whether at a tick the stream pauses, went on only just before, is in no order, or has
         too few samples for any of them to be held against a tick."""
         pauses = self.is_silent(tick_ns) or tick_ns < self._until
-        return pauses or self.is_rare or self._is_disordered()
+        return pauses or self.is_rare(tick_ns) or self._is_disordered()
 
-    @property
-    def is_rare(self) -> bool:
-        """Whether, up to the last tick, samples came one by one, with gaps between them."""
-        return self._pauses >= _RARE
+    def is_rare(self, tick_ns: int) -> bool:
+        """Whether samples come one by one, with gaps between them, and have not ended."""
+        age = tick_ns - self.last(tick_ns)
+        return self._pauses >= _RARE and age < _ENDED * self.silence
 
     def _is_disordered(self) -> bool:
         """Whether hardly any of the last messages could be placed; repeats do not count, as some

@@ -12,7 +12,6 @@ from tomr_power_model.model.ticks import to_ns
 TOPIC = "/diagnostics"
 _MANY = 3  # messages in a row that cannot be used
 _PAUSE = to_ns(0.5)  # of the commands: who is silent for so long has ended, and begun anew
-_LOST = to_ns(10.0)  # what comes rarely has ended
 _RECENT = to_ns(2.0)  # in which a gap or a refused message is worth a warning
 
 
@@ -39,7 +38,7 @@ class InputState:
             return Level.WARN, apart(flow.ahead) if flow.ahead else "its stamps do not fit"
         if flow.refused_since >= _MANY:
             return Level.WARN, "sends what cannot be used"
-        if flow.is_rare and age < _LOST:
+        if flow.is_rare(tick_ns):
             return Level.WARN, f"comes every {1e-9 * flow.silence:.1f} s: too rarely to be compared"
         if not last:
             return (Level.OK, "waiting") if self.is_optional else (Level.STALE, "no message yet")
