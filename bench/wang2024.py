@@ -26,9 +26,8 @@ from tqdm import tqdm
 
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, TOTAL
-from tomr_power_model.calibration.wang2024_samples import read_samples
+from tomr_power_model.calibration.wang2024_samples import joined, read_samples
 from tomr_power_model.cli import run_main
-from tomr_power_model.dynamics.drives import WheelMotion
 from tomr_power_model.model.scores import accuracy, nrmse
 from tomr_power_model.robot import Robot, load_robot
 from tomr_power_model.wang2024 import Coefficients
@@ -78,18 +77,7 @@ def record(planned: tuple[str, int], deviation: float, deviation_seed: int, fold
 
 def samples_of(bags: Sequence[Path], robot: Robot) -> Samples:
     """All that is known of some recordings, one after the other."""
-    parts = []
-    for bag in bags:
-        parts.append(read_samples(bag, robot).known())
-    totals = [part.total for part in parts if part.total is not None]
-    return Samples(
-        WheelMotion(
-            np.concatenate([part.motion.speed for part in parts]),
-            np.concatenate([part.motion.acceleration for part in parts]),
-        ),
-        np.concatenate([part.power for part in parts]),
-        np.concatenate(totals) if len(totals) == len(parts) else None,
-    )
+    return joined([read_samples(bag, robot) for bag in bags])
 
 
 def play(bag: Path, robot: str, parameters: dict[str, object]) -> Played:

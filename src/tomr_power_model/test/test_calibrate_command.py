@@ -15,6 +15,7 @@ from tomr_power_model.calibration.parameters import Choice
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import load_robot, read_description, shipped_robot
+from tomr_power_model.wang2024 import Coefficients
 
 # Of a recording: quoted in YAML, escaped in HTML, no formula in a picture.
 NAME = "<script>\x01 $a_ #: {\ntour"
@@ -109,6 +110,28 @@ def test_the_command_writes_a_robot_and_a_page(
     assert "<script" not in page.read_text()
 
 
+def test_the_paper_s_coefficients_are_fitted_to_a_file_that_the_model_takes(
+    tmp_path: Path,
+    make_drive: MakeDrive,
+    write_bag: WriteBag,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    bags = [
+        str(write_bag(make_drive(ROBOT, seed, seconds=30.0), tmp_path / f"{NAME}{seed}"))
+        for seed in (1, 2)
+    ]
+    out = tmp_path / "wang2024.yaml"
+    command = [bags[0], "--holdout", bags[1], "--robot", "reference", "--out", str(out)]
+    assert main([*command, "--power-model", "wang2024"]) == 0
+    printed = capsys.readouterr().out
+    (unseen,) = [line for line in printed.splitlines() if "tour2" in line]
+    motors, robot = (float(word) for word in unseen.split()[-2:])
+    assert 90.0 < motors < robot < 100.0
+    assert f"--set wang2024.coefficients={out}" in printed
+    Coefficients.load(out).check(ROBOT)
+    assert out.read_text().splitlines()[1].endswith("tour1, for reference.")
+
+
 def test_a_fitted_file_of_another_robot_is_refused(
     tmp_path: Path, make_drive: MakeDrive, write_bag: WriteBag
 ) -> None:
@@ -145,6 +168,8 @@ def test_a_recorded_fault_is_one_line_and_skipping_it_helps(
         (["--tolerance", "robot.mass=-1"], "give a number above 0"),
         (["--out", "/nowhere/fitted.yaml"], "no folder /nowhere"),
         (["--encoder-window", "0"], "give seconds above 0"),
+        (["--power-model", "wang2024", "--power-window", "0.02"], "--power-window is for the phys"),
+        (["--power-model", "wang2024"], "wheel_3_joint, 8.0 s to 14.0 s: its encoder"),
     ],
 )
 def test_bad_options_are_one_line(

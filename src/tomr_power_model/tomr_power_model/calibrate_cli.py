@@ -1,12 +1,14 @@
 """`tomr_calibrate`: fit a robot's description to recordings of it."""
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import cast
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 from tqdm import tqdm
 
@@ -15,7 +17,8 @@ from tomr_power_model.calibration.fitted import fitted_text
 from tomr_power_model.calibration.following import lost_wheels
 from tomr_power_model.calibration.parameters import Choice
 from tomr_power_model.calibration.scoring import COLUMNS
-from tomr_power_model.calibration.tables import rows, tables
+from tomr_power_model.calibration.tables import Line, rows, tables
+from tomr_power_model.calibration.wang2024 import calibrate_wang2024
 from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.drive.clean import check_duration
 from tomr_power_model.drive.cut import skips_of
@@ -34,6 +37,7 @@ from tomr_power_model.robot import (
 )
 
 _MOST_NAMES = 6  # of recordings in a line
+_PHYSICAL_ONLY = ("fit", "shared", "tolerance", "power_window", "squares", "report")
 _WIDTH = 120  # characters; a table that is cut off says nothing
 
 _EPILOG = """\
@@ -43,6 +47,7 @@ examples:
   tomr_calibrate tour --robot my_robot.yaml --out fitted.yaml --fit robot.mass \\
       --shared physics.contact.roller_drag.coefficient --tolerance robot.mass=0.02
   tomr_calibrate tour --robot my_robot.yaml --out fitted.yaml --skip tour=8.0:14.5
+  tomr_calibrate tour --robot my_robot.yaml --power-model wang2024 --out wang2024.yaml
 
 Drive about three minutes on the floor that counts: starts and stops, several headings and speeds,
 spins, and ten seconds of standing. Without --fit, mass, inertia, resistance, torque constant,
@@ -99,6 +104,12 @@ def _parser() -> argparse.ArgumentParser:
         "else 0.05, up to 0.2 for coarse encoders; five samples at least)",
     )
     add("--squares", action="store_true", help="plain least squares, no robust loss")
+    add(
+        "--power-model",
+        choices=("physical", "wang2024"),
+        default="physical",
+        help="whose values to fit: of the physical model, or the coefficients of Wang 2024",
+    )
     return parser
 
 
@@ -138,6 +149,8 @@ def _calibrate(arguments: Sequence[str] | None) -> int:
         if path is not None and not path.parent.is_dir():
             raise InputError(f"{path}: no folder {path.parent}: make it first")
     robot = load_robot(options.robot)
+    if options.power_model == "wang2024":
+        return _wang2024(options, robot)
     values = read_description(options.robot)
     choice = Choice(
         keys=tuple(options.fit),
@@ -169,6 +182,34 @@ def _calibrate(arguments: Sequence[str] | None) -> int:
         with _bar("report", None, "picture") as tick:
             texts[options.report] = report_page(result, options.robot, tick)
     write_together(texts)
+    return EXIT_OK
+
+
+def _wang2024(options: argparse.Namespace, robot: Robot) -> int:
+    """Fit the paper's coefficients in place of the description's values."""
+    for name in _PHYSICAL_ONLY:
+        if getattr(options, name):
+            option = "--" + name.replace("_", "-")
+            raise InputError(f"{option} is for the physical model: leave it out for wang2024")
+    timing = _timing(options)
+    drives = _drives(options, robot)
+    count = len(options.bags)
+    with _bar("fitting", None, "evaluation"):
+        found = calibrate_wang2024(robot, drives[:count], drives[count:], timing.span)
+    console = _console()
+    shown = ("held out, not fitted", found.held_out), ("fitted", found.fitted)
+    _print_scores(console, [(title, lines) for title, lines in shown if lines])
+    _say(console, [note for item in drives for note in item.notes], held_out=bool(found.held_out))
+    if options.out is not None:
+        bags = _listed([item.name for item in found.fitted])
+        note = f"By tomr_calibrate from {bags}, for {Path(options.robot).name}."
+        write_together({options.out: found.coefficients.text(note)})
+        name = shlex.quote(str(options.out))
+        console.print(
+            f"try it: tomr_diagnose BAG --robot {shlex.quote(options.robot)} --set "
+            f"power_model=wang2024 --set wang2024.coefficients={name}",
+            markup=False,
+        )
     return EXIT_OK
 
 
@@ -235,8 +276,7 @@ def _accuracies(numbers: Sequence[float]) -> str:
 
 
 def _print(result: Result, notes: Sequence[str]) -> None:
-    console = Console(highlight=False, soft_wrap=True)
-    console.width = max(console.width, _WIDTH)
+    console = _console()
     values = _table("value", "fitted", "95 %", "unit", "before", "left")
     for row in rows(result):
         style = "yellow" if row.open else None
@@ -244,19 +284,34 @@ def _print(result: Result, notes: Sequence[str]) -> None:
         values.add_row(*cells, style=style)
     console.print(values)
     console.print("left: of the uncertainty before\n")
+    _print_scores(console, tables(result))
+    _say(console, [*notes, *result.notes], held_out=bool(result.held_out))
+    for text in result.warnings:
+        console.print(f"warning: {one_line(text)}", markup=False, style="yellow")
+
+
+def _console() -> Console:
+    console = Console(highlight=False, soft_wrap=True)
+    console.width = max(console.width, _WIDTH)
+    return console
+
+
+def _print_scores(console: Console, found: Iterable[tuple[str, Sequence[Line]]]) -> None:
     scores = _table("accuracy, %", "s", *COLUMNS)
-    for title, lines in tables(result):
+    for title, lines in found:
         scores.add_row(title, style="bold")
         for line in lines:
             figures = (f"{100 * value:.1f}" if value == value else "-" for value in line.values)
-            scores.add_row(f"  {line.name}", f"{line.seconds:.0f}", *figures)
+            name = escape(one_line(line.name))
+            scores.add_row(f"  {name}", f"{line.seconds:.0f}", *figures)
     console.print(scores)
-    if not result.held_out:
-        notes = [*notes, "no --holdout: the figures are those of the fitted drives"]
-    for text in (*notes, *result.notes):
+
+
+def _say(console: Console, notes: Sequence[str], *, held_out: bool) -> None:
+    for text in notes:
         console.print(f"note: {one_line(text)}", markup=False)
-    for text in result.warnings:
-        console.print(f"warning: {one_line(text)}", markup=False, style="yellow")
+    if not held_out:
+        console.print("note: no --holdout: the figures are those of the fitted drives")
 
 
 def _table(*headings: str) -> Table:

@@ -1,5 +1,6 @@
-"""Samples for a fit out of a recording, tick by tick as the model stage sees them."""
+"""Samples for a fit out of recordings, tick by tick as the model stage sees them."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,24 +21,41 @@ Stamps = NDArray[np.int64]
 _STALE = to_ns(0.5)
 
 
-def read_samples(
-    path: Path,
+def read_samples(path: Path, robot: Robot, namespace: str | None = None) -> Samples:
+    """Those of a recording, as `tick_samples` has them."""
+    return tick_samples(read_drive(path, robot, namespace), robot)
+
+
+def joined(parts: Sequence[Samples]) -> Samples:
+    """All that is known of some recordings, one after the other."""
+    parts = [part.known() for part in parts]
+    totals = [part.total for part in parts if part.total is not None]
+    return Samples(
+        WheelMotion(
+            np.concatenate([part.motion.speed for part in parts]),
+            np.concatenate([part.motion.acceleration for part in parts]),
+        ),
+        np.concatenate([part.power for part in parts]),
+        np.concatenate(totals) if len(totals) == len(parts) else None,
+    )
+
+
+def tick_samples(
+    drive: Drive,
     robot: Robot,
-    namespace: str | None = None,
     encoder_window: int = to_ns(0.07),
     period: int = TickSettings().period,
 ) -> Samples:
     """Wheel motion from the encoders and measured power, one row per tick; NaN where missing.
 
-    Times in nanoseconds. Raises InputError where the recording has no power of every motor.
+    Times in nanoseconds. Raises InputError where the robot has no power of every motor.
     """
     if robot.measurement.source != "battery_state" or robot.measurement.quantity != "power":
         raise InputError(
-            f"{path}: a fit of wang2024 needs the power of each motor: robot.yaml has "
+            f"{drive.name}: a fit of wang2024 needs the power of each motor: robot.yaml has "
             f"measurement.source = {robot.measurement.source}, "
             f"measurement.quantity = {robot.measurement.quantity}"
         )
-    drive = read_drive(path, robot, namespace)
     stamps = _stamps(drive, drive.encoder_time)
     ticks = range((int(stamps[0]) // period + 1) * period, int(stamps[-1]) + 1, period)
     power_stamps = _stamps(drive, drive.power_time)

@@ -12,7 +12,7 @@ from typing import Any, Self, cast
 import yaml
 from attrs import Attribute, evolve, field, fields, frozen
 
-from tomr_power_model.errors import InputError
+from tomr_power_model.errors import InputError, one_line
 from tomr_power_model.files import write_text
 from tomr_power_model.robot import WHEELS, Robot, read_node_sections
 from tomr_power_model.robot.description import closest
@@ -127,22 +127,28 @@ class Coefficients:
         return evolve(self, **values)
 
     def save(self, path: Path) -> None:
-        """Write a parameter file that the node, `load` and `--robot` read alike."""
+        """Write `text` to a file."""
+        write_text(path, self.text())
+
+    def text(self, *notes: str) -> str:
+        """A parameter file that the node, `load` and `--robot` read alike, notes at its top."""
         values = {key.name: getattr(self, key.name) for key in fields(type(self))}
         group = {
             name: [_short(v) for v in value] if isinstance(value, tuple) else _short(value)
             for name, value in values.items()
         }
         document = {NODE: {"ros__parameters": {GROUP.rstrip("."): group}}}
-        text = yaml.safe_dump(document, sort_keys=False, default_flow_style=None)
-        write_text(path, "# Wang 2024: coefficients fitted to a healthy drive.\n" + text)
+        head = ("Wang 2024: coefficients fitted to a healthy drive.", *notes)
+        body = yaml.safe_dump(document, sort_keys=False, default_flow_style=None)
+        return "".join(f"# {one_line(line)}\n" for line in head) + body
 
     def check(self, robot: Robot) -> None:
         """Raise InputError unless they were fitted for this robot."""
         if self.L_R <= 0.0:
             raise InputError(
-                "power_model = wang2024 has no coefficients: fit them to a healthy drive and give "
-                f"the file as {FILE_PARAMETER}, or the group wang2024 in the section {NODE}"
+                "power_model = wang2024 has no coefficients: fit them to a healthy drive (tomr_cali"
+                f"brate --power-model wang2024) and give the file as {FILE_PARAMETER}, or the "
+                f"group wang2024 in the section {NODE}"
             )
         for name in ("L", "L_v", "v_max", "t"):
             value = getattr(self, name)
