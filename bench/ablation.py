@@ -18,7 +18,6 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
@@ -32,11 +31,11 @@ from extended import Fleet, scenario_of, seeds_of, targets, tracked
 from faults.drawn import KINDS
 from faults.play import changes_of
 from faults.recordings import Recordings
+from pool import each
 from ramps import over_ramps
 from rich.console import Console
 from rich.table import Table
 from stages import frames_of, pipeline_of
-from tqdm import tqdm
 
 from tomr_fault_diag.classifier.braking import BrakingWatch
 from tomr_fault_diag.classifier.contacts import Contacts
@@ -226,9 +225,7 @@ class Ablation:
 
     def run(self, title: str, drives: Sequence[Work]) -> list[dict[str, Any]]:
         """What each drive is worth, by name."""
-        with ProcessPoolExecutor() as pool:
-            found = pool.map(partial(_do, names=self.names, keep=self.keep), drives)
-            return list(tqdm(found, total=len(drives), desc=title, unit="drive", disable=None))
+        return each(partial(_do, names=self.names, keep=self.keep), drives, title=title)
 
 
 def _percent(share: float | None) -> str:

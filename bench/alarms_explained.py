@@ -12,19 +12,17 @@ description. `real_holdout` was used for no fit; `real` is what the explanation 
 
 import argparse
 import json
-import os
 import sys
 from collections import Counter
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
 from attrs import frozen
 from matplotlib.figure import Figure
+from pool import each
 from rich.console import Console
 from rich.table import Table
-from tqdm import tqdm
 
 from tomr_fault_diag.classifier.states import FAULTLESS
 from tomr_fault_diag.diagnosis.offline import diagnose
@@ -223,8 +221,7 @@ def _main(arguments: Sequence[str] | None) -> int:
     for case in {task.case for task in tasks}:
         text = (options.reports / "details" / case / "report.json").read_text(encoding="utf-8")
         effects[case] = [item["effect"] for item in json.loads(text)["findings"]]
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        played = list(tqdm(pool.map(play, tasks), total=len(tasks), unit="recording"))
+    played = each(play, tasks, unit="recording")
     results = {
         (task.case, task.recording, task.when): item
         for task, item in zip(tasks, played, strict=True)

@@ -2,9 +2,7 @@
 
 import contextlib
 import io
-import os
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -12,6 +10,7 @@ from typing import Any
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
+from pool import each
 from record import record_mission
 from rich.console import Console
 from rich.table import Table
@@ -138,8 +137,7 @@ def measure_mujoco() -> dict[str, Any]:
             Job(s, *m, truth, folder) for s in seeds for m in UNSEEN for truth in (False, True)
         ]
         jobs = fitted + unseen
-        with ProcessPoolExecutor(min(2, os.cpu_count() or 1)) as pool:
-            list(tqdm(pool.map(record, jobs), total=len(jobs), desc="driving", unit="drive"))
+        each(record, jobs, title="driving")
         for seed in seeds:
             bags = [str(job.path) for job in fitted if job.seed == seed]
             out = str(folder / f"fitted{seed}.yaml")

@@ -16,10 +16,8 @@ kept in DIR and not done again.
 import argparse
 import json
 import math
-import os
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 from pathlib import Path
 from time import process_time
@@ -32,9 +30,9 @@ from concealed.robots import described as described_robot
 from concealed.robots import description_text
 from diagnosis import Kind, named_by, rebanded, score_faulty, score_healthy, twin_of
 from diagnosis_report import Outcome, publish, report
+from pool import each
 from ramps import over_ramps
 from record import record_mission
-from tqdm import tqdm
 
 from tomr_commission.cli import main as commission
 from tomr_commission.plan import mission_text
@@ -189,9 +187,7 @@ def scored(task: Task) -> Outcome:
 
 
 def _outcomes(title: str, tasks: Sequence[Task]) -> list[Outcome]:
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        found = pool.map(scored, tasks)
-        return list(tqdm(found, total=len(tasks), desc=title, unit="drive"))
+    return each(scored, tasks, title=title)
 
 
 def _main(arguments: Sequence[str] | None) -> int:

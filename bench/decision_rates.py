@@ -10,12 +10,12 @@ import argparse
 import sys
 from collections import Counter
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 
 import numpy as np
 from disturbances import stamped
 from interrupted import recorded
+from pool import each
 
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
@@ -53,14 +53,14 @@ def main(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--rates", type=float, nargs="+", default=[5.0, 10.0, 20.0, 50.0, 100.0])
     parser.add_argument("--phases", type=int, default=4)
     parser.add_argument("--missions", nargs="+", default=MISSIONS)
-    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--jobs", type=int, help="processes (default: one a core)")
     options = parser.parse_args(arguments)
     shifts = [_PERIOD * k / options.phases for k in range(options.phases)]
     for mission in options.missions:
         recorded(mission, 100)  # the workers inherit it
         cases = list(product(options.rates, shifts))
-        with ProcessPoolExecutor(options.jobs) as pool:
-            found = list(pool.map(changes, *zip(*[(mission, *c) for c in cases], strict=True)))
+        columns = zip(*[(mission, *case) for case in cases], strict=True)
+        found = each(changes, *columns, title=mission, jobs=options.jobs)
         print(mission)
         for names, count in Counter(tuple(n for _, n in c) for c in found).most_common():
             same = [c for c in found if tuple(n for _, n in c) == names]

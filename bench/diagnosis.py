@@ -23,22 +23,19 @@ It takes an hour on two cores; --first-seed 500000 --drives 10 --healthy-hours 0
 """
 
 import argparse
-import os
 import pickle
 import sys
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from importlib.resources import files
-from itertools import repeat
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 from attrs import evolve, frozen
 from diagnosis_report import NAMES, Codes, Onset, Outcome, publish, report
+from pool import each
 from stages import as_arrays
-from tqdm import tqdm
 
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
@@ -309,10 +306,8 @@ def _run(
     kind: str | None,
     folder: Path | None,
 ) -> list[Result]:
-    title = kind or "healthy"
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        found = pool.map(work, seeds, repeat(kind), repeat(folder))
-        return list(tqdm(found, total=len(seeds), desc=title, unit="drive"))
+    of_all = [kind] * len(seeds), [folder] * len(seeds)
+    return each(work, seeds, *of_all, title=kind or "healthy")
 
 
 def _main(arguments: Sequence[str] | None) -> int:

@@ -18,11 +18,9 @@ its wheel turns. Decisions count from 1 s after it first shows. Figures are thos
 
 import argparse
 import math
-import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Self
 
@@ -33,7 +31,7 @@ from diagnosis import Kind as Diagnosed
 from diagnosis import rebanded, twin_of
 from diagnosis_report import publish
 from faults.drawn import EXTENDED, KINDS, LOADED_SLIP, NOT_TRAINED, faulty_drive, pushed_drive
-from tqdm import tqdm
+from pool import each
 
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import Diagnosis, FaultClassifier
@@ -248,16 +246,14 @@ def _main(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
     parser.add_argument("--commissioned", type=Path, help="DIR of bench/commissioned.py --out")
     parser.add_argument("--without-imu", action="store_true", help="robots that have none")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--jobs", type=int, help="processes (default: one a core)")
     parser.add_argument("--json", type=Path, help="write the report to this file as well")
     options = parser.parse_args(arguments)
     fleet = Fleet.of(options.commissioned, (IMU_TOPIC,) if options.without_imu else ())
     healthy = round(options.healthy_hours * 3600.0 / _DRIVE_SECONDS)
     seeds = seeds_of(options.first_seed, options.drives, healthy, options.kinds)
     tasks = [(fleet, seed, name) for seed, name in seeds]
-    with ProcessPoolExecutor(options.jobs) as pool:
-        played = pool.map(scored, tasks)
-        found = list(tqdm(played, total=len(tasks), unit="drive", disable=None))
+    found = each(scored, tasks, jobs=options.jobs)
     shown = [item for item in found if item is not None]
     report = {
         "never_showed": len(found) - len(shown),

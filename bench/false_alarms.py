@@ -9,14 +9,12 @@ included, from seeds that nothing else uses; the plant is the faster one that al
 
 import argparse
 import json
-import os
 import sys
 from collections import Counter
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
-from tqdm import tqdm
+from pool import each
 
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
@@ -64,8 +62,7 @@ def _main(arguments: Sequence[str] | None) -> int:
     options = parser.parse_args(arguments)
     count = max(1, round(options.hours * 3600.0 / 18.0))
     seeds = range(_FIRST_SEED, _FIRST_SEED + count)
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        parts = list(tqdm(pool.map(alarms, seeds, chunksize=20), total=count, unit="drive"))
+    parts = each(alarms, seeds, at_a_time=20)
     kinds = Counter(name for found, _, _ in parts for name in found)
     hours = sum(ticks for _, _, ticks in parts) * 0.05 / 3600.0
     total = sum(kinds.values())

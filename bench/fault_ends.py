@@ -12,13 +12,12 @@ import argparse
 import math
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 
 import numpy as np
 from attrs import frozen
 from disturbances import Item, stamped
-from tqdm import tqdm
+from pool import each
 
 from tomr_demo.acts import twist_at
 from tomr_fault_diag.classifier.stage import FaultClassifier
@@ -137,26 +136,25 @@ def main(arguments: Sequence[str] | None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cases", type=int, default=40, help="of each fault (default 40)")
     parser.add_argument("--first-seed", type=int, default=1, help="default: 1")
-    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--jobs", type=int, help="processes (default: one a core)")
     options = parser.parse_args(arguments)
     seeds = range(options.first_seed, options.first_seed + options.cases)
     print(
         "| fault ends | named before | normal again after, median | 95th percentile | most ", end=""
     )
     print("| begun anew: accuse |\n|---|---|---|---|---|---|")
-    with ProcessPoolExecutor(options.jobs) as pool:
-        for fault, leap in product(FAULTS, (0.0, _LEAP)):
-            endings = [random_ending(fault, seed, leap) for seed in seeds]
-            found = np.array(list(tqdm(pool.map(after, endings), fault, len(endings))))
-            times, accused = found[:, 0], int(found[:, 1].sum())
-            named = np.sort(times[~np.isnan(times)])
-            middle, high = np.quantile(named, [0.5, 0.95], method="higher")
-            most = named[-1]
-            name = f"{fault}, stamps leap" if leap else fault
-            print(
-                f"| {name} | {len(named)} of {len(times)} | {middle:.2f} s | {high:.2f} s "
-                f"| {most:.2f} s | {accused} of {len(_ANEW) * len(times)} |"
-            )
+    for fault, leap in product(FAULTS, (0.0, _LEAP)):
+        endings = [random_ending(fault, seed, leap) for seed in seeds]
+        found = np.array(each(after, endings, title=fault, jobs=options.jobs))
+        times, accused = found[:, 0], int(found[:, 1].sum())
+        named = np.sort(times[~np.isnan(times)])
+        middle, high = np.quantile(named, [0.5, 0.95], method="higher")
+        most = named[-1]
+        name = f"{fault}, stamps leap" if leap else fault
+        print(
+            f"| {name} | {len(named)} of {len(times)} | {middle:.2f} s | {high:.2f} s "
+            f"| {most:.2f} s | {accused} of {len(_ANEW) * len(times)} |"
+        )
     return EXIT_OK
 
 

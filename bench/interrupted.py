@@ -13,10 +13,8 @@ needs being back.
 
 import argparse
 import json
-import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import cache, partial
 from itertools import chain, islice
 from pathlib import Path
@@ -49,7 +47,7 @@ from disturbances import (
     unseen,
     zeros_of_imu,
 )
-from tqdm import tqdm
+from pool import each
 from winding import winding
 
 from tomr_fault_diag.classifier.stage import Diagnosis
@@ -269,7 +267,7 @@ def main(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--first-seed", type=int, default=100)
     parser.add_argument("--only", default="", help="cases whose kind holds this word")
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)))
+    parser.add_argument("--jobs", type=int, help="processes (default: one a core)")
     options = parser.parse_args(arguments)
     seeds = range(options.first_seed, options.first_seed + options.seeds)
     amount = options.placements, seeds
@@ -278,8 +276,7 @@ def main(arguments: Sequence[str] | None) -> int:
     for mission, seed in sorted({(listed[k][2], listed[k][3]) for k in chosen}):
         usually(mission, seed)  # the workers inherit it, and the drive
     play = partial(_play, placements=amount[0], seeds=amount[1])
-    with ProcessPoolExecutor(options.jobs) as pool:
-        results = list(tqdm(pool.map(play, chosen), total=len(chosen), disable=None))
+    results = each(play, chosen, jobs=options.jobs)
     found = table(results)
     for kind, row in found.items():
         print(f"{kind:40} {row['wrong']:3} of {row['drives']:3} wrong, "

@@ -22,7 +22,6 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import redirect_stdout
 from functools import partial
 from itertools import compress
@@ -33,7 +32,7 @@ from time import process_time
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
-from tqdm import tqdm
+from pool import each
 
 from tomr_odometry.cli import main as tomr_odometry
 from tomr_odometry.creep import Creep
@@ -94,10 +93,7 @@ def read_floor(folder: Path, name: str, every: int) -> Floor:
         for bag, heading in headings.items()
         if bag.startswith(f"{name}/") and round(heading / 5.0) % every == 0
     ]
-    with ProcessPoolExecutor(int(os.environ.get("OMP_NUM_THREADS", "2"))) as pool:
-        found = list(
-            tqdm(pool.map(_legs, [bag for bag, _ in chosen]), total=len(chosen), desc=name)
-        )
+    found = each(_legs, [bag for bag, _ in chosen], title=name)
     kept = [(bag, number, leg) for (bag, number), leg in zip(chosen, found, strict=True) if leg]
     return Floor(
         tuple(bag for bag, _, _ in kept),
@@ -206,8 +202,7 @@ def slips(options: argparse.Namespace) -> int:
         out = options.out / robot.name
         out.mkdir(parents=True, exist_ok=True)
         todo = [bag for bag in bags if not (out / bag.name).exists()]
-        with ProcessPoolExecutor(int(os.environ.get("OMP_NUM_THREADS", "2"))) as pool:
-            list(pool.map(partial(_drive, robot=robot / "robot.yaml", out=out), todo))
+        each(partial(_drive, robot=robot / "robot.yaml", out=out), todo)
     scorer = [sys.executable, str(folder / "score_odometry.py"), str(options.out)]
     data = [str(folder / "slips"), str(folder / "slips_truth")]
     for which in ("drives", "healthy"):

@@ -7,15 +7,13 @@ in either simulation, and their correlation tick by tick. Sensor noise is drawn 
 """
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
+from pool import each
 from stages import as_arrays
-from tqdm import tqdm
 
 from tomr_fault_diag.residuals.settings import BandSettings
 from tomr_power_model.cli import run_main
@@ -48,8 +46,7 @@ def _main(arguments: Sequence[str] | None) -> int:
     options = parser.parse_args(arguments)
     kinds = [kind for kind, _ in KINDS]
     work = [(_FIRST_SEED + number, kind) for kind in kinds for number in range(options.drives)]
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        found = list(tqdm(pool.map(both, *zip(*work, strict=True)), total=len(work), unit="drive"))
+    found = each(both, *zip(*work, strict=True))
     print(f"{'':22}{'residual':14}{'MuJoCo':>9}{'planar':>9}{'correlation':>13}")
     for kind in kinds:
         parts = [pair for pair, (_, of) in zip(found, work, strict=True) if of == kind]

@@ -8,11 +8,9 @@ constants and the friction of the bench only; nothing is fitted to the drives.
 
 import argparse
 import json
-import os
 import sys
 from collections import Counter
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import redirect_stdout
 from functools import partial
 from pathlib import Path
@@ -22,8 +20,8 @@ from typing import cast
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
+from pool import each
 from stages import as_arrays, pipeline_of, steps_of
-from tqdm import tqdm
 
 from tomr_fault_diag.classifier.states import FAULTLESS
 from tomr_fault_diag.diagnosis.summary import Summariser
@@ -139,9 +137,7 @@ def _main(arguments: Sequence[str] | None) -> int:
             for bag in sorted((out / options.surface).iterdir())
             if options.surface != "gray" or bag.name not in cast(Sequence[str], fitted)
         ]
-        with ProcessPoolExecutor(os.cpu_count()) as pool:
-            played = pool.map(partial(play, robot=options.robot), bags)
-            drives = list(tqdm(played, total=len(bags), desc="drives"))
+        drives = each(partial(play, robot=options.robot), bags)
     print(json.dumps(report(drives), indent=2))
     return 0
 

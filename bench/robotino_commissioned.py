@@ -10,10 +10,8 @@ brown floor is a data set of its own, robotino_brown beside the other; it is pla
 import argparse
 import csv
 import json
-import os
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import redirect_stdout
 from functools import partial
 from pathlib import Path
@@ -21,8 +19,8 @@ from tempfile import TemporaryDirectory
 from time import monotonic, process_time
 from typing import Any
 
+from pool import each
 from robotino import is_absent, play, report
-from tqdm import tqdm
 
 from tomr_commission.cli import main as commission
 from tomr_fault_diag.diagnosis.score import binomial_interval
@@ -48,9 +46,7 @@ def divided(bags: Path, surface: str) -> tuple[list[Path], list[Path]]:
 
 def alarmed(bags: Sequence[Path], robot: Path) -> dict[str, Any]:
     """Drives in which a fault is named, with the interval of their share, and all states."""
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        played = pool.map(partial(play, robot=str(robot)), bags)
-        found = report(list(tqdm(played, total=len(bags), desc="drives")))
+    found = report(each(partial(play, robot=str(robot)), bags))
     part = found["drives_with_a_fault_named"]
     assert isinstance(part, int)
     return {

@@ -13,7 +13,6 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
@@ -22,8 +21,8 @@ from attrs import frozen
 from extended import Fleet
 from faults.drawn import faulty_drive
 from faults.recordings import Recordings
+from pool import each
 from stages import pipeline_of, steps_of
-from tqdm import tqdm
 
 from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.severity import Severity
@@ -136,7 +135,7 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("--drives", type=int, default=12, help="of each kind (default: %(default)s)")
     add("--robot", type=Path, help="of faults_practice, for its drives too")
-    add("--jobs", type=int, default=2)
+    add("--jobs", type=int, help="processes (default: one a core)")
     add("--json", type=Path, help="every case goes here")
     return parser
 
@@ -145,10 +144,10 @@ def _severities(arguments: Sequence[str] | None) -> int:
     options = _parser().parse_args(arguments)
     seeds = range(FIRST_SEED, FIRST_SEED + options.drives)
     tasks = [(1000 * place + seed, name) for place, name in enumerate(_STATES) for seed in seeds]
-    with ProcessPoolExecutor(options.jobs) as pool:
-        cases = list(tqdm(pool.map(_simulated, tasks), total=len(tasks), disable=None))
-        if options.robot is not None:
-            cases += pool.map(partial(_recorded, robot=options.robot), _practice())
+    cases = each(_simulated, tasks, jobs=options.jobs)
+    if options.robot is not None:
+        recorded = partial(_recorded, robot=options.robot)
+        cases += each(recorded, list(_practice()), jobs=options.jobs)
     for kind in dict.fromkeys(case.kind for case in cases):
         print(_line(kind, [case for case in cases if case.kind == kind]))
     if options.json is not None:

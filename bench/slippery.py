@@ -16,7 +16,6 @@ import math
 import sys
 import zlib
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
@@ -25,8 +24,8 @@ from attrs import evolve, frozen
 from commissioned import made
 from numpy.typing import NDArray
 from odometry import ratio
+from pool import each
 from record import record_mission
-from tqdm import tqdm
 
 from tomr_odometry.estimate import Estimate
 from tomr_odometry.estimator import SlipOdometry
@@ -253,13 +252,12 @@ def _main(arguments: Sequence[str] | None) -> int:
     parser.add_argument("--robots", type=int, default=8)
     parser.add_argument("--first", type=int, default=20, help="number of the first robot")
     parser.add_argument("--imu", action="store_true", help="use the IMU, made worse")
-    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--jobs", type=int, help="processes (default: one a core)")
     options = parser.parse_args(arguments)
     numbers = range(options.first, options.first + options.robots)
     tasks = [(number, kind) for kind in KINDS for number in numbers]
-    with ProcessPoolExecutor(options.jobs) as pool:
-        found = pool.map(partial(scored, folder=options.out, use_imu=options.imu), tasks)
-        rows = list(tqdm(found, total=len(tasks), unit="drive"))
+    work = partial(scored, folder=options.out, use_imu=options.imu)
+    rows = each(work, tasks, jobs=options.jobs)
     for kind in KINDS:
         print(_line(kind, [row for row, task in zip(rows, tasks, strict=True) if task[1] == kind]))
     slid = [row for row in rows if row.reported == row.reported]

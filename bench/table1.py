@@ -10,10 +10,8 @@ under either order.
 
 import argparse
 import json
-import os
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,7 +20,7 @@ import numpy as np
 from attrs import frozen
 from figures.simulated import SENSOR_BANDS
 from numpy.typing import NDArray
-from tqdm import tqdm
+from pool import each
 from wang2024 import record
 
 from tomr_fault_diag.diagnosis.offline import diagnose
@@ -104,10 +102,10 @@ def agreement(codes: Codes, state: str) -> dict[str, object]:
 def _main(arguments: Sequence[str] | None) -> int:
     argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0]).parse_args(arguments)
     planned = [(case.mission, 1) for case in CASES]
-    with TemporaryDirectory() as name, ProcessPoolExecutor(min(2, os.cpu_count() or 1)) as pool:
+    with TemporaryDirectory() as name:
         make = partial(record, deviation=0.0, deviation_seed=0, folder=Path(name))
-        bags = list(tqdm(pool.map(make, planned), total=len(planned), desc="driving", unit="drive"))
-        found = list(pool.map(codes_of, bags, CASES))
+        bags = each(make, planned, title="driving")
+        found = each(codes_of, bags, CASES, title="diagnosing")
     report = {
         f"{case.state} ({case.mission})": agreement(codes, case.state)
         for case, codes in zip(CASES, found, strict=True)

@@ -9,10 +9,8 @@ the command and from the encoders. --deviation lets the robot differ from its de
 
 import argparse
 import json
-import os
 import sys
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,9 +18,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
+from pool import each
 from record import record_mission
 from stages import as_arrays, frames_of
-from tqdm import tqdm
 
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.frame import ENCODERS, MOTORS, TOTAL
@@ -132,16 +130,13 @@ def rows(title: str, found: dict[str, Scores]) -> Iterator[str]:
 def _main(arguments: Sequence[str] | None) -> int:
     options = _parser().parse_args(arguments)
     robot = load_robot(options.robot)
-    with (
-        TemporaryDirectory() as name,
-        ProcessPoolExecutor(min(2, os.cpu_count() or 1)) as pool,
-    ):
+    with TemporaryDirectory() as name:
         folder = Path(name)
         make = partial(
             record, deviation=options.deviation, deviation_seed=options.seed, folder=folder
         )
         planned = (*FITTED, *SCORED)
-        bags = list(tqdm(pool.map(make, planned), total=len(planned), desc="driving", unit="drive"))
+        bags = each(make, planned, title="driving")
         samples = samples_of(bags[: len(FITTED)], robot)
         fitted = fit_wang2024(robot, samples)
         if options.out:
@@ -154,7 +149,7 @@ def _main(arguments: Sequence[str] | None) -> int:
         report = {}
         for model, parameters in chosen.items():
             run = partial(play, robot=options.robot, parameters=parameters)
-            played = list(tqdm(pool.map(run, bags), total=len(bags), desc=model, unit="drive"))
+            played = each(run, bags, title=model)
             by_drive = {
                 f"{mission}, seed {seed}": scores([item])
                 for (mission, seed), item in zip(planned, played, strict=True)

@@ -1,15 +1,14 @@
 """A recording through the offline diagnosis: its states, and the power residuals of every tick."""
 
 from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
+from pool import each
 from stages import as_arrays, pipeline_of, steps_of
-from tqdm import tqdm
 
 from tomr_fault_diag.classifier.stage import Diagnosis
 from tomr_fault_diag.classifier.states import (
@@ -26,7 +25,6 @@ from tomr_power_model.model.ticks import NANOSECONDS
 Array = NDArray[np.float64]
 Change = tuple[float, str, int | None]  # stamp [s], state, wheel 1..3
 
-JOBS = 2
 # The score knows the paper's six: what is none of them is unknown.
 _SCORED = {
     NOT_OBSERVABLE.name: "not_observable",
@@ -90,6 +88,5 @@ def play_all(
 ) -> dict[Path, Played]:
     """Diagnose recordings side by side."""
     chosen = tuple(bags)
-    with ProcessPoolExecutor(JOBS) as pool:
-        played = pool.map(partial(play, robot=robot, seconds=seconds), chosen)
-        return dict(zip(chosen, tqdm(played, total=len(chosen), disable=None), strict=True))
+    played = each(partial(play, robot=robot, seconds=seconds), chosen)
+    return dict(zip(chosen, played, strict=True))

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from faults.closed_loop import Prediction, closed_loop
-from faults.play import JOBS, Played, play
+from faults.play import Played, play
 from faults.recordings import Drive, Recordings
 from faults.regimes import (
     AT_REST,
@@ -23,6 +23,7 @@ from faults.regimes import (
     tick_speeds,
     undisturbed,
 )
+from tomr_power_model.dynamics.simulation import worker_count
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import Robot, load_robot
 
@@ -91,7 +92,7 @@ def compare_all(recordings: Recordings, robot: Path) -> dict[str, Compared | str
     for drive in recordings.drives("healthy_long"):
         chosen.append((f"long {drive.identity}", drive, _LONG))
     found: dict[str, Compared | str] = {}
-    with ProcessPoolExecutor(JOBS) as pool:
+    with ProcessPoolExecutor(worker_count()) as pool:
         tasks = {name: pool.submit(compare, drive, robot, end) for name, drive, end in chosen}
         for name, task in tasks.items():
             try:
