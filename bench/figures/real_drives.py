@@ -18,6 +18,7 @@ from figures.page import MEASURED, MUTED, PHYSICAL, WANG2024, lines, page, plain
 from figures.result import Result
 from figures.simulated import Played, of_robot
 from tomr_power_model.calibration.problem import modelled_power
+from tomr_power_model.drive.motion import median_period
 from tomr_power_model.model.scores import accuracy, nrmse
 
 Array = NDArray[np.float64]
@@ -172,7 +173,7 @@ def _picture(
 def _power(axis: Axes, drive: Scored) -> None:
     time, measured = drive.item.samples.time, drive.item.measured
     axis.plot(time, measured, ".", color=MEASURED, ms=1.5, alpha=0.5, label="measured, samples")
-    width = max(1, round(_SMOOTH / float(np.median(np.diff(time)))))
+    width = max(1, round(_SMOOTH / median_period(time)))
     inside = slice(width // 2, -(width // 2) or None)
 
     def smooth(values: Array) -> Array:

@@ -15,6 +15,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from tomr_demo.score import Stretch
 from tomr_demo.series import Drive, Power
 from tomr_fault_diag.classifier.states import CONTROL, MOTOR, NORMAL, SLIP, STATES
+from tomr_power_model.drive.motion import median_period
 from tomr_power_model.files.write import write_bytes
 from tomr_power_model.messages.plain import NANOSECONDS
 
@@ -203,7 +204,7 @@ def _residuals(figure: Figure, axis: Axes, drive: Drive) -> None:
         axis.axhline(border, color="white", lw=2.5, zorder=3)
     if len(drive.residual_time) < 2:
         return
-    period = float(np.median(np.diff(drive.residual_time)))
+    period = median_period(drive.residual_time)
     mesh = axis.pcolormesh(
         np.append(drive.residual_time - period, drive.residual_time[-1]),
         np.arange(len(names) + 1),

@@ -11,6 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from tomr_power_model.drive.motion import median_period
+
 Array = NDArray[np.float64]
 
 MEASURED, BEFORE, AFTER, PLACE = "#8a8f98", "#c2410c", "#1d4ed8", "#fde68a"
@@ -47,7 +49,7 @@ def broken(time: Array, values: Array) -> tuple[Array, Array]:
     """A line over time, broken where samples are missing."""
     if len(time) < 3:
         return time, values
-    gaps = np.flatnonzero(np.diff(time) > _BREAK * float(np.median(np.diff(time)))) + 1
+    gaps = np.flatnonzero(np.diff(time) > _BREAK * median_period(time)) + 1
     return np.insert(time, gaps, np.nan), np.insert(values, gaps, np.nan)
 
 

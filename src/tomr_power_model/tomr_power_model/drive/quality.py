@@ -11,7 +11,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from tomr_power_model.drive.motion import measured_speed, wheel_motion
+from tomr_power_model.drive.motion import measured_speed, median_period, wheel_motion
 from tomr_power_model.drive.quantum import quantum_of
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
@@ -78,7 +78,7 @@ def runs(
 
 def _gap(time: Array) -> float:
     """From which on nothing is known of what was between two samples [s]."""
-    return _GAP * float(np.median(np.diff(time)))
+    return _GAP * median_period(time)
 
 
 def refuse(findings: Iterable[Finding]) -> None:
@@ -109,7 +109,7 @@ def not_following(drive: Drive, robot: Robot, time: Array, expected: Array) -> I
     motion = wheel_motion(drive.encoder_time, drive.position, drive.velocity, time, _SPAN)
     known = np.isfinite(expected) & np.isfinite(motion.speed)
     expected, speed = (np.where(known, values, 0.0) for values in (expected, motion.speed))
-    width = _COMPARED / float(np.median(np.diff(time)))
+    width = _COMPARED / median_period(time)
     error = gaussian_filter1d((speed - expected) ** 2, width, axis=0)
     level = gaussian_filter1d(np.maximum(expected**2, speed**2), width, axis=0)
     notable = level > _NOTABLE**2

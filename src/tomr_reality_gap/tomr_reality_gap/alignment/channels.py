@@ -6,6 +6,7 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.drive.motion import median_period
 from tomr_power_model.drive.quantum import quantum_of
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.robot import Robot
@@ -97,9 +98,9 @@ def _quantum(reading: Array, drawn: Array) -> float:
 def _blocks(recorded: Drive) -> Channel:
     """The gyro's yaw rate, means over blocks of `_BLOCK`."""
     time, rate = recorded.yaw_time, recorded.yaw_rate
-    every = max(1, round(_BLOCK / float(np.median(np.diff(time)))))
+    every = max(1, round(_BLOCK / median_period(time)))
     rows = np.arange(len(time) // every * every).reshape(-1, every)
-    usual = every * float(np.median(np.diff(time)))
+    usual = every * median_period(time)
     whole = np.ptp(time[rows], axis=1) < usual
     middle, value = time[rows].mean(axis=1)[whole], rate[rows].mean(axis=1)[whole]
     span = np.full(len(middle), usual)
@@ -119,7 +120,7 @@ def _speeds(recorded: Drive, robot: Robot) -> list[Channel]:
         time = recorded.encoder_time
         is_measured = quantum > 0.0 and bool(np.isfinite(recorded.velocity[:, wheel]).any())
         if known.sum() > 1 and not is_measured:
-            every = max(1, round(_BLOCK / float(np.median(np.diff(time[known])))))
+            every = max(1, round(_BLOCK / median_period(time[known])))
             time, angle = time[known][::every], recorded.position[known, wheel][::every]
             span = np.diff(time)
             rows = span < _GAP * np.median(span)

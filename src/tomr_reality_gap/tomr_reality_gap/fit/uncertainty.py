@@ -7,6 +7,7 @@ block of the recordings pulls the values towards shows how wrong they may be for
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_power_model.drive.motion import median_period
 from tomr_power_model.estimation.intervals import (
     block_length,
     interval_factor,
@@ -48,7 +49,7 @@ def blocks_of(dataset: Dataset, residual: Array) -> NDArray[np.intp]:
     channels, parts = dataset.channels, rows_of(dataset.channels)
     ends = [max(float(c.time[-1]) for c in item.channels) for item in dataset.simulations]
     times = [
-        autocorrelation_time([residual[part]]) * float(np.median(np.diff(channel.time)))
+        autocorrelation_time([residual[part]]) * median_period(channel.time)
         for channel, part in zip(channels, parts, strict=True)
     ]
     length = block_length(ends, max(times))

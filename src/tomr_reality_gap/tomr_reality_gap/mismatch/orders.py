@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_power_model.drive.motion import median_period
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.estimation.statistics import robust_scale
 from tomr_reality_gap.alignment.channels import MOTOR_KINDS, Channel
@@ -56,7 +57,7 @@ def ripple_orders(
 
 def _fast(time: Array, values: Array) -> Array:
     """Without what is slow."""
-    width = max(3, round(_SLOW / float(np.median(np.diff(time)))))
+    width = max(3, round(_SLOW / median_period(time)))
     return np.asarray(values - np.convolve(values, np.ones(width) / width, mode="same"))
 
 
