@@ -225,6 +225,16 @@ def test_commands_that_act_as_late_as_described_are_waited_for(
     assert "cmd_vel comes 0.20 s later" in notes
 
 
+def test_a_radius_that_the_drivers_do_not_share_is_noted_with_the_one_they_have(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot, text = tmp_path / "robot.yaml", robot_file("reference").read_text()
+    robot.write_text(re.sub(r"wheel_radius: \S+", "wheel_radius: 0.0515", text))
+    notes = run(capsys, HEALTHY, "--robot", robot)[2]
+    assert "they turn 1.030 times as fast as described: write robot.wheel_radius: 0.05," in notes
+    assert "wheels and commands" not in run(capsys, HEALTHY)[2]
+
+
 def test_to_wait_for_late_commands_most_of_the_time_is_to_decide_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -160,6 +160,21 @@ def test_a_recorded_fault_is_one_line_and_skipping_it_helps(
     assert main([*command, "--skip", "circle_encoder_lost=7.0:15.0"]) == 0
 
 
+def test_a_radius_that_the_drivers_do_not_share_is_refused_with_the_one_they_have(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    described = yaml.safe_load(REFERENCE.read_text(encoding="utf-8"))
+    described["/**"]["ros__parameters"]["robot"]["wheel_radius"] = 0.0515
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(yaml.safe_dump(described))
+    assert main([str(FAULTY_BAG.parent / "square"), "--robot", str(robot)]) == 2
+    printed = capsys.readouterr().err
+    assert (
+        "they turn 1.030 times as fast as described: write robot.wheel_radius: 0.05, as" in printed
+    )
+    assert printed.count("\n") == 1
+
+
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [

@@ -23,9 +23,10 @@ from tomr_reality_gap.described import described, for_users
 from tomr_reality_gap.explanation import Explanation
 from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.model import Model
+from tomr_reality_gap.hypotheses.catalogue import nuisances
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 from tomr_reality_gap.request import Request
-from tomr_reality_gap.verdict import _comparisons, _term_notes
+from tomr_reality_gap.verdict import _comparisons, _term_notes, edge_notes
 from tomr_sim_bridge.plant.simulation import Simulation
 
 from .test_alignment import as_recorded, simulation  # noqa: F401 -- the fixture
@@ -74,6 +75,20 @@ def _notes(effect: object, spoils: bool = False) -> tuple[str, ...]:
     best = SimpleNamespace(model=SimpleNamespace(described=SimpleNamespace(robot=robot)))
     found = SimpleNamespace(best=best)
     return _term_notes(SimpleNamespace(unmodelled=effect, spoils=spoils, found=found))  # type: ignore[arg-type]
+
+
+def test_values_at_the_edge_of_their_tolerance_are_named() -> None:
+    base = per_wheel(dict(read_description("reference")), WHEELS, "reference")
+    held = nuisances(base, WHEELS, 0.02, {"motor.resistance": 0.1})
+    edges = {"robot.mass": 1.0, "robot.inertia_z": 0.9, "motor.wheel_1_joint.resistance": -1.0}
+    offsets = tuple(edges.get(item.keys[0], 0.0) * item.upper for item in held)
+    (note,) = edge_notes(Model(base, held, offsets))
+    listed = "robot.mass +2.5%, motor.wheel_1_joint.resistance -12.5%"
+    assert note.startswith(f"as far off as the tolerance lets them be: {listed}: measure them")
+    (note,) = edge_notes(Model(base, held, tuple(item.upper for item in held)))
+    assert note.count("%") == 6
+    assert f" and {len(held) - 6} more: " in note
+    assert edge_notes(Model(base, held, (0.0,) * len(held))) == ()
 
 
 def _draws(power: float, is_repeatable: bool) -> SimpleNamespace:

@@ -208,6 +208,7 @@ def test_nrmse_of_a_channel_is_the_residual_over_the_spread(mismatch: Explanatio
         (Estimate(2.31e-7, 2.2e-7, 2.42e-7, "W s/rad"), "2.31e-7 ± 1.1e-8 W s/rad"),
         (Estimate(2.0, 1.0, math.inf, ""), "2.0 (1.0 to ∞)"),
         (Estimate(1.5, 1.5, 1.5, "W"), "1.5 W"),
+        (Estimate(15.1, 12.6, 17.6, "kg", 20.0), "15.1 ± 2.5 kg, described as 20"),
     ],
 )
 def test_values_are_shown_to_the_digits_that_their_interval_warrants(

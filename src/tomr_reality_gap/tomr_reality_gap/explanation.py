@@ -21,6 +21,7 @@ class Estimate:
     low: float
     high: float
     unit: str
+    described: float | None = None  # what the description has for a value that is wrong
 
 
 @frozen

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.calibration.priors import drive_for
@@ -115,7 +115,7 @@ class Findings:
                 start = hypothesis.start.get(key, self.analysis.base.values.get(key))
                 starts.append(float(start if start is not None else neutral_of(key)))  # type: ignore[arg-type]
                 starts[-1] += nuisance.get(key, 0.0) if key not in hypothesis.start else 0.0
-            found[item.name] = estimate_of(
+            estimate = estimate_of(
                 sum(starts) / len(starts) + whole - theirs,
                 width,
                 offset=whole - theirs,
@@ -124,7 +124,15 @@ class Findings:
                 unit=item.unit,
                 bounds=bounds_of(item.keys[0]),
             )
+            is_wrong = hypothesis.effect.startswith("parameter.")
+            before = self._described(item.keys) if is_wrong else None
+            found[item.name] = evolve(estimate, described=before)
         return found
+
+    def _described(self, keys: Sequence[str]) -> float:
+        """What the description has for a value, the mean of all wheels."""
+        values = [self.analysis.base.values[key] for key in keys]
+        return sum(value for value in values if isinstance(value, float)) / len(values)
 
 
 def log_odds_of(found: Hypothesis, group: Sequence[FittedModel]) -> list[tuple[float, Hypothesis]]:

@@ -11,7 +11,7 @@ from tomr_power_model.drive.clean import check_duration, cleaned
 from tomr_power_model.drive.commands import shift_between
 from tomr_power_model.drive.cut import names_of, without
 from tomr_power_model.drive.excitation import check_excitation
-from tomr_power_model.drive.quality import not_following, refuse, sensor_faults
+from tomr_power_model.drive.quality import not_following, other_radii, refuse, sensor_faults
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.effects.scales import Scales
@@ -74,7 +74,8 @@ def prepared(request: Request) -> Prepared:
     )
     runs = tuple(item.run(base.robot) for item in recordings)
     for item, run in zip(recordings, runs, strict=True):
-        refuse(not_following(item.recorded, robot, item.timeline.middle, run.speed))
+        for found in (not_following, other_radii):
+            refuse(found(item.recorded, robot, item.timeline.middle, run.speed))
     scales = _scales(recordings, runs, robot)
     discrepancy = discrepancy_torques(simulations, base.robot, scales.torque)
     notes = [note for item in (*real, *held) for note in item.notes]

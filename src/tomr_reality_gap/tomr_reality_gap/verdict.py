@@ -17,12 +17,16 @@ from tomr_reality_gap.explanation import Comparison, Explanation, Finding, Learn
 from tomr_reality_gap.findings import Findings
 from tomr_reality_gap.fit.laws import words_of
 from tomr_reality_gap.fit.learnt import with_terms
+from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.mismatch.compare import comparison, score_of
 from tomr_reality_gap.mismatch.locate import maps_of, variables_at
 from tomr_reality_gap.rules import is_doubted, unexplained
 from tomr_reality_gap.suggest import suggested
 
 Array = NDArray[np.float64]
+
+_AT_EDGE = 0.98  # of the way to the edge of a tolerance
+_MOST_KEYS = 6  # in a line
 
 
 def explanation_of(
@@ -57,7 +61,7 @@ def explanation_of(
         score=score_of([item for item in comparisons if item.held_out]),
         explained=described(analysis, for_users(analysis, model)) if findings else "",
         suggested=suggested(findings),
-        notes=(*notes, *_term_notes(analysis)),
+        notes=(*notes, *_term_notes(analysis), *edge_notes(model)),
     )
 
 
@@ -77,6 +81,23 @@ def _term_notes(analysis: AnalysisResult) -> tuple[str, ...]:
     return (
         f"{effect.family.words} comes and goes: other drives are predicted without it; its course "
         "is an estimate for this one",
+    )
+
+
+def edge_notes(model: Model) -> tuple[str, ...]:
+    """Which described values the recordings ask to be farther off than they may be."""
+    listed = []
+    for parameter, offset in zip(model.nuisances, model.nuisance_offsets, strict=True):
+        value = model.base.values[parameter.keys[0]]
+        if isinstance(value, float) and abs(offset) > _AT_EDGE * parameter.upper:
+            listed.append(f"{parameter.keys[0]} {offset / value:+.1%}")
+    if not listed:
+        return ()
+    more = len(listed) - _MOST_KEYS
+    text = ", ".join(listed[:_MOST_KEYS]) + (f" and {more} more" if more > 0 else "")
+    return (
+        f"as far off as the tolerance lets them be: {text}: measure them, or give them more with "
+        "--tolerance KEY=REL",
     )
 
 
@@ -180,6 +201,7 @@ def _sentence(findings: Sequence[Finding]) -> str:
             continue
         sizes = ", ".join(
             f"{name} {value.value:.3g} {value.unit}".rstrip()
+            + ("" if value.described is None else f", described as {value.described:.3g}")
             for name, value in item.parameters.items()
         )
         parts.append(f"{_label(item.effect)} ({where}: {sizes})")

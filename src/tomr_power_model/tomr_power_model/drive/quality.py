@@ -13,6 +13,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from tomr_power_model.drive.motion import measured_speed, median_period, wheel_motion
 from tomr_power_model.drive.quantum import quantum_of
+from tomr_power_model.drive.radii import SPAN, answer, misdescribed
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
 from tomr_power_model.geometry.kinematics import twist_to_wheels
@@ -119,6 +120,16 @@ def not_following(drive: Drive, robot: Robot, time: Array, expected: Array) -> I
     if mostly and {item.where for item in found} == set(robot.wheel_names):
         found = [_other_controller(drive, time)]
     yield from found
+
+
+def other_radii(drive: Drive, robot: Robot, time: Array, expected: Array) -> Iterator[Finding]:
+    """Other radii, or places of wheels, than the drivers go by; as `not_following`."""
+    if len(time) < 2:
+        return
+    motion = wheel_motion(drive.encoder_time, drive.position, drive.velocity, time, SPAN)
+    seen, remedy = misdescribed(answer(time, motion.speed, expected, robot), robot)
+    if seen:
+        yield Finding(drive.name, "all wheels", float(time[0]), float(time[-1]), seen, remedy)
 
 
 def _astray(

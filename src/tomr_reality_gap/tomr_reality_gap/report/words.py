@@ -49,7 +49,13 @@ def decimals(estimate: Estimate, digits: int) -> int:
 
 
 def estimate_words(estimate: Estimate) -> str:
-    """E.g. `0.0410 ± 0.0035 N m`; both ends where the halves differ, none where it is fixed."""
+    """E.g. `0.0410 ± 0.0035 N m`; both ends where the halves differ, none where it is fixed. Of a
+    wrong value what it was described as, too."""
+    before = "" if estimate.described is None else f", described as {estimate.described:.4g}"
+    return _interval_words(estimate) + before
+
+
+def _interval_words(estimate: Estimate) -> str:
     unit = f" {estimate.unit}" if estimate.unit else ""
     if estimate.low == estimate.high:
         return f"{estimate.value:.4g}{unit}"

@@ -1,0 +1,90 @@
+"""Radii and places of wheels that the drivers have otherwise than the description."""
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from tomr_power_model.drive.radii import Answer, answer, misdescribed
+from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.robot import Robot, shipped_robot
+
+ROBOT = shipped_robot("reference")
+Array = np.ndarray
+
+
+def _twist(seconds: float = 60.0, period: float = 0.05) -> tuple[Array, Array]:
+    """Legs of 3 s: straight ahead, aside, turning on the spot, standing."""
+    time = np.arange(0.0, seconds, period)
+    legs = np.array([[0.3, 0.0, 0.0], [0.0, -0.4, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
+    return time, legs[(time // 3.0).astype(int) % 4]
+
+
+def _answer(drivers: Robot, noise: float = 0.0) -> Answer:
+    """Of a robot whose drivers have another description than ours."""
+    time, twist = _twist()
+    random = np.random.default_rng(1)
+    measured = twist @ twist_to_wheels(drivers).T
+    measured += noise * random.standard_normal(measured.shape)
+    return answer(time, measured, twist @ twist_to_wheels(ROBOT).T, ROBOT)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize(
+    ("changes", "seen", "remedy"),
+    [
+        ({}, "", ""),
+        ({"wheel_radius": 0.0501}, "", ""),  # of 0.05 m: 0.2 % are not said
+        (
+            {"wheel_radius": 0.04},
+            "they turn 1.250 times as fast as described",
+            "robot.wheel_radius: 0.04,",
+        ),
+        (
+            {"robot_radius": 0.22},
+            "where the robot turns, 1.100 times as fast",
+            "robot.robot_radius: 0.22,",
+        ),
+        (
+            {"wheel_offset": ROBOT.wheel_offset - 0.1},
+            "they drive +5.7 degrees beside the command",
+            f"robot.wheel_offset: {ROBOT.wheel_offset - 0.1:.4g}",
+        ),
+        (
+            {"wheel_radius": 0.052, "robot_radius": 0.19},
+            "they turn 0.962 times as fast as described, where the robot turns, 0.950 times",
+            "robot.wheel_radius: 0.052, robot.robot_radius: 0.19,",
+        ),
+    ],
+)
+def test_what_the_drivers_have_is_what_to_write(
+    changes: dict[str, float], seen: str, remedy: str, noise: float
+) -> None:
+    found = _answer(evolve(ROBOT, **changes), noise)
+    said, write = misdescribed(found, ROBOT)
+    if noise:  # digits may differ, not what is said
+        assert bool(said) == bool(seen)
+        return
+    assert said.startswith(seen)
+    assert bool(said) == bool(seen)
+    assert remedy in write
+
+
+def test_what_is_shown_too_little_or_not_alike_says_nothing() -> None:
+    time, twist = _twist()
+    expected = twist @ twist_to_wheels(ROBOT).T
+    fast = 1.08 * expected
+    assert misdescribed(answer(time, fast, expected, ROBOT), ROBOT)[0]
+    few = slice(0, 50)  # 2.5 s
+    short = answer(time[few], fast[few], expected[few], ROBOT)
+    assert short == Answer(None, None, None)
+    assert misdescribed(short, ROBOT) == ("", "")
+    straight = np.abs(twist[:, 2:]) < 0.1
+    found = answer(time, fast, np.where(straight, expected, np.nan), ROBOT)
+    assert found.yaw is None
+    assert misdescribed(found, ROBOT)[1].startswith("write robot.wheel_radius: 0.0463, as the")
+    half = np.where(time[:, None] < 30.0, fast, expected)  # a fault that begins
+    assert misdescribed(answer(time, half, expected, ROBOT), ROBOT) == ("", "")
+    assert misdescribed(answer(time, -expected, expected, ROBOT), ROBOT) == ("", "")
+    assert misdescribed(answer(time, fast[:, ::-1], expected, ROBOT), ROBOT) == ("", "")
+    loop = evolve(ROBOT, controller=evolve(ROBOT.controller, integral=0.0))
+    assert misdescribed(answer(time, fast, expected, loop), loop) == ("", "")
