@@ -5,6 +5,7 @@ import pytest
 from tomr_power_model.messages.plain import Level
 from tomr_power_model.model.continuity import POWER_TOLERANCE, Continuity
 from tomr_power_model.model.input_health import InputReporter, InputState
+from tomr_power_model.model.ticks import Arrival, to_ns
 
 MS = 1_000_000
 BASE = 1_700_000_000_000 * MS
@@ -68,6 +69,23 @@ def test_what_comes_too_rarely_to_be_compared_says_so_steadily() -> None:
     for t in range(18_000, 18_200, 20):
         stream.take(BASE + t * MS)
     assert not stream.is_broken(BASE + 18_190 * MS)
+
+
+@pytest.mark.parametrize(
+    ("ahead_s", "words"),
+    [
+        (7.46, "stamped 7.5 s ahead of the other inputs: synchronise the clocks"),
+        (-0.5, "stamped 0.5 s behind the other inputs: synchronise the clocks"),
+        (1.7e9, "stamped 1700000000.0 s ahead of the other inputs: set use_sim_time everywhere"),
+    ],
+)
+def test_how_far_a_clock_is_off_says_what_to_see_to(ahead_s: float, words: str) -> None:
+    stream = flow(1000)
+    for _ in range(3):
+        stream.ignore(Arrival.FOREIGN, BASE, to_ns(ahead_s))
+    assert said(InputState("x", stream), 1000) == (Level.WARN, words)
+    stream.take(BASE + 1020 * MS)
+    assert said(InputState("x", stream), 1020)[0] is Level.OK
 
 
 def test_a_usual_interval_between_gaps_is_no_rare_stream() -> None:

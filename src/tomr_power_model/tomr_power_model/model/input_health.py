@@ -12,13 +12,16 @@ from tomr_power_model.model.ticks import to_ns
 TOPIC = "/diagnostics"
 _MANY = 3  # messages in a row that cannot be used
 _PAUSE = to_ns(0.5)  # of the commands: who is silent for so long has ended, and begun anew
+_YEARS = to_ns(1e8)  # between the clocks of a computer and of a simulation
 _RECENT = to_ns(2.0)  # in which a gap or a refused message is worth a warning
 
 
 def apart(ahead_ns: int) -> str:
     """What to say of a stream whose stamps are so far ahead of those of the others [ns]."""
     way = "ahead of" if ahead_ns > 0 else "behind"
-    return f"stamped {1e-9 * abs(ahead_ns):.1f} s {way} the other inputs: synchronise the clocks"
+    is_simulated = abs(ahead_ns) > _YEARS
+    remedy = "set use_sim_time everywhere" if is_simulated else "synchronise the clocks"
+    return f"stamped {1e-9 * abs(ahead_ns):.1f} s {way} the other inputs: {remedy}"
 
 
 @frozen
