@@ -43,6 +43,7 @@ _LONGEST = to_ns(0.6)  # of a gap, as far as `share` goes
 _REFUSED = -1
 _MISPLACED = -2
 _REPEATED = -3
+_FOREIGN = -4
 
 
 class Continuity:
@@ -65,7 +66,8 @@ class Continuity:
         self._tolerated = self._tolerance.longest
         self._back, self._strays, self._misplaced = 0, 0, 0
         self._excused = 0
-        self.ahead = 0  # by another clock [ns]
+        self._foreign = 0  # how far the newest message of another clock is ahead [ns]
+        self.ahead = 0  # the same, up to the last tick; 0 once a sample came
         self.refused = 0  # messages up to the last tick
         self.refused_at = 0  # newest stamp before the last of them, 0: there was none
         self.refused_since = 0  # the newest sample
@@ -101,8 +103,8 @@ class Continuity:
     def ignore(self, arrival: Arrival, stamp_ns: int, ahead_ns: int) -> None:
         """Take note of an ignored message; one of another clock is so far ahead of the others."""
         if arrival is Arrival.FOREIGN:
-            self.ahead = ahead_ns
-            self.misplace()
+            self._foreign = ahead_ns
+            self._ahead.append((self._read, _FOREIGN))
         else:
             self.precedes(stamp_ns)
 
@@ -193,7 +195,9 @@ class Continuity:
             self._misplaced += 1
         if back not in (_REFUSED, _REPEATED):
             self._in_order.append(False)
-        if back not in (_MISPLACED, _REPEATED):
+        if back == _FOREIGN:
+            self.ahead = self._foreign
+        if back not in (_MISPLACED, _REPEATED, _FOREIGN):
             self.refused, self.refused_at = self.refused + 1, stamp
             self.refused_since += 1
         if back > 0:
