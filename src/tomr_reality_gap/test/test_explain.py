@@ -1,5 +1,6 @@
 """Bad input of an explanation, and what goes into robot_explained.yaml."""
 
+import re
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,6 +11,7 @@ from attrs import evolve
 
 from tomr_power_model.errors import InputError
 from tomr_power_model.robot import load_robot
+from tomr_power_model.robot.files import robot_file
 from tomr_power_model.unmodelled import FAMILIES, LearntTerm
 from tomr_reality_gap import prepared
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
@@ -44,6 +46,16 @@ def test_wheels_that_stand_elsewhere_belong_to_another_robot() -> None:
     """The wheels have the names of the description, and answer to other headings."""
     with pytest.raises(InputError, match=r"this robot\.yaml belongs to another robot"):
         explain(Request("robotino_v2", (SQUARE,)))
+
+
+def test_a_radius_that_the_drivers_do_not_share_is_refused_with_the_one_they_have(
+    tmp_path: Path,
+) -> None:
+    text = robot_file("reference").read_text(encoding="utf-8")
+    other = tmp_path / "other.yaml"
+    other.write_text(re.sub(r"wheel_radius: \S+", "wheel_radius: 0.0515", text), encoding="utf-8")
+    with pytest.raises(InputError, match=r"1\.030 times as fast .* robot\.wheel_radius: 0\.05,"):
+        prepared.prepared(Request(other, (SQUARE,)))
 
 
 @pytest.mark.parametrize(

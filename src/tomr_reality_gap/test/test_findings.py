@@ -13,6 +13,7 @@ from tomr_reality_gap.findings import Findings, log_odds_of
 from tomr_reality_gap.fit.model import Model
 from tomr_reality_gap.fit.refine import FittedModel
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
+from tomr_reality_gap.verdict import _sentence
 
 SAMPLES = 300
 
@@ -99,11 +100,12 @@ def test_the_smallest_that_would_have_been_seen_brings_just_its_cost() -> None:
     )
 
 
-def test_a_value_is_as_sure_as_noise_and_what_is_not_named_leave_it() -> None:
+@pytest.mark.parametrize("named", ["second", "parameter.made"])
+def test_a_value_is_as_sure_as_noise_and_what_is_not_named_leave_it(named: str) -> None:
     """The second of two findings; the simulator is exact to 2 % of no offset at all."""
-    size = Parameter("torque", ("made",), "N m", 0.5)
-    model = Model(ParameterisedRobot({"made": 1.0}, "made"), (), ())
-    for effect in ("first", "second"):
+    size = Parameter("torque", ("made", "other"), "N m", 0.5)
+    model = Model(ParameterisedRobot({"made": 0.5, "other": 1.5}, "made"), (), ())
+    for effect in ("first", named):
         model = model.joined(Hypothesis(effect, ("body",), (size,)))
     analysis = SimpleNamespace(
         found=SimpleNamespace(best=SimpleNamespace(model=model)),
@@ -114,3 +116,7 @@ def test_a_value_is_as_sure_as_noise_and_what_is_not_named_leave_it() -> None:
     )
     found = Findings(analysis, (), {})._parameters(1)["torque"]  # type: ignore[arg-type]
     assert (found.value, found.high) == (1.0, pytest.approx(1.0 + 1.96 * 0.5))
+    assert found.described == (1.0 if named.startswith("parameter.") else None)
+    finding = SimpleNamespace(effect=named, where=("all_wheels",), parameters={"torque": found})
+    words = ", described as 1)." if named.startswith("parameter.") else " N m)."
+    assert _sentence([finding]).endswith(words)  # type: ignore[list-item]
