@@ -129,6 +129,10 @@ def test_the_paper_s_coefficients_are_fitted_to_a_file_that_the_model_takes(
     assert 90.0 < motors < robot < 100.0
     assert f"--set wang2024.coefficients={out}" in printed
     Coefficients.load(out).check(ROBOT)
+    shorter = tmp_path / "shorter.yaml"
+    command[command.index(str(out))] = str(shorter)
+    assert main([*command, "--power-model", "wang2024", "--encoder-window", "0.05"]) == 0
+    assert Coefficients.load(shorter) != Coefficients.load(out)
     assert out.read_text().splitlines()[1].endswith("tour1, for reference.")
 
 

@@ -193,7 +193,7 @@ class TestInputsOfAStage:
             reference.measurement, source="joint_effort", quantity="motor_current", total="none"
         )
         readings: list[PowerReading] = []
-        arrivals = iter((Arrival.TAKEN, Arrival.REPEATED, Arrival.RESTARTED))
+        arrivals = iter((Arrival.TAKEN, Arrival.REPEATED, Arrival.RESTARTED, Arrival.FOREIGN))
         (joints,) = measured_inputs(
             evolve(reference, measurement=measurement),
             lambda *_: next(arrivals),
@@ -206,6 +206,8 @@ class TestInputsOfAStage:
         assert len(readings) == 2
         assert "started afresh" in str(joints.take(message, STAMP))
         assert len(readings) == 4
+        words = str(joints.take(message, STAMP))
+        assert words.endswith("the message is ignored: synchronise the clocks")
 
 
 @pytest.mark.parametrize(

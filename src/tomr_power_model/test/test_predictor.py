@@ -287,6 +287,23 @@ def test_commands_that_another_clock_stamps_say_so(ahead_ms: int, delay: float, 
     assert said[-1] == words
 
 
+def test_what_was_said_of_a_clock_is_forgotten_where_time_leaps() -> None:
+    predictor = PowerPredictor(shipped_robot("reference"))
+    legs: list[list[str]] = []
+    for start_ms, ahead_ms in ((0, 400), (60_000, 0)):
+        legs.append([])
+        for at_ms, kind in _events(3000):
+            stamp = BASE + (start_ms + at_ms) * MS
+            if kind == "command":
+                predictor.command(stamp + ahead_ms * MS, (0.0, 0.0, 0.0))
+            else:
+                predictor.encoders(stamp, (0.0, 0.0, 0.0), NAN3)
+            predictor.due()
+            legs[-1] += [report.statuses[0].message for report in predictor.reports()]
+    assert legs[0][-1].startswith("stamped 0.4 s ahead")
+    assert set(legs[1]) <= {"waiting", "as it should be"}
+
+
 def test_of_sensors_that_died_commands_are_not_ahead() -> None:
     predictor, said = PowerPredictor(shipped_robot("reference")), []
     for at_ms, kind in _events(6000):

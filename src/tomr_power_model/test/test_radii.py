@@ -69,6 +69,17 @@ def test_what_the_drivers_have_is_what_to_write(
     assert remedy in write
 
 
+def test_only_steady_motion_counts() -> None:
+    """Commands that change twice as often as not, and a robot that follows them 0.1 s late."""
+    time = np.arange(0.0, 120.0, 0.05)
+    speed = np.where(time % 6.0 < 2.0, 0.4, 0.2 + 0.15 * np.sin(4.0 * time))
+    twist, late = np.zeros((2, len(time), 3))
+    twist[:, 0], late[:, 0] = speed, np.interp(time - 0.1, time, speed)
+    expected, measured = (item @ twist_to_wheels(ROBOT).T for item in (twist, late))
+    found = answer(time, 1.05 * measured, expected, ROBOT)
+    assert found.linear == pytest.approx(1.05, abs=1e-3)
+
+
 def test_what_is_shown_too_little_or_not_alike_says_nothing() -> None:
     time, twist = _twist()
     expected = twist @ twist_to_wheels(ROBOT).T

@@ -27,6 +27,7 @@ from tomr_reality_gap.hypotheses.catalogue import nuisances
 from tomr_reality_gap.hypotheses.hypothesis import Hypothesis
 from tomr_reality_gap.request import Request
 from tomr_reality_gap.verdict import _comparisons, _term_notes, edge_notes
+from tomr_reality_gap.verdict import _notes as _notes_of
 from tomr_sim_bridge.plant.simulation import Simulation
 
 from .test_alignment import as_recorded, simulation  # noqa: F401 -- the fixture
@@ -89,6 +90,9 @@ def test_values_at_the_edge_of_their_tolerance_are_named() -> None:
     assert note.count("%") == 6
     assert f" and {len(held) - 6} more: " in note
     assert edge_notes(Model(base, held, (0.0,) * len(held))) == ()
+    found = SimpleNamespace(best=SimpleNamespace(model=Model(base, held, offsets)))
+    heeded = _notes_of(SimpleNamespace(unmodelled=None, found=found))  # type: ignore[arg-type]
+    assert heeded == edge_notes(Model(base, held, offsets))
 
 
 def _draws(power: float, is_repeatable: bool) -> SimpleNamespace:

@@ -61,8 +61,13 @@ def explanation_of(
         score=score_of([item for item in comparisons if item.held_out]),
         explained=described(analysis, for_users(analysis, model)) if findings else "",
         suggested=suggested(findings),
-        notes=(*notes, *_term_notes(analysis), *edge_notes(model)),
+        notes=(*notes, *_notes(analysis)),
     )
+
+
+def _notes(analysis: AnalysisResult) -> tuple[str, ...]:
+    """What is to be heeded of a term without a name, and of values at their edge."""
+    return (*_term_notes(analysis), *edge_notes(analysis.found.best.model))
 
 
 def _term_notes(analysis: AnalysisResult) -> tuple[str, ...]:

@@ -79,7 +79,7 @@ class TickClock:
         self._settle = settings.settle
         self._newest: dict[str, int] = {}
         self._periodic: set[str] = set()
-        # Of streams that are left out: by another clock, or not heard since time leapt.
+        # The same of streams that were left out, or heard before time leapt.
         self._elsewhere: dict[str, int] = {}
         self._sensors: set[str] = set()  # the periodic ones, once another was far from them
         self._watermark = 0
@@ -100,8 +100,6 @@ class TickClock:
         if stamp_ns <= self._newest.get(stream, 0):
             return Arrival.REPEATED
         self._newest[stream] = stamp_ns
-        if self._elsewhere:
-            self._elsewhere.pop(stream, None)
         if periodic:
             self._periodic.add(stream)
             self._measure_lead()
@@ -152,7 +150,6 @@ class TickClock:
 
     def _start(self, stream: str, stamp_ns: int, periodic: bool) -> None:
         self._elsewhere |= self._newest
-        self._elsewhere.pop(stream, None)
         self._newest = {stream: stamp_ns}
         self._periodic = {stream} if periodic else set()
         self._watermark = self._resumed = stamp_ns
