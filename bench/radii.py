@@ -1,9 +1,10 @@
 """Whether a description's radii that the drivers do not share are found, and right ones left alone.
 
-    .venv/bin/python bench/radii.py BAG... --robot robot.yaml [--wrong]
+    .venv/bin/python bench/radii.py BAG... --robot robot.yaml [--live | --wrong]
 
-Counts the recordings in which `other_radii` finds something as described. --wrong diagnoses the
-first with one value off at a time, and says what is named and noted then.
+Counts the recordings in which `other_radii` finds something as described; with --live those in
+which `inputs: robot.yaml` ever warns. --wrong diagnoses the first with one value off at a time, and
+says what is named and noted then.
 """
 
 import argparse
@@ -17,6 +18,8 @@ from typing import Any
 import yaml
 from pool import each
 
+from tomr_fault_diag.diagnosis.offline import diagnose
+from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.replayed import Replayed, Task, replay_one
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_power_model.calibration.following import expected_speed
@@ -25,6 +28,8 @@ from tomr_power_model.drive.clean import cleaned
 from tomr_power_model.drive.quality import other_radii
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.errors import InputError
+from tomr_power_model.messages.plain import NANOSECONDS, Level
+from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import load_robot
 from tomr_power_model.robot.files import robot_file
 
@@ -50,6 +55,22 @@ def found(bag: Path, robot: str) -> str | None:
     return "; ".join(map(str, other_radii(drive, described, time, expected)))
 
 
+def warned(bag: Path, robot: str) -> str | None:
+    """What `inputs: robot.yaml` warns of first in a recording, and when; as `found`."""
+    try:
+        with open_recording(bag) as recording:
+            pipeline = Pipeline(load_robot(robot), DiagnosisSettings.of({}, "bench"))
+            for receive_ns, step in diagnose(recording, pipeline):
+                for report in step.reports:
+                    for status in report.statuses:
+                        if status.name == "inputs: robot.yaml" and status.level is not Level.OK:
+                            seconds = (receive_ns - recording.start_ns) / NANOSECONDS
+                            return f"{seconds:.1f} s: {status.message}"
+    except InputError:
+        return None
+    return ""
+
+
 def changed(robot: str, wrong: Mapping[str, float], path: Path) -> str:
     """A file with a robot some of whose values are off."""
     tree: dict[str, Any] = yaml.safe_load(robot_file(robot).read_text(encoding="utf-8"))
@@ -72,6 +93,9 @@ def _main(arguments: Sequence[str] | None) -> int:
     )
     parser.add_argument("bags", nargs="+", type=Path, metavar="BAG")
     parser.add_argument("--robot", required=True)
+    parser.add_argument(
+        "--live", action="store_true", help="as nodes say it while the robot drives"
+    )
     parser.add_argument("--wrong", action="store_true", help="put values wrong, one at a time")
     options = parser.parse_args(arguments)
     if options.wrong:
@@ -86,7 +110,8 @@ def _main(arguments: Sequence[str] | None) -> int:
         print("| off | named | noted |\n|---|---|---|")
         print("\n".join(_line(*pair) for pair in zip(WRONG, played, strict=True)))
         return EXIT_OK
-    seen = each(partial(found, robot=options.robot), options.bags)
+    look = warned if options.live else found
+    seen = each(partial(look, robot=options.robot), options.bags)
     for bag, words in zip(options.bags, seen, strict=True):
         if words:
             print(f"{bag}: {words}")

@@ -327,6 +327,7 @@ def _health(feed: dict[str, Callable[[int], Any]]) -> tuple[dict[str, str], list
         ticks += [(frame.stamp_ns - BASE) // MS for frame in stage.due()]
         for report in stage.reports():
             said.update({status.name: status.message for status in report.statuses})
+    assert said.pop("inputs: robot.yaml") == "nothing speaks against it"
     return said, ticks
 
 

@@ -17,7 +17,7 @@ from tomr_odometry.settings import PARAMETERS, OdometrySettings
 from tomr_odometry.summary import lines, summary
 from tomr_odometry.topics import estimate_messages
 from tomr_power_model.cli import EXIT_OK, PrintAndLeave, run_main
-from tomr_power_model.errors import InputError
+from tomr_power_model.errors import InputError, counted
 from tomr_power_model.files import make_folder, write_together
 from tomr_power_model.messages.bag import to_bag
 from tomr_power_model.recordings import Recording, RecordingWriter, open_recording
@@ -79,7 +79,7 @@ def _play(
     items = estimates(recording, robot, core, complaints, options.namespace)
     kept = list(tqdm(items, unit=" estimates", disable=None, delay=1.0))
     for (topic, problem), count in complaints.counts.items():
-        print(f"note: {topic}: {problem} ({count} messages)", file=sys.stderr)
+        print(f"note: {topic}: {problem} ({counted(count, 'message')})", file=sys.stderr)
     if not kept:
         raise InputError(
             f"{options.bag}: no estimate: it takes encoder samples of all wheels with positions"

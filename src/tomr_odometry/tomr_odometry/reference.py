@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from tomr_power_model.errors import InputError
 from tomr_power_model.geometry.poses import turned
-from tomr_power_model.messages.intake import MALFORMED, WheelFinder, stamp_of
+from tomr_power_model.messages.intake import MALFORMED, stamp_of
+from tomr_power_model.messages.joined import WheelStream
 from tomr_power_model.messages.types import ODOMETRY, TF
 from tomr_power_model.recordings import Recording, require_topic
 from tomr_power_model.robot import Robot
@@ -79,15 +80,18 @@ def reference_of(recording: Recording, topic: str, namespace: str | None = None)
 
 def wheel_path(recording: Recording, robot: Robot, namespace: str | None = None) -> Path2D:
     """What the encoders alone say of the way, as if nothing slipped."""
-    finder, rows = WheelFinder(robot.wheel_names), []
+    wheels, rows = WheelStream(robot.wheel_names), []
     topic = require_topic(recording, "joint_states", namespace)
     for _, _, message, receive_ns in recording.messages([topic]):
         try:
-            position = finder.read(message).position
+            samples = wheels.samples(message, stamp_of(message, receive_ns))
         except MALFORMED:
             continue
-        if all(math.isfinite(value) for value in position):
-            rows.append((stamp_of(message, receive_ns), *position))
+        rows += [
+            (stamp, *found.position)
+            for stamp, found in samples
+            if all(math.isfinite(value) for value in found.position)
+        ]
     if len(rows) < 2:
         raise InputError(f"{recording.path}: {topic}: no wheel positions: odometry counts them")
     body, radius = body_of(robot)

@@ -10,7 +10,8 @@ from tomr_odometry.estimate import Estimate
 from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.grip import SIDE, Grid
 from tomr_odometry.settings import OdometrySettings
-from tomr_power_model.messages.intake import WheelFinder, inertial_of, stamp_of, twist_of
+from tomr_power_model.messages.intake import inertial_of, stamp_of, twist_of
+from tomr_power_model.messages.joined import WheelStream
 from tomr_power_model.messages.motion import odometry, quaternion, transform_of
 from tomr_power_model.messages.plain import (
     Level,
@@ -70,7 +71,7 @@ def odometry_inputs(robot: Robot, core: SlipOdometry) -> tuple[Input, ...]:
         return core.imu(stamp_of(message, receive_ns), (*rate, *force))
 
     inputs = [Input("cmd_vel", TWIST_STAMPED, guarded(command), (TWIST, TWIST_STAMPED))]
-    wheels = WheelFinder(robot.wheel_names)
+    wheels = WheelStream(robot.wheel_names)
     inputs += measured_inputs(robot, core.encoders, core.power, wheels)
     if core.settings.use_imu:
         inputs.append(Input("imu/data", IMU, guarded(imu)))

@@ -71,7 +71,7 @@ def test_names_may_change_from_message_to_message() -> None:
     assert wheels.position[0] == 1.0
     assert wheels.position[2] == 3.0
     assert math.isnan(wheels.position[1])
-    assert finder.missing() == (WHEELS[1],)
+    assert wheels.absent == (WHEELS[1],)
 
 
 def test_angles_that_begin_anew_each_turn_go_on() -> None:

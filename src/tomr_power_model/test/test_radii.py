@@ -19,7 +19,7 @@ def _twist(seconds: float = 60.0, period: float = 0.05) -> tuple[Array, Array]:
     return time, legs[(time // 3.0).astype(int) % 4]
 
 
-def _answer(drivers: Robot, noise: float = 0.0) -> Answer:
+def _answer(drivers: Robot, noise: float = 0.0) -> Answer | None:
     """Of a robot whose drivers have another description than ours."""
     time, twist = _twist()
     random = np.random.default_rng(1)
@@ -77,6 +77,7 @@ def test_only_steady_motion_counts() -> None:
     twist[:, 0], late[:, 0] = speed, np.interp(time - 0.1, time, speed)
     expected, measured = (item @ twist_to_wheels(ROBOT).T for item in (twist, late))
     found = answer(time, 1.05 * measured, expected, ROBOT)
+    assert found is not None
     assert found.linear == pytest.approx(1.05, abs=1e-3)
 
 
@@ -87,10 +88,11 @@ def test_what_is_shown_too_little_or_not_alike_says_nothing() -> None:
     assert misdescribed(answer(time, fast, expected, ROBOT), ROBOT)[0]
     few = slice(0, 50)  # 2.5 s
     short = answer(time[few], fast[few], expected[few], ROBOT)
-    assert short == Answer(None, None, None)
+    assert short is None
     assert misdescribed(short, ROBOT) == ("", "")
     straight = np.abs(twist[:, 2:]) < 0.1
     found = answer(time, fast, np.where(straight, expected, np.nan), ROBOT)
+    assert found is not None
     assert found.yaw is None
     assert misdescribed(found, ROBOT)[1].startswith("write robot.wheel_radius: 0.0463, as the")
     half = np.where(time[:, None] < 30.0, fast, expected)  # a fault that begins
@@ -99,3 +101,26 @@ def test_what_is_shown_too_little_or_not_alike_says_nothing() -> None:
     assert misdescribed(answer(time, fast[:, ::-1], expected, ROBOT), ROBOT) == ("", "")
     loop = evolve(ROBOT, controller=evolve(ROBOT.controller, integral=0.0))
     assert misdescribed(answer(time, fast, expected, loop), loop) == ("", "")
+
+
+@pytest.mark.parametrize("twists", [[(0.3, 0.0, 0.0)], [(0.2, 0.0, 0.8)]])
+def test_of_one_motion_three_values_explain_any_three_speeds(
+    twists: list[tuple[float, float, float]],
+) -> None:
+    """A wheel that is dead looks like three wrong values, until the robot moves otherwise."""
+    time = np.arange(0.0, 30.0, 0.05)
+    straight = np.broadcast_to(np.array(twists[0]), (len(time), 3))
+    expected = straight @ twist_to_wheels(ROBOT).T
+    dead = expected * [0.95, 1.0, 1.0]
+    found = answer(time, dead, expected, ROBOT)
+    assert found is not None
+    assert found.ways == 1
+    assert misdescribed(found, ROBOT) == ("", "")
+    found = answer(time, 1.05 * expected, expected, ROBOT)  # one value alone is believed
+    assert misdescribed(found, ROBOT)[1].startswith("write robot.wheel_radius: 0.04762, as")
+    both = np.where(time[:, None] < 15.0, straight, [[0.0, 0.3, 0.0]])
+    expected = both @ twist_to_wheels(ROBOT).T
+    assert answer(time, expected * [0.95, 1.0, 1.0], expected, ROBOT) is None
+    assert answer(time, 1.05 * expected, expected, ROBOT) == Answer(
+        pytest.approx(1.05), found.yaw and pytest.approx(1.05), pytest.approx(0.0), 2
+    )

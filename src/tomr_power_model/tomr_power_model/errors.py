@@ -16,3 +16,8 @@ def one_line(text: object) -> str:
     if len(line) > _MOST:
         line = f"{line[: _MOST // 2]} ... {line[-_MOST // 2 :]}"
     return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in line)
+
+
+def counted(number: int, noun: str) -> str:
+    """So many of something, as 1 message or 3 messages."""
+    return f"{number:,} {noun}" + ("" if number == 1 else "s")

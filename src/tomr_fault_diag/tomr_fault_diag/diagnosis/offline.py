@@ -37,15 +37,17 @@ def find_topics(
 
 
 def check_wheels(recording: Recording, topic: str, wheel_names: tuple[str, str, str]) -> None:
-    """Raise InputError if the first joint_states has none of the robot's wheels."""
+    """Raise InputError if joint_states are there and none has any of the robot's wheels."""
+    others: set[str] | None = None
     for _, _, message, _ in recording.messages([topic]):
-        names = list(message.name)
-        if not set(names) & set(wheel_names):
-            raise InputError(
-                f"{recording.path}: {topic} has {', '.join(names) or 'no joints'}, but robot.yaml "
-                f"names {', '.join(wheel_names)}: set robot.wheel_names"
-            )
-        return
+        if set(message.name) & set(wheel_names):
+            return
+        others = (others or set()) | set(message.name)
+    if others is not None:
+        raise InputError(
+            f"{recording.path}: {topic} has {', '.join(sorted(others)) or 'no joints'}, but "
+            f"robot.yaml names {', '.join(wheel_names)}: set robot.wheel_names"
+        )
 
 
 def replay(

@@ -18,7 +18,7 @@ from tomr_fault_diag.residuals.messages import residual_message
 from tomr_fault_diag.residuals.sources import residual_inputs
 from tomr_fault_diag.residuals.stage import ResidualStage
 from tomr_power_model.dynamics.binding import has_numba
-from tomr_power_model.messages.intake import WheelFinder
+from tomr_power_model.messages.joined import WheelStream
 from tomr_power_model.messages.outgoing import DiagnosticMessage, Outgoing
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.predictor import PowerPredictor
@@ -64,7 +64,7 @@ class Pipeline:
         self._residuals = ResidualStage(robot, settings.residuals)
         self._classifier = FaultClassifier.of(settings.classifier, robot)
         self._commissioned = commissioned_words(settings.classifier, robot)
-        wheels = WheelFinder(robot.wheel_names)
+        wheels = WheelStream(robot.wheel_names)
         self.inputs: tuple[Input, ...] = (
             *model_inputs(robot, self._predictor, wheels),
             *residual_inputs(robot, self._residuals, wheels),
@@ -102,6 +102,10 @@ class Pipeline:
         self.settings = settings
         self._residuals.retune(settings.residuals.bands)
         self._classifier.settings = settings.classifier
+
+    def misdescribed(self) -> str:
+        """What speaks against robot.yaml so far and what to write there, empty where nothing."""
+        return self._residuals.answers.words()
 
     def release(self) -> str:
         """Let go of a named fault, latched or not; returns its name, empty if there was none."""

@@ -14,7 +14,6 @@ from tomr_fault_diag.classifier.commissioned import commissioned_words
 from tomr_fault_diag.classifier.messages import diagnosis_message, evidence_of
 from tomr_fault_diag.classifier.stage import Diagnosis
 from tomr_fault_diag.classifier.states import WAITING
-from tomr_fault_diag.diagnosis.answers import Answers
 from tomr_fault_diag.diagnosis.heard import Heard, Stream, out_of_step, why_undecided
 from tomr_fault_diag.diagnosis.labels import Label, recorded_labels
 from tomr_fault_diag.diagnosis.offline import replay
@@ -93,7 +92,6 @@ class _Listener:
         self.pipeline = pipeline
         self._summariser = Summariser(pipeline.robot.wheel_names)
         self._tracker = Tracker(detail)
-        self._answers = Answers()
         self._detail = detail
 
     def take(self, step: Step) -> None:
@@ -104,7 +102,6 @@ class _Listener:
         for frame in step.frames:
             self._summariser.frame(frame)
             self._tracker.frame(frame)
-            self._answers.frame(frame)
         for report in step.reports:
             self._tracker.report(report)
 
@@ -113,9 +110,6 @@ class _Listener:
 
     def track(self) -> Track:
         return self._tracker.track()
-
-    def note(self) -> str:
-        return self._answers.note(self.pipeline.robot)
 
     def _probability(self, diagnosis: Diagnosis) -> float:
         """Of the state that stands, as its message says it."""
@@ -136,7 +130,7 @@ def replay_one(task: Task, progress: Progress | None = None) -> Replayed:
     heard = Heard()
     with open_recording(task.bag) as recording:
         _run(recording, task, listeners, heard, progress)
-        said = recording.warning, _outdated(task, robot), listeners[0].note()
+        said = recording.warning, _outdated(task, robot), listeners[0].pipeline.misdescribed()
         notes = tuple(filter(None, said))
         start_ns, end_ns = recording.start_ns, recording.end_ns
     first = listeners[0].pipeline

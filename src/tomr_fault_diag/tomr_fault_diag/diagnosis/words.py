@@ -8,7 +8,7 @@ from attrs import asdict
 from tomr_fault_diag.classifier.advice import check_first
 from tomr_fault_diag.diagnosis.replayed import Failed, Phase, Replayed
 from tomr_fault_diag.diagnosis.summary import Episode, Summary
-from tomr_power_model.errors import one_line
+from tomr_power_model.errors import counted, one_line
 from tomr_power_model.messages.plain import NANOSECONDS
 
 
@@ -88,7 +88,7 @@ def notes(replayed: Replayed) -> Iterator[str]:
     """What is to be said beside the diagnosis."""
     yield from replayed.notes
     for (topic, problem), count in replayed.complaints.items():
-        yield f"{topic}: {problem} ({count} messages)"
+        yield f"{topic}: {problem} ({counted(count, 'message')})"
 
 
 def total_line(done: Sequence[Replayed], failed: Sequence[Failed]) -> str:

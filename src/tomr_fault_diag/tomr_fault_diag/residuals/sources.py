@@ -3,7 +3,8 @@
 from typing import Any
 
 from tomr_fault_diag.residuals.stage import ResidualStage
-from tomr_power_model.messages.intake import WheelFinder, inertial_of, stamp_of
+from tomr_power_model.messages.intake import inertial_of, stamp_of
+from tomr_power_model.messages.joined import WheelStream
 from tomr_power_model.messages.readings import NAN
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.robot import Robot
@@ -11,7 +12,7 @@ from tomr_power_model.topics.inputs import Input, imu_input, measured_inputs
 
 
 def residual_inputs(
-    robot: Robot, stage: ResidualStage, wheels: WheelFinder | None = None
+    robot: Robot, stage: ResidualStage, wheels: WheelStream | None = None
 ) -> tuple[Input, ...]:
     """Encoders, power as the robot publishes it, and the IMU of a robot that has one."""
     inputs = measured_inputs(robot, stage.encoders, stage.power, wheels, refused=stage.refused)

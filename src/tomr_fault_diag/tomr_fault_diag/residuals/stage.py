@@ -8,6 +8,7 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
+from tomr_fault_diag.residuals.answers import AnswerWatch
 from tomr_fault_diag.residuals.frame import (
     BAND_SIGMAS,
     FROZEN,
@@ -49,7 +50,7 @@ from tomr_power_model.model.encoders import (
     Triple,
     WheelEstimate,
 )
-from tomr_power_model.model.input_health import InputReporter, InputState
+from tomr_power_model.model.input_health import InputReporter, InputState, Remark
 from tomr_power_model.model.prediction import Prediction
 from tomr_power_model.model.repeats import RepeatWatch, Work
 from tomr_power_model.model.ticks import Arrival, TickClock
@@ -124,6 +125,7 @@ class ResidualStage:
         self._voltages = VoltageWatch(lately)
         self._flaws = EncoderFlaws.of(robot)
         self._to_twist = Body.of(robot).to_twist
+        self.answers = AnswerWatch(robot, period)
         self._decided = 0  # newest tick
 
     def retune(self, bands: BandSettings) -> None:
@@ -202,10 +204,12 @@ class ResidualStage:
         """How the sensors do, as far as it is to be said anew; after `due`."""
         return self._health.due()
 
-    def _inputs(self, tick: int, frame: ResidualFrame) -> list[InputState]:
+    def _inputs(self, tick: int, frame: ResidualFrame) -> list[InputState | Remark]:
         absent = [self._robot.wheel_names[wheel] for wheel in self._encoders.absent(tick)]
         without = f"no {', '.join(absent)} among its names" if absent else ""
-        found = [InputState(ENCODERS, self._encoders.continuity, without)]
+        found: list[InputState | Remark] = [
+            InputState(ENCODERS, self._encoders.continuity, without)
+        ]
         if self._has_motor_power:
             for wheel, topic in enumerate(self._topics):
                 missing = frame.residuals[MOTORS[wheel]].missing
@@ -214,7 +218,7 @@ class ResidualStage:
         if self._robot.measurement.total == TOTAL_TOPIC:
             found.append(InputState(TOTAL_TOPIC, self._flows[TOTAL]))
         found += self._inertial.states(tick, frame)
-        return found
+        return [*found, self.answers.remark()]
 
     def _arrive(self, stream: str, stamp_ns: int) -> Arrival:
         arrival = self._clock.arrive(stream, stamp_ns)
@@ -242,6 +246,7 @@ class ResidualStage:
         absent = "" if known else _NO_PREDICTION
         estimate = self._encoders.at(tick)
         speeds = self._speeds(tick, estimate, absent)
+        self.answers.take(tick, speeds)
         motors = [self._supply(tick, wheel, speeds[wheel]) for wheel in range(WHEELS)]
         powers = [self._motor(wheel, motors[wheel], absent) for wheel in range(WHEELS)]
         derived = [self._derived(wheel, motors[wheel], absent) for wheel in range(WHEELS)]

@@ -26,24 +26,26 @@ _STEADY = 0.5  # m/s^2, rad/s^2
 _DRIVES, _TURNS = 0.1, 0.2  # m/s, rad/s
 _LEAST = 3.0  # s of steady motion
 _OFF = 0.004  # of 1, and rad, by which these may differ: healthy robots' samples do by 0.0008
-_ALIKE = 0.25  # of what one differs by, within which most of the motion has the same
-_NOISE = 0.01  # the same, of encoders
+_ALIKE = 0.25  # of what a motion differs by, within which most of it is as expected by these
+_NOISE = 0.01  # of a speed: the same, of encoders
 _MOST = 0.8
+_SHARE = 0.05  # of the motion, which counts as a way of moving
 _GROSS = 1.6  # and its logarithm in rad
 
 
 @frozen
 class Answer:
-    """Twist that the wheels turn with, against that which a simulation has; None where too little
-    shows it, NaN where it is not alike throughout, as with a fault."""
+    """Twist that the wheels turn with, against that which a simulation has."""
 
-    linear: float | None  # ratio
-    yaw: float | None  # ratio
-    turned: float | None  # direction of the linear part, anti-clockwise [rad]
+    linear: float  # ratio
+    yaw: float | None  # ratio; None where the robot turned too little
+    turned: float  # direction of the linear part, anti-clockwise [rad]
+    ways: int  # of moving, 1 to 3: straight drives to and fro are one, and so is a circle
 
 
-def answer(time: Array, measured: Array, expected: Array, robot: Robot) -> Answer:
-    """How the steady motion of a drive answers to its commands.
+def answer(time: Array, measured: Array, expected: Array, robot: Robot) -> Answer | None:
+    """How the steady motion of a drive answers to its commands; None where too little shows it, or
+    where it is not alike throughout, as with a fault.
 
     Args:
         time: evenly spaced [s], (n,).
@@ -53,19 +55,25 @@ def answer(time: Array, measured: Array, expected: Array, robot: Robot) -> Answe
     """
     period = median_period(time)
     to_twist = np.linalg.inv(twist_to_wheels(robot, nominal=True)).T
-    seen, asked = measured @ to_twist, expected @ to_twist
+    # In m/s all three, turning at the wheels.
+    scale = np.array([1.0, 1.0, robot.robot_radius])
+    seen, asked = measured @ to_twist * scale, expected @ to_twist * scale
     known = np.isfinite(seen).all(axis=1) & np.isfinite(asked).all(axis=1)
-    change = np.abs(np.diff(np.nan_to_num(asked), axis=0, append=0.0)).max(axis=1) / period
+    change = np.abs(np.diff(np.nan_to_num(asked / scale), axis=0, append=0.0)).max(axis=1) / period
     known &= _greatest(change, max(1, round(_AROUND / period))) < _STEADY
-    seen, asked, least = seen[known], asked[known], _LEAST / period
-    fast = np.linalg.norm(asked[:, :2], axis=1) > _DRIVES
-    (sx, sy), (ax, ay) = seen[fast, :2].T, asked[fast, :2].T
-    turns = np.abs(asked[:, 2]) > _TURNS
-    return Answer(
-        _usual(np.hypot(sx, sy) / np.hypot(ax, ay), 1.0, least),
-        _usual(seen[turns, 2] / asked[turns, 2], 1.0, least),
-        _usual(np.arctan2(sy * ax - sx * ay, sx * ax + sy * ay), 0.0, least),
-    )
+    fast = known & (np.linalg.norm(asked[:, :2], axis=1) > _DRIVES)
+    turns = known & (np.abs(asked[:, 2]) > _TURNS * robot.robot_radius)
+    if fast.sum() < _LEAST / period:
+        return None
+    # As complex numbers: the ratio of two has their directions' difference.
+    ways = seen[fast, :2] @ (1.0, 1.0j), asked[fast, :2] @ (1.0, 1.0j)
+    linear = float(np.median(np.abs(ways[0] / ways[1])))
+    turned = float(np.median(np.angle(ways[0] / ways[1])))
+    is_shown = turns.sum() >= _LEAST / period
+    yaw = float(np.median(seen[turns, 2] / asked[turns, 2])) if is_shown else None
+    seen, asked = seen[fast | turns], asked[fast | turns]
+    found = Answer(linear, yaw, turned, _ways(asked))
+    return found if _is_alike(seen, asked, found) else None
 
 
 def _greatest(values: Array, around: int) -> Array:
@@ -74,25 +82,33 @@ def _greatest(values: Array, around: int) -> Array:
     return np.asarray(sliding_window_view(padded, 2 * around + 1).max(axis=1))
 
 
-def _usual(found: Array, neutral: float, least: float) -> float | None:
-    """What most values are about; NaN where they differ, None of fewer than `least`."""
-    if len(found) < least:
-        return None
-    middle = float(np.median(found))
-    alike = np.abs(found - middle) < max(_ALIKE * abs(middle - neutral), _NOISE)
-    return middle if np.mean(alike) > _MOST else np.nan
+def _ways(asked: Array) -> int:
+    """In how many ways that differ twists (n, 3) move the robot."""
+    unit = asked / np.linalg.norm(asked, axis=1, keepdims=True)
+    return int((np.linalg.eigvalsh(unit.T @ unit / len(unit)) > _SHARE).sum())
 
 
-def misdescribed(found: Answer, robot: Robot) -> tuple[str, str]:
+def _is_alike(seen: Array, asked: Array, found: Answer) -> bool:
+    """Whether most twists (n, 3) are as an answer has them."""
+    cos, sin = found.linear * np.cos(found.turned), found.linear * np.sin(found.turned)
+    yaw = found.linear if found.yaw is None else found.yaw
+    expected = asked @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, yaw]])
+    off, change, size = (
+        np.linalg.norm(twists, axis=1) for twists in (seen - expected, expected - asked, asked)
+    )
+    return bool(np.mean(off < np.maximum(_ALIKE * change, _NOISE * size)) > _MOST)
+
+
+def misdescribed(found: Answer | None, robot: Robot) -> tuple[str, str]:
     """What is seen where the description is another than the drivers have, and what to write;
     empty where it is not. Of drivers without an integral friction decides how fast they turn."""
-    if robot.controller.integral <= 0.0 or found.linear is None or found.turned is None:
+    if found is None or robot.controller.integral <= 0.0:
         return "", ""
-    linear = found.linear
+    linear, turned = found.linear, found.turned
     turn = 1.0 if found.yaw is None else found.yaw / linear
-    # Gross mistakes are others': an order of wheels, a sign. False where one is not a number.
+    # Gross mistakes are others': an order of wheels, a sign.
     is_near = all(_GROSS > ratio > 1.0 / _GROSS for ratio in (linear, turn))
-    if not (is_near and abs(found.turned) < np.log(_GROSS)):
+    if not (is_near and abs(turned) < np.log(_GROSS)):
         return "", ""
     seen, keys = [], []
     if abs(linear - 1.0) > _OFF:
@@ -101,10 +117,11 @@ def misdescribed(found: Answer, robot: Robot) -> tuple[str, str]:
     if abs(turn - 1.0) > _OFF:
         seen.append(f"where the robot turns, {turn:.3f} times as fast")
         keys.append(f"robot.robot_radius: {robot.robot_radius * turn:.4g}")
-    if abs(found.turned) > _OFF:
-        seen.append(f"they drive {np.degrees(found.turned):+.1f} degrees beside the command")
-        keys.append(f"robot.wheel_offset: {robot.wheel_offset - found.turned:.6g}")
-    if not keys:
+    if abs(turned) > _OFF:
+        seen.append(f"they drive {np.degrees(turned):+.1f} degrees beside the command")
+        keys.append(f"robot.wheel_offset: {robot.wheel_offset - turned:.6g}")
+    # A motion of one kind has any three wheel speeds by three such values: as with a dead wheel.
+    if not keys or len(keys) > found.ways:
         return "", ""
     return (
         ", ".join(seen),

@@ -19,15 +19,15 @@ from tomr_power_model.drive.sources import (
     motor_topics,
     total_topics,
 )
-from tomr_power_model.errors import InputError, one_line
+from tomr_power_model.errors import InputError, counted, one_line
 from tomr_power_model.limits import limits, too_large
 from tomr_power_model.messages.intake import (
     MALFORMED,
-    WheelFinder,
     inertial_of,
     stamp_of,
     twist_of,
 )
+from tomr_power_model.messages.joined import WheelStream
 from tomr_power_model.recordings import Recording, open_recording, require_topic, resolve_topic
 from tomr_power_model.robot import WHEELS, Robot
 
@@ -55,7 +55,7 @@ class _Collector:
         self.gyro = Series(1)
         self.takers: dict[str, list[Taker]] = {}
         self.complaints: dict[str, int] = {}
-        self._wheels = WheelFinder(robot.wheel_names)
+        self._wheels = WheelStream(robot.wheel_names)
 
     def find(self) -> None:
         """Find the topics; raises InputError for one that must be there."""
@@ -110,9 +110,8 @@ class _Collector:
             self.takers.setdefault(topic, []).append(taker)
 
     def _joints(self, message: Any, receive_ns: int) -> None:
-        found = self._wheels.read(message)
-        stamp = stamp_of(message, receive_ns)
-        self.encoders.add(stamp, receive_ns, *found.position, *found.velocity)
+        for stamp, found in self._wheels.samples(message, stamp_of(message, receive_ns)):
+            self.encoders.add(stamp, receive_ns, *found.position, *found.velocity)
 
     def _command(self, message: Any, receive_ns: int) -> None:
         stamp = stamp_of(message, receive_ns, fallback=True)
@@ -224,7 +223,10 @@ def _no_power(path: Path, collector: _Collector) -> str:
 
 
 def _notes(path: Path, collector: _Collector) -> list[str]:
-    notes = [f"{path}: {text} ({count} messages)" for text, count in collector.complaints.items()]
+    notes = [
+        f"{path}: {text} ({counted(count, 'message')})"
+        for text, count in collector.complaints.items()
+    ]
     series = (collector.encoders, *collector.supplies)
     dropped, strays = sum(one.dropped for one in series), sum(one.strays for one in series)
     if dropped:

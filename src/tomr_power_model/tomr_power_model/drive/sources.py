@@ -132,7 +132,8 @@ def joint_effort(robot: Robot) -> tuple[PowerTopic, ...]:
 
     def read(message: Any, receive_ns: int) -> Iterator[PowerReading]:
         stamp = stamp_of(message, receive_ns)
-        for wheel, current in enumerate(wheels.read(message).effort):
+        efforts = () if wheels.is_others(message) else wheels.read(message).effort
+        for wheel, current in enumerate(efforts):
             if current == current:  # not NaN
                 yield PowerReading(wheel, stamp, NAN, drawing(current), NAN)
 

@@ -101,6 +101,7 @@ class Wheels:
     position: Triple
     velocity: Triple
     effort: Triple
+    absent: tuple[str, ...] = ()  # wheels that are not among the names
 
 
 class WheelFinder:
@@ -117,32 +118,42 @@ class WheelFinder:
         self._last: Any = None
         self._found = Wheels(_UNKNOWN, _UNKNOWN, _UNKNOWN)
         self._turns = Turns(len(wheel_names))
+        self._is_heard = False
+
+    def is_others(self, message: Any) -> bool:
+        """Whether a message is of other joints alone, as an arm sends, once wheels were heard."""
+        if not self._is_heard:
+            return False
+        self._find(message.name)
+        return bool(self._names) and len(self._missing) == len(self._wheels)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the last message had all wheels, or none was read."""
+        return not (self._is_heard and self._missing)
 
     def read(self, message: Any) -> Wheels:
         """Wheels of a message; raises Unusable if none is there or the lengths disagree."""
         if message is self._last:  # two stages read the same
             return self._found
-        names = message.name
-        if names != self._names:
-            self._find(list(names))
+        self._find(message.name)
         if len(self._missing) == len(self._wheels):
-            found = ", ".join(names) or "no joint"
+            found = ", ".join(self._names) or "no joint"
             raise Unusable(f"none of {', '.join(self._wheels)} is there, but {found}")
-        count = len(names)
+        count = len(self._names)
         position = self._pick(message.position, count, "position", LARGEST.angle)
         velocity = self._pick(message.velocity, count, "velocity", LARGEST.speed)
         effort = self._pick(message.effort, count, "effort", LARGEST.current)
         a, b, c = self._turns.go_on(position, velocity)
-        self._found = Wheels((a, b, c), velocity, effort)
+        self._found = Wheels((a, b, c), velocity, effort, self._missing)
         self._last = message
+        self._is_heard = True
         return self._found
 
-    def missing(self) -> tuple[str, ...]:
-        """Wheels that the last message did not have."""
-        return self._missing
-
-    def _find(self, names: list[str]) -> None:
-        self._names = names
+    def _find(self, names: Sequence[str]) -> None:
+        if names == self._names:
+            return
+        self._names = names = list(names)
         self._places = tuple(
             names.index(wheel) if wheel in names else None for wheel in self._wheels
         )

@@ -73,20 +73,30 @@ class InputState:
 
 
 @frozen
-class TermsState:
-    """What is to be said of learnt terms: whether the motion is one that they were learnt in."""
+class Remark:
+    """What is to be said of an input that is no stream, such as a file."""
 
-    outside: Sequence[str]  # families of those that are beyond their tables
+    topic: str
+    level: Level
+    message: str
 
     def verdict(self, tick_ns: int) -> tuple[Level, str]:
-        """How they do at a tick."""
-        if not self.outside:
-            return Level.OK, "within their tables"
-        return Level.WARN, f"fading beyond the table of {', '.join(self.outside)}"
+        """How it does."""
+        return self.level, self.message
 
     def status(self, tick_ns: int, hardware_id: str) -> Status:
         """As a status, with a name that stays."""
-        return Status("inputs: learnt terms", *self.verdict(tick_ns), hardware_id=hardware_id)
+        name = f"inputs: {self.topic}"
+        return Status(name, self.level, self.message, hardware_id=hardware_id)
+
+
+def terms_remark(outside: Sequence[str]) -> Remark:
+    """Whether the motion is one that learnt terms were learnt in; `outside`: families of those
+    that are beyond their tables."""
+    if not outside:
+        return Remark("learnt terms", Level.OK, "within their tables")
+    words = f"fading beyond the table of {', '.join(outside)}"
+    return Remark("learnt terms", Level.WARN, words)
 
 
 class InputReporter:
@@ -98,9 +108,7 @@ class InputReporter:
         self._slot = 0
         self._reports: list[DiagnosticMessage] = []
 
-    def take(
-        self, tick_ns: int, states: Sequence[InputState | TermsState], hardware_id: str
-    ) -> None:
+    def take(self, tick_ns: int, states: Sequence[InputState | Remark], hardware_id: str) -> None:
         """Look at all inputs of a stage at a tick."""
         levels = [state.verdict(tick_ns)[0] for state in states]
         slot = tick_ns // self._period

@@ -28,7 +28,7 @@ from tomr_power_model.model.encoders import (
     Triple,
     WheelEstimate,
 )
-from tomr_power_model.model.input_health import InputReporter, InputState, TermsState
+from tomr_power_model.model.input_health import InputReporter, InputState, Remark, terms_remark
 from tomr_power_model.model.means import Means
 from tomr_power_model.model.power_models import POWER_MODELS, MeasuredMotion, Windows
 from tomr_power_model.model.prediction import Prediction, Readings
@@ -184,11 +184,11 @@ class PowerPredictor:
         found = []
         for tick in self._clock.due():
             found.append(self._predict(tick))
-            states: list[InputState | TermsState] = [
+            states: list[InputState | Remark] = [
                 InputState(COMMANDS, self._commands, self._command_clock.ailment(), True)
             ]
             if self._robot.unmodelled:
-                states.append(TermsState(self._path.besides.outside))
+                states.append(terms_remark(self._path.besides.outside))
             self._health.take(tick, states, self.settings.hardware_id)
         return found
 

@@ -21,13 +21,13 @@ from tomr_power_model.messages.intake import (
     MALFORMED,
     Triple,
     Unusable,
-    WheelFinder,
     header_stamp_ns,
     inertial_of,
     numbers_of,
     stamp_of,
     twist_of,
 )
+from tomr_power_model.messages.joined import WheelStream
 from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.messages.types import IMU, JOINT_STATE, MULTI_ARRAY, TWIST, TWIST_STAMPED
 from tomr_power_model.model.predictor import PowerPredictor
@@ -56,14 +56,16 @@ class Thinning:
     """Leaves out samples that come more closely than nodes take those of a topic: they add nothing
     more. What `Flow` lets through of a flood is uneven, and recordings know nothing of it."""
 
-    def __init__(self, closest_ns: int = 0) -> None:
-        """`closest_ns`: that samples may come, where that is farther than the nodes' limit."""
+    def __init__(self, closest_ns: int = 0, applies: Callable[[], bool] = lambda: True) -> None:
+        """`closest_ns`: that samples may come, where that is farther than the nodes' limit;
+        `applies`: whether that counts now."""
+        self._applies = applies
         self._closest = max(closest_ns, NANOSECONDS // limits().topic_rate)
         self._last = 0
 
     def is_too_close(self, stamp_ns: int) -> bool:
         """Whether to leave out a sample; what goes back or repeats is for others to judge."""
-        if 0 < stamp_ns - self._last < self._closest:
+        if 0 < stamp_ns - self._last < self._closest and self._applies():
             return True
         self._last = stamp_ns
         return False
@@ -114,7 +116,7 @@ def _complaint(arrival: Arrival | str | None) -> str | None:
 
 
 def model_inputs(
-    robot: Robot, predictor: PowerPredictor, wheels: WheelFinder | None = None
+    robot: Robot, predictor: PowerPredictor, wheels: WheelStream | None = None
 ) -> tuple[Input, ...]:
     """Inputs of the model stage; `wheels` may be shared with another stage."""
 
@@ -158,7 +160,7 @@ def measured_inputs(
     robot: Robot,
     encoders: Callable[[int, Triple, Triple], Arrival | str],
     power: Callable[[PowerReading], Arrival | str],
-    wheels: WheelFinder | None = None,
+    wheels: WheelStream | None = None,
     *,
     refused: Callable[[str], None] = lambda topic: None,
 ) -> tuple[Input, ...]:
@@ -166,7 +168,8 @@ def measured_inputs(
 
     `refused` gets the topic of each message that nothing can be read from.
     """
-    take = _encoders(wheels or WheelFinder(robot.wheel_names), encoders)
+    wheels = wheels or WheelStream(robot.wheel_names)
+    take = _encoders(wheels, encoders)
     inputs = []
     for source in (*motor_topics(robot), *total_topics(robot)):
         if source.topic == ENCODER_TOPIC:
@@ -174,7 +177,8 @@ def measured_inputs(
         else:
             taker = guarded(_power(source, power), partial(refused, source.topic))
             inputs.append(Input(source.topic, source.type_name, taker))
-    thinning = Thinning()
+    # Wheels in messages of their own are stamped one right after the other.
+    thinning = Thinning(applies=lambda: wheels.is_whole)
     taker = guarded(thinning.around(take), partial(refused, ENCODER_TOPIC))
     encoder_input = Input(ENCODER_TOPIC, JOINT_STATE, taker, is_too_close=thinning.is_too_close)
     return (encoder_input, *inputs)
@@ -206,15 +210,16 @@ def _with_power(
     return take
 
 
-def _encoders(wheels: WheelFinder, take: Callable[[int, Triple, Triple], Arrival | str]) -> Take:
+def _encoders(wheels: WheelStream, take: Callable[[int, Triple, Triple], Arrival | str]) -> Take:
     """Reads the wheels out of joint_states for a stage's `encoders`; reports missing wheels."""
 
-    def encoders(message: Any, receive_ns: int) -> Arrival | str:
-        found = wheels.read(message)
-        arrival = take(stamp_of(message, receive_ns), found.position, found.velocity)
-        if arrival is Arrival.TAKEN and wheels.missing():
-            return f"no {', '.join(wheels.missing())} among its names"
-        return arrival
+    def encoders(message: Any, receive_ns: int) -> Arrival | str | None:
+        outcome: Arrival | str | None = None
+        for stamp, found in wheels.samples(message, stamp_of(message, receive_ns)):
+            outcome = take(stamp, found.position, found.velocity)
+            if outcome is Arrival.TAKEN and found.absent:
+                outcome = f"no {', '.join(found.absent)} among its names"
+        return outcome
 
     return encoders
 
