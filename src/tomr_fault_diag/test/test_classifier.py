@@ -190,6 +190,22 @@ def test_the_message_says_when_the_robot_was_commissioned() -> None:
         assert dict(status.values)["commissioned"] == words
 
 
+def test_of_a_robot_that_is_not_the_one_described_nothing_is_known() -> None:
+    """Named before, fault or not: what residuals show is of the wrong description."""
+    classifier, words = _classifier(), "the order of the wheels is wrong: write another"
+    healthy = [_frame(tick, HEALTHY) for tick in range(1, 40)]
+    faulty = [_frame(tick, TABLE_1[CONTROL]) for tick in range(40, 80)]
+    mistaken = [evolve(_frame(tick, TABLE_1[CONTROL]), mistake=words) for tick in range(80, 120)]
+    mended = [_frame(tick, HEALTHY) for tick in range(120, 200)]
+    found = [classifier.classify(frame) for frame in (*healthy, *faulty, *mistaken, *mended)]
+    named = [item.state.name for item in found if item is not None and item.changed]
+    assert named == ["normal", "control system fault", "unknown", "normal"]
+    (said,) = [item for item in found if item is not None and item.changed and item.frame.mistake]
+    status = diagnosis_message(shipped_robot("reference"), said, "").statuses[0]
+    assert status.message == f"unknown: robot.yaml: {words}"
+    assert dict(status.values)["evidence 1"] == f"robot.yaml: {words}"
+
+
 def test_a_clock_that_goes_back_starts_afresh() -> None:
     classifier = _classifier()
     for tick in range(100, 130):

@@ -522,10 +522,11 @@ def test_a_frame_survives_its_message() -> None:
         Residual(value, 1.0, 2.5, unit, missing="lost" if math.isnan(value) else "")
         for value, unit in zip(values, ["W", "A", "rad/s"] * 4, strict=False)
     )
-    frame = ResidualFrame(BASE, residuals, 0.912)
+    frame = ResidualFrame(BASE, residuals, 0.912, mistake="a plug: exchange it")
     message = to_bag(residual_message(robot, frame).plain)
     back = frame_of(message, BASE)
     assert back.supply == 0.912
+    assert back.mistake == frame.mistake
     assert [item.value for item in message.status[TOTAL].values if item.key == "supply"] == [
         "0.912"
     ]

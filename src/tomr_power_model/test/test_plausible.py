@@ -18,12 +18,12 @@ NAN = math.nan
     [
         (0, 700.0, 29.0, 24.0, ""),
         (0, -700.0, -29.0, 24.0, ""),
-        (1, 24e30, 1.0, 1e30, "1e+30 V of motor 2 cannot be (48 V"),
-        (2, 1.0, 61.0, NAN, "61 A of motor 3 cannot be (60 A"),
-        (2, 1441.0, NAN, NAN, "1.44e+03 W of motor 3 cannot be"),
+        (1, 24e30, 1.0, 1e30, "more V of motor 2 than can be (48 V"),
+        (2, 1.0, 61.0, NAN, "more A of motor 3 than can be (60 A"),
+        (2, 1441.0, NAN, NAN, "more W of motor 3 than can be (1.44e+03 W"),
         (TOTAL, 4000.0, 170.0, 24.0, ""),
-        (TOTAL, 4400.0, 170.0, 24.0, "of the robot cannot be"),
-        (0, 0.0, 0.0, 0.0, "0 V of motor 1 feeds nothing"),
+        (TOTAL, 4400.0, 170.0, 24.0, "of the robot than can be"),
+        (0, 0.0, 0.0, 0.0, "V feed nothing of motor 1"),
         (0, NAN, 0.3, NAN, ""),
     ],
 )

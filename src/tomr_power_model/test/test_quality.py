@@ -97,6 +97,13 @@ def test_a_sign_is_judged_where_power_is_known(make_drive: MakeDrive) -> None:
         refuse(faults(evolve(drive, power=reversed_)))
 
 
+def test_powers_of_other_wheels_are_refused(make_drive: MakeDrive) -> None:
+    drive = make_drive(ROBOT, 1)
+    swapped = evolve(drive, power=drive.power[:, [0, 2, 1]], reading=drive.reading[:, [0, 2, 1]])
+    with pytest.raises(InputError, match="wheel_2/power goes with the motion of wheel_3_joint"):
+        refuse(faults(swapped))
+
+
 def test_a_bag_of_another_robot_is_refused(make_drive: MakeDrive) -> None:
     turned = evolve(ROBOT, wheel_offset=ROBOT.wheel_offset + np.pi / 3)
     with pytest.raises(

@@ -72,7 +72,8 @@ def silence_message(
 def evidence_of(robot: Robot, diagnosis: Diagnosis) -> list[str]:
     """The residuals outside their bands, and those that are missing, in words."""
     names = residual_names(robot.wheel_topics)
-    found = [
+    found = [f"robot.yaml: {diagnosis.frame.mistake}"] if diagnosis.frame.mistake else []
+    found += [
         f"{name.removeprefix('residuals: ')}: {sentence(residual)}"
         for name, residual in zip(names, diagnosis.frame.residuals, strict=True)
         if residual.code or residual.stale
@@ -108,6 +109,8 @@ def _said(robot: Robot, diagnosis: Diagnosis) -> str:
     if state == NOT_ENOUGH:
         gaps = [r.missing for r in diagnosis.frame.residuals if r.missing.startswith(GAP)]
         return f"{state.name}: {gaps[0] if gaps else 'gaps a moment ago'}"
+    if state == UNKNOWN and diagnosis.frame.mistake:
+        return f"{state.name}: robot.yaml: {diagnosis.frame.mistake}"
     if state == WAITING:
         return f"{state.name}: no fresh command"
     if state == NOT_OBSERVABLE:

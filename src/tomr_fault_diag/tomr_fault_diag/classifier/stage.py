@@ -236,13 +236,12 @@ class FaultClassifier:
         if not data.joined:
             self._judge.interrupt()
             self._candidate_since = frame.stamp_ns
+        if frame.mistake and data.enough:
+            self._conclude(UNKNOWN, frame.stamp_ns)
+            return
         obeys_others = misfit.obeys_others and self._state in _WITHOUT_FAULT
         if (misfit.disobeys or obeys_others) and data.enough:
-            # No fault of one wheel looks like this; what the judge makes of it says nothing.
-            self._judge.clear()
-            self._opinion = None
-            self._candidate = DISOBEYS
-            self._enter(DISOBEYS, frame.stamp_ns, None)
+            self._conclude(DISOBEYS, frame.stamp_ns)
             return
         is_well = self._state is STATES[NORMAL]
         parity = NOT_KNOWN if self._parity is None else self._parity.take(frame)
@@ -254,6 +253,13 @@ class FaultClassifier:
             self._weigh(self._opinion, misfit, frame.stamp_ns, outside)
         else:
             self._enter(NOT_ENOUGH, frame.stamp_ns, None)
+
+    def _conclude(self, state: State, stamp: int) -> None:
+        """No fault of one wheel looks like this; what the judge makes of it says nothing."""
+        self._judge.clear()
+        self._opinion = None
+        self._candidate = state
+        self._enter(state, stamp, None)
 
     def _weigh(self, opinion: Opinion, misfit: Misfit, stamp: int, outside: Outside) -> None:
         """Name what the judge is sure of, or what it does not know."""

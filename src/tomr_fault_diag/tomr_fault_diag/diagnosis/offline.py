@@ -38,14 +38,14 @@ def find_topics(
 
 def check_wheels(recording: Recording, topic: str, wheel_names: tuple[str, str, str]) -> None:
     """Raise InputError if joint_states are there and none has any of the robot's wheels."""
-    others: set[str] | None = None
+    others: dict[str, None] | None = None
     for _, _, message, _ in recording.messages([topic]):
         if set(message.name) & set(wheel_names):
             return
-        others = (others or set()) | set(message.name)
+        others = (others or {}) | dict.fromkeys(message.name)
     if others is not None:
         raise InputError(
-            f"{recording.path}: {topic} has {', '.join(sorted(others)) or 'no joints'}, but "
+            f"{recording.path}: {topic} has {', '.join(others) or 'no joints'}, but "
             f"robot.yaml names {', '.join(wheel_names)}: set robot.wheel_names"
         )
 

@@ -105,7 +105,7 @@ class Pipeline:
 
     def misdescribed(self) -> str:
         """What speaks against robot.yaml so far and what to write there, empty where nothing."""
-        return self._residuals.answers.words()
+        return self._residuals.description.words()
 
     def release(self) -> str:
         """Let go of a named fault, latched or not; returns its name, empty if there was none."""

@@ -86,6 +86,7 @@ class ResidualFrame:
     along: tuple[Residual, Residual] = (UNKNOWN_FORCE, UNKNOWN_FORCE)  # accelerometer - wheels
     # Of the drivers of motors 1-3: what they hold - simulated.
     voltages: tuple[Residual, Residual, Residual] = (UNKNOWN_VOLTAGE,) * 3
+    mistake: str = ""  # a gross one in robot.yaml or the wiring, in words
 
     @property
     def codes(self) -> tuple[int, ...]:

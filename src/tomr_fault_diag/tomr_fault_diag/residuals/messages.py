@@ -31,7 +31,7 @@ def residual_message(
     """The message of one frame: a sentence to read, numbers to plot."""
     names = residual_names(robot.wheel_topics)
     statuses = tuple(
-        _status(name, residual, hardware_id, [("supply", f"{frame.supply:.6g}")] * (not place))
+        _status(name, residual, hardware_id, () if place else _of_all(frame))
         for place, (name, residual) in enumerate(zip(names, frame.residuals, strict=True))
     )
     beside = tuple(
@@ -43,6 +43,11 @@ def residual_message(
         )
     )
     return DiagnosticMessage(TOPIC, frame.stamp_ns, (*statuses, *beside))
+
+
+def _of_all(frame: ResidualFrame) -> tuple[tuple[str, str], ...]:
+    """What a frame says of the whole robot, beside its total power."""
+    return ("supply", f"{frame.supply:.6g}"), ("mistake", frame.mistake)
 
 
 def _beside(status: Status, residual: Residual) -> Status:
@@ -95,14 +100,16 @@ def frame_of(message: Any, stamp_ns: int) -> ResidualFrame:
     if len(statuses) != count:
         raise Unusable(f"{len(statuses)} statuses, a frame has {count}")
     *residuals, yaw, x, y, first, second, third = (_residual(status) for status in statuses)
-    supply, voltages = _supply(statuses[TOTAL]), (first, second, third)
-    return ResidualFrame(stamp_ns, tuple(residuals), supply, yaw, (x, y), voltages)
+    supply, mistake = _read_of_all(statuses[TOTAL])
+    voltages = (first, second, third)
+    return ResidualFrame(stamp_ns, tuple(residuals), supply, yaw, (x, y), voltages, mistake)
 
 
-def _supply(status: Any) -> float:
-    found = next((item.value for item in status.values if item.key == "supply"), "nan")
+def _read_of_all(status: Any) -> tuple[float, str]:
+    values = {item.key: item.value for item in status.values}
+    found = values.get("supply", "nan")
     try:
-        return float(found)
+        return float(found), str(values.get("mistake", ""))
     except ValueError:
         raise Unusable(f"{status.name}: supply {found!r} is no number") from None
 

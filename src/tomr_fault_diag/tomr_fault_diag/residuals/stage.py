@@ -8,7 +8,7 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from tomr_fault_diag.residuals.answers import AnswerWatch
+from tomr_fault_diag.residuals.description import DescriptionWatch
 from tomr_fault_diag.residuals.frame import (
     BAND_SIGMAS,
     FROZEN,
@@ -125,7 +125,7 @@ class ResidualStage:
         self._voltages = VoltageWatch(lately)
         self._flaws = EncoderFlaws.of(robot)
         self._to_twist = Body.of(robot).to_twist
-        self.answers = AnswerWatch(robot, period)
+        self.description = DescriptionWatch(robot, period)
         self._decided = 0  # newest tick
 
     def retune(self, bands: BandSettings) -> None:
@@ -145,7 +145,9 @@ class ResidualStage:
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
             if not self._encoders.add(EncoderSample(stamp_ns, position, velocity)):
                 self._encoders.continuity.refuse()
-                return "by robot.yaml no wheel can turn so far so fast; the sample is ignored"
+                return (
+                    "by robot.yaml no wheel can turn so far so fast (in rad); the sample is ignored"
+                )
         else:
             self._encoders.continuity.ignore(arrival, stamp_ns, self._clock.off(ENCODERS))
         return arrival
@@ -218,7 +220,7 @@ class ResidualStage:
         if self._robot.measurement.total == TOTAL_TOPIC:
             found.append(InputState(TOTAL_TOPIC, self._flows[TOTAL]))
         found += self._inertial.states(tick, frame)
-        return [*found, self.answers.remark()]
+        return [*found, self.description.remark()]
 
     def _arrive(self, stream: str, stamp_ns: int) -> Arrival:
         arrival = self._clock.arrive(stream, stamp_ns)
@@ -246,9 +248,9 @@ class ResidualStage:
         absent = "" if known else _NO_PREDICTION
         estimate = self._encoders.at(tick)
         speeds = self._speeds(tick, estimate, absent)
-        self.answers.take(tick, speeds)
         motors = [self._supply(tick, wheel, speeds[wheel]) for wheel in range(WHEELS)]
         powers = [self._motor(wheel, motors[wheel], absent) for wheel in range(WHEELS)]
+        self.description.take(tick, speeds, powers)
         derived = [self._derived(wheel, motors[wheel], absent) for wheel in range(WHEELS)]
         twist, bands = self._twist(estimate, speeds), self.settings.bands
         moves = float(np.abs(estimate.speed).max()) > _TURNS  # false where it is NaN
@@ -261,6 +263,7 @@ class ResidualStage:
             yaw,
             along,
             self._voltages.residuals(known, bands),
+            self.description.mistake,
         )
 
     def _supply_share(self, tick: int) -> float:

@@ -52,7 +52,7 @@ class PowerLimits:
             return None  # as nearly all are
         name = "the robot" if reading.wheel == TOTAL else f"motor {reading.wheel + 1}"
         if reading.voltage < self.dead:
-            return f"{reading.voltage:.3g} V of {name} feeds nothing; the sample is ignored"
+            return f"under {self.dead:.3g} V feed nothing of {name}; the sample is ignored"
         for value, most, unit in (
             (reading.voltage, self.voltage, "V"),
             (reading.current, self.current[reading.wheel], "A"),
@@ -60,5 +60,5 @@ class PowerLimits:
         ):
             if abs(value) > most:
                 limit = f"{most:.3g} {unit} is twice what it can"
-                return f"{value:.3g} {unit} of {name} cannot be ({limit}); the sample is ignored"
+                return f"more {unit} of {name} than can be ({limit}); the sample is ignored"
         return None

@@ -11,6 +11,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from tomr_power_model.drive.exchanged import draws_by, exchange_words, exchanged
 from tomr_power_model.drive.motion import measured_speed, median_period, wheel_motion
 from tomr_power_model.drive.quantum import quantum_of
 from tomr_power_model.drive.radii import SPAN, answer, misdescribed
@@ -312,6 +313,18 @@ def _wrong_sign(item: Drive, robot: Robot) -> Iterator[Finding]:
             )
 
 
+def _exchanged_power(item: Drive, robot: Robot) -> Iterator[Finding]:
+    """Powers that go with the motion of other wheels than their own."""
+    time, power = item.power_time, item.power
+    if len(time) < 2:
+        return
+    at_power = [np.interp(time, item.encoder_time, speed) for speed in measured_speed(item).T]
+    order = exchanged(power, draws_by(np.column_stack(at_power), time))
+    if order is not None:
+        seen, remedy = exchange_words(order, robot)
+        yield Finding(item.name, "all wheels", float(time[0]), float(time[-1]), seen, remedy)
+
+
 def _of_wheel(item: Drive, wheel: int) -> tuple[Array, Array, Array]:
     """Time, reading and wheel speed where the wheel's power was measured."""
     known = np.isfinite(item.reading[:, wheel])
@@ -333,4 +346,5 @@ SENSOR_CHECKS: tuple[Check, ...] = (
     _saturated_power,
     _stuck_power,
     _wrong_sign,
+    _exchanged_power,
 )

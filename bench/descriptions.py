@@ -1,0 +1,216 @@
+"""Whether a robot that is not as described, or not wired so, is found, and a right one left alone.
+
+    .venv/bin/python bench/descriptions.py BAG... --robot robot.yaml [--live | --wrong | --rewired]
+
+Counts the recordings in which `other_radii` finds something as described; with --live those in
+which `inputs: robot.yaml` ever warns. --wrong diagnoses the first with one value off at a time,
+--rewired as a robot that is wired or reports otherwise would have recorded it; both say what is
+named and noted then.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import yaml
+from pool import each
+
+from tomr_fault_diag.diagnosis.offline import diagnose
+from tomr_fault_diag.diagnosis.pipeline import Pipeline
+from tomr_fault_diag.diagnosis.replayed import Task, replay_one
+from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
+from tomr_power_model.calibration.following import expected_speed
+from tomr_power_model.cli import EXIT_OK, run_main
+from tomr_power_model.drive.clean import cleaned
+from tomr_power_model.drive.quality import other_radii
+from tomr_power_model.drive.read import read_drive
+from tomr_power_model.errors import InputError
+from tomr_power_model.messages.bag import bag_message
+from tomr_power_model.messages.plain import NANOSECONDS, Level
+from tomr_power_model.messages.types import JOINT_STATE
+from tomr_power_model.recordings import RecordingWriter, open_recording
+from tomr_power_model.robot import load_robot
+from tomr_power_model.robot.files import robot_file
+
+# By how much each value is off: factors, but of the offset radians.
+WRONG: Sequence[Mapping[str, float]] = (
+    {},
+    {"wheel_radius": 1.03},
+    {"wheel_radius": 1.08},
+    {"robot_radius": 1.08},
+    {"wheel_offset": 0.0349},
+    {"wheel_radius": 1.08, "robot_radius": 0.967},
+)
+
+
+def found(bag: Path, robot: str) -> str | None:
+    """What is found in a recording, "" where nothing; None where it cannot be read."""
+    described = load_robot(robot)
+    try:
+        drive = cleaned(read_drive(bag, described, None), described)
+    except InputError:
+        return None
+    time, expected = expected_speed(drive, described)
+    return "; ".join(map(str, other_radii(drive, described, time, expected)))
+
+
+def warned(bag: Path, robot: str) -> str | None:
+    """What `inputs: robot.yaml` warns of first in a recording, and when; as `found`."""
+    try:
+        with open_recording(bag) as recording:
+            pipeline = Pipeline(load_robot(robot), DiagnosisSettings.of({}, "bench"))
+            for receive_ns, step in diagnose(recording, pipeline):
+                for report in step.reports:
+                    for status in report.statuses:
+                        if status.name == "inputs: robot.yaml" and status.level is not Level.OK:
+                            seconds = (receive_ns - recording.start_ns) / NANOSECONDS
+                            return f"{seconds:.1f} s: {status.message}"
+    except InputError:
+        return None
+    return ""
+
+
+def changed(robot: str, wrong: Mapping[str, float], path: Path) -> str:
+    """A file with a robot some of whose values are off."""
+    tree: dict[str, Any] = yaml.safe_load(robot_file(robot).read_text(encoding="utf-8"))
+    values = tree["/**"]["ros__parameters"]["robot"]
+    for key, off in wrong.items():
+        values[key] = values[key] + off if key == "wheel_offset" else values[key] * off
+    path.write_text(yaml.safe_dump(tree), encoding="utf-8")
+    return str(path)
+
+
+Part = tuple[str, Any]  # topic and message
+REWIRED: dict[str, Callable[[str, Any], Iterator[Part]]] = {}
+
+
+def _rewired(
+    function: Callable[[str, Any], Iterator[Part]],
+) -> Callable[[str, Any], Iterator[Part]]:
+    REWIRED[function.__name__.replace("_", " ")] = function
+    return function
+
+
+@_rewired
+def one_encoder_counts_backwards(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("joint_states"):
+        message.position = message.position * [1.0, -1.0, 1.0]
+        message.velocity = message.velocity * [1.0, -1.0, 1.0]
+    yield topic, message
+
+
+@_rewired
+def all_encoders_count_backwards(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("joint_states"):
+        message.position = -message.position
+        message.velocity = -message.velocity
+    yield topic, message
+
+
+@_rewired
+def wheels_in_another_order(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("joint_states"):
+        message.name = [*message.name[1:], message.name[0]]
+    yield topic, message
+
+
+@_rewired
+def commands_turn_the_other_way(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("cmd_vel"):
+        twist = getattr(message, "twist", message)
+        twist.angular.z *= -1.0
+    yield topic, message
+
+
+@_rewired
+def currents_are_positive_while_drawing(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("/power"):
+        message.current *= -1.0
+    yield topic, message
+
+
+@_rewired
+def powers_of_two_motors_exchanged(topic: str, message: Any) -> Iterator[Part]:
+    other = {"/wheel_1/power": "/wheel_2/power", "/wheel_2/power": "/wheel_1/power"}
+    yield other.get(topic, topic), message
+
+
+@_rewired
+def a_message_for_each_wheel_and_an_arm(topic: str, message: Any) -> Iterator[Part]:
+    if not topic.endswith("joint_states"):
+        yield topic, message
+        return
+    for number, name in enumerate(message.name):
+        here = slice(number, number + 1)
+        position, velocity = message.position[here], message.velocity[here]
+        fields = {"header": message.header, "position": position, "velocity": velocity}
+        yield topic, bag_message(JOINT_STATE, name=[name], **fields)
+    yield topic, bag_message(JOINT_STATE, header=message.header, name=["elbow"], position=[0.5])
+
+
+def recorded(bag: Path, change: Callable[[str, Any], Iterator[Part]], new: Path) -> None:
+    """Write a recording as a robot that is wired otherwise would have made it."""
+    with open_recording(bag) as recording, RecordingWriter(new) as writer:
+        for topic, type_name, message, receive_ns in recording.messages():
+            for place, part in change(topic, message):
+                writer.write(place, type_name, part, receive_ns)
+
+
+def _rows(names: Sequence[str], tasks: Sequence[Task]) -> Iterator[str]:
+    """A table of what is named and noted."""
+    yield "| otherwise | named | noted |"
+    yield "|---|---|---|"
+    for name, played in zip(names, each(replay_one, tasks), strict=True):
+        shares = sorted(played.phases[0].summary.shares.items(), key=lambda item: -item[1])
+        named = ", ".join(f"{name} {share:.1%}" for name, share in shares if share > 0.001)
+        yield f"| {name} | {named} | {'; '.join(played.notes) or '-'} |"
+
+
+def _table(options: argparse.Namespace) -> list[str]:
+    settings, bag = DiagnosisSettings.of({}, "bench"), options.bags[0]
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        if options.rewired:
+            bags = [folder / str(number) for number in range(len(REWIRED))]
+            for change, new in zip(REWIRED.values(), bags, strict=True):
+                recorded(bag, change, new)
+            return list(_rows([*REWIRED], [Task(new, options.robot, settings) for new in bags]))
+        robots = [
+            changed(options.robot, wrong, folder / f"{number}.yaml")
+            for number, wrong in enumerate(WRONG)
+        ]
+        names = [str(dict(wrong)) if wrong else "as described" for wrong in WRONG]
+        return list(_rows(names, [Task(bag, robot, settings) for robot in robots]))
+
+
+def _main(arguments: Sequence[str] | None) -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("bags", nargs="+", type=Path, metavar="BAG")
+    parser.add_argument("--robot", required=True)
+    parser.add_argument(
+        "--live", action="store_true", help="as nodes say it while the robot drives"
+    )
+    parser.add_argument("--wrong", action="store_true", help="put values wrong, one at a time")
+    parser.add_argument("--rewired", action="store_true", help="wire the robot otherwise")
+    options = parser.parse_args(arguments)
+    if options.wrong or options.rewired:
+        print("\n".join(_table(options)))
+        return EXIT_OK
+    look = warned if options.live else found
+    seen = each(partial(look, robot=options.robot), options.bags)
+    for bag, words in zip(options.bags, seen, strict=True):
+        if words:
+            print(f"{bag}: {words}")
+    read = [words for words in seen if words is not None]
+    print(f"found in {sum(map(bool, read))} of {len(read)}; {len(seen) - len(read)} not read")
+    return EXIT_OK
+
+
+if __name__ == "__main__":
+    sys.exit(run_main(_main))

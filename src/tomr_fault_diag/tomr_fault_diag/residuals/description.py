@@ -1,0 +1,141 @@
+"""Whether the robot is the one that is described, and wired as described, while it drives."""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_fault_diag.residuals.frame import Residual, measured_speed
+from tomr_power_model.drive.exchanged import exchange_words, exchanged
+from tomr_power_model.drive.mistakes import gross_mistake
+from tomr_power_model.drive.radii import answer, misdescribed
+from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.messages.plain import Level
+from tomr_power_model.model.input_health import Remark
+from tomr_power_model.model.ticks import to_ns
+from tomr_power_model.robot import Robot
+
+Array = NDArray[np.float64]
+
+_KEPT = to_ns(120.0)  # of driving
+_EVERY = to_ns(5.0)
+_LEAST = to_ns(5.0)  # of driving, before which a fault may be all that is seen
+_TURNS = 0.3  # rad/s: where all wheels are to turn slower, a tick shows nothing
+_REVERSED = -0.5  # correlation of what a motor draws with what it should
+
+
+@frozen
+class _Driving:
+    """Ticks of driving, (n, 3) each, NaN where unknown."""
+
+    time: Array  # s, (n,)
+    speed: Array  # measured [rad/s]
+    asked: Array  # as the model has it [rad/s]
+    power: Array  # measured [W] or [A]
+    expected: Array  # as the model has it, likewise
+
+
+Said = tuple[str, str]  # what is seen and what to mend, empty where nothing
+
+
+def _mistaken(driving: _Driving, robot: Robot) -> Said:
+    twist = driving.asked @ np.linalg.inv(twist_to_wheels(robot, nominal=True)).T
+    seen, remedy = gross_mistake(twist, driving.speed, robot)
+    return f"wheels and commands: {seen}" if seen else "", remedy
+
+
+def _other_radii(driving: _Driving, robot: Robot) -> Said:
+    found = answer(driving.time, driving.speed, driving.asked, robot)
+    seen, remedy = misdescribed(found, robot)
+    return f"wheels and commands: {seen}" if seen else "", remedy
+
+
+def _reversed(driving: _Driving, robot: Robot) -> Said:
+    names = [
+        f"{topic}/power"
+        for topic, drawn, expected in zip(
+            robot.wheel_topics, driving.power.T, driving.expected.T, strict=True
+        )
+        if _is_reversed(drawn, expected)
+    ]
+    if not names:
+        return "", ""
+    return (
+        f"{', '.join(names)} gives back what the motor draws",
+        "BatteryState.current is negative while drawing: mend its sign in the driver, or set "
+        "measurement.signed: false if the sensor gives magnitudes",
+    )
+
+
+def _is_reversed(drawn: Array, expected: Array) -> bool:
+    """Whether a motor (n,) draws less the more it should; down a slope it only draws less."""
+    known = np.isfinite(drawn) & np.isfinite(expected)
+    drawn, expected = drawn[known], expected[known]
+    if not len(drawn) or np.sum(drawn) >= 0.0 or min(np.ptp(drawn), np.ptp(expected)) == 0.0:
+        return False
+    return bool(np.corrcoef(drawn, expected)[0, 1] < _REVERSED)
+
+
+def _exchanged(driving: _Driving, robot: Robot) -> Said:
+    order = exchanged(driving.power, driving.expected[:, :, None])
+    return ("", "") if order is None else exchange_words(order, robot)
+
+
+# What no fault looks like: residuals mean nothing until it is mended.
+_GROSS: Sequence[Callable[[_Driving, Robot], Said]] = (_mistaken, _reversed, _exchanged)
+
+
+def _sentence(said: Said) -> str:
+    seen, remedy = said
+    return f"{seen}: {remedy}" if seen else ""
+
+
+class DescriptionWatch:
+    """Holds the last minutes of driving against the description and the wiring.
+
+    A restart forgets nothing: the description stays what it is.
+    """
+
+    def __init__(self, robot: Robot, period_ns: int) -> None:
+        self._robot = robot
+        self._period = period_ns
+        self._ticks: deque[tuple[float, ...]] = deque(maxlen=_KEPT // period_ns)
+        self._slot = 0
+        self._words = ""
+        self.mistake = ""  # a gross one, as it was looked at last
+
+    def take(self, tick_ns: int, speeds: Sequence[Residual], powers: Sequence[Residual]) -> None:
+        """Take the wheels' speeds and the motors' powers of a tick."""
+        asked = [speed.modelled for speed in speeds]
+        if any(abs(speed) > _TURNS for speed in asked):  # false where unknown
+            measured = [measured_speed(speed) for speed in speeds]
+            expected = [power.modelled for power in powers]
+            drawn = [power.modelled + power.residual for power in powers]
+            self._ticks.append((*measured, *asked, *drawn, *expected))
+        slot = tick_ns // _EVERY
+        if slot != self._slot:
+            self._slot = slot
+            self._look()
+
+    def words(self) -> str:
+        """What speaks against the description so far and what to mend, empty where nothing."""
+        self._look()
+        return self._words
+
+    def _look(self) -> None:
+        if len(self._ticks) * self._period < _LEAST:
+            return
+        time = np.linspace(0.0, 1e-9 * self._period * (len(self._ticks) - 1), len(self._ticks))
+        parts = np.hsplit(np.array(self._ticks), 4)
+        driving = _Driving(time, *parts)
+        gross = (check(driving, self._robot) for check in _GROSS)
+        self.mistake = next((_sentence(said) for said in gross if said[0]), "")
+        self._words = self.mistake or _sentence(_other_radii(driving, self._robot))
+
+    def remark(self) -> Remark:
+        """What is to be said of the description, as it was looked at last."""
+        if self._words:
+            return Remark("robot.yaml", Level.WARN, self._words)
+        return Remark("robot.yaml", Level.OK, "nothing speaks against it")

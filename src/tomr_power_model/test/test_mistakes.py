@@ -1,0 +1,44 @@
+"""Gross mistakes that encoders against commands show."""
+
+import numpy as np
+import pytest
+
+from tomr_power_model.drive.mistakes import gross_mistake
+from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.robot import shipped_robot
+
+ROBOT = shipped_robot("reference")
+DESCRIBED = twist_to_wheels(ROBOT, nominal=True)
+
+
+def _twists() -> np.ndarray:
+    return np.random.default_rng(2).uniform(-0.5, 0.5, (300, 3)) * [1.0, 1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("matrix", "seen", "remedy"),
+    [
+        (DESCRIBED * [1.0, 1.0, -1.0], "angular.z of the commands has the wrong sign", "REP 103"),
+        (DESCRIBED * [1.0, 1.0, 2.0], "2 times as far out", "robot.robot_radius: 0.4"),
+        (0.5 * DESCRIBED, "turn 0.5 times as fast", "robot.wheel_radius: 0.1,"),
+        (DESCRIBED[[0, 2, 1]], "the order of the wheels", "robot.wheel_names: [wheel_1_joint, "),
+    ],
+)
+def test_a_mistake_is_named_with_its_remedy(matrix: np.ndarray, seen: str, remedy: str) -> None:
+    twists = _twists()
+    said, mend = gross_mistake(twists, twists @ matrix.T, ROBOT)
+    assert seen in said
+    assert said.endswith("off as described, 0 % so")
+    assert remedy in mend
+
+
+def test_what_is_a_little_off_or_not_shown_is_no_gross_mistake() -> None:
+    twists = _twists()
+    for matrix in (DESCRIBED, 1.2 * DESCRIBED, DESCRIBED * [[1.0], [0.6], [1.0]]):
+        assert gross_mistake(twists, twists @ matrix.T, ROBOT) == ("", "")
+    straight = twists * [1.0, 0.0, 0.0]
+    assert gross_mistake(straight, -straight @ DESCRIBED.T, ROBOT) == ("", "")
+    nothing = np.full((10, 3), np.nan)
+    assert gross_mistake(nothing, nothing, ROBOT) == ("", "")
+    still = gross_mistake(twists, 0.0 * twists, ROBOT)  # no wheel answers: a fault
+    assert still == ("", "")

@@ -1,0 +1,143 @@
+"""Gross mistakes in a description that encoders against commands show: which, and what to mend.
+
+The order, directions, places and radius of the wheels. What is a little off is for `radii`; here a
+value is twice what it should be, or belongs to another wheel.
+"""
+
+import math
+from collections.abc import Iterator
+from itertools import permutations
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.robot import WHEELS, Robot
+
+Array = NDArray[np.float64]
+
+_FACTORS = (2.0, 0.5)
+_MOST_ALIKE = 100.0  # condition number of the twists: beyond, not all parts of them show
+_LEAST_LENGTH = 0.05  # (rad/s)/(m/s): a wheel that answers to nothing
+_OFF = 0.3  # relative error of the answers as described from which on something is wrong
+_FITS = 0.15  # and with the mistake mended
+
+
+@frozen
+class _Mistake:
+    """How wheels would answer to commands if the description had one mistake."""
+
+    seen: str
+    remedy: str
+    matrix: Array  # wheel speeds by twist, (3, 3)
+
+
+def gross_mistake(asked: Array, speed: Array, robot: Robot) -> tuple[str, str]:
+    """What is seen where wheels answer to commands as another description says, and what to mend;
+    empty where they do not, or where it does not show.
+
+    Args:
+        asked: twists [m/s, m/s, rad/s], (n, 3), NaN where unknown.
+        speed: of the wheels [rad/s], (n, 3), the same.
+        robot: the description.
+    """
+    # In m/s all three, turning at the wheels.
+    scale = np.array([1.0, 1.0, robot.robot_radius])
+    seen = _matrix(asked * scale, speed)
+    if seen is None:
+        return "", ""
+    expected = twist_to_wheels(robot, nominal=True) / scale
+    error = _distance(seen, expected)
+    if error < _OFF:
+        return "", ""
+    # Of mistakes that look alike the first is the likeliest.
+    best = min(
+        _mistakes(robot, expected), key=lambda mistake: round(_distance(seen, mistake.matrix), 3)
+    )
+    left = _distance(seen, best.matrix)
+    if left >= _FITS:
+        return "", ""
+    words = (
+        f"encoders against commands are {100 * error:.0f} % off as described, {100 * left:.0f} %"
+    )
+    return f"{best.seen}: {words} so", best.remedy
+
+
+def _matrix(asked: Array, speed: Array) -> Array | None:
+    """Wheel speeds by twist, (3, 3); None where the twists do not show them."""
+    known = np.isfinite(asked).all(axis=1) & np.isfinite(speed).all(axis=1)
+    known &= np.abs(asked).any(axis=1)
+    asked, speed = asked[known], speed[known]
+    if len(asked) < WHEELS or np.linalg.cond(asked) > _MOST_ALIKE:
+        return None
+    found, *_ = np.linalg.lstsq(asked, speed, rcond=None)
+    matrix = np.asarray(found.T)
+    return matrix if (np.linalg.norm(matrix, axis=1) > _LEAST_LENGTH).all() else None
+
+
+def _distance(seen: Array, expected: Array) -> float:
+    """Relative difference; answers that lag seem a little small, so their size is free by 15 %."""
+    scale = float(np.clip(np.sum(seen * expected) / np.sum(expected**2), 0.85, 1.05))
+    return float(np.linalg.norm(seen - scale * expected) / np.linalg.norm(seen))
+
+
+def _mistakes(robot: Robot, expected: Array) -> Iterator[_Mistake]:
+    names = robot.wheel_names
+    for order in permutations(range(WHEELS)):
+        if order != (0, 1, 2):
+            # The wheel called names[i] turns as the one in place order[i] should.
+            right = [names[order.index(position)] for position in range(WHEELS)]
+            yield _Mistake(
+                "the order of the wheels is wrong",
+                f"write robot.wheel_names: [{', '.join(right)}]",
+                expected[list(order)],
+            )
+    for wheel, name in enumerate(names):
+        signs = np.ones((WHEELS, 1))
+        signs[wheel] = -1.0
+        yield _Mistake(
+            f"the encoder of {name} counts against its sense",
+            "change its sign in the driver",
+            signs * expected,
+        )
+    yield _Mistake(
+        "all wheels turn against their sense", "change the signs in the driver", -expected
+    )
+    for degrees in range(30, 360, 30):
+        angle = math.radians(degrees)
+        turned = expected.copy()
+        turned[:, :2] = expected[:, :2] @ _rotation(angle)
+        offset = round(math.remainder(robot.wheel_offset + angle, 2.0 * math.pi), 4) + 0.0
+        yield _Mistake(
+            f"the wheels stand {degrees} degrees further around than described",
+            f"write robot.wheel_offset: {offset:g}",
+            turned,
+        )
+    for axis, what in ((1, "linear.y"), (2, "angular.z")):
+        flipped = expected.copy()
+        flipped[:, axis] *= -1.0
+        yield _Mistake(
+            f"{what} of the commands has the wrong sign",
+            "commands are in base_link with y to the left and z up (REP 103): mend what sends them",
+            flipped,
+        )
+    for factor in _FACTORS:
+        yield _Mistake(
+            f"the wheels turn {factor:g} times as fast as described",
+            f"write robot.wheel_radius: {robot.wheel_radius / factor:g}, or mend the gear ratio "
+            "by which the driver counts",
+            factor * expected,
+        )
+        wide = expected.copy()
+        wide[:, 2] *= factor
+        yield _Mistake(
+            f"the wheels stand {factor:g} times as far out as described",
+            f"write robot.robot_radius: {factor * robot.robot_radius:g}",
+            wide,
+        )
+
+
+def _rotation(angle: float) -> Array:
+    """Takes a twist's linear part to that seen from axes turned by an angle [rad], (2, 2)."""
+    return np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
