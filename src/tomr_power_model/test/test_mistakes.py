@@ -42,3 +42,13 @@ def test_what_is_a_little_off_or_not_shown_is_no_gross_mistake() -> None:
     assert gross_mistake(nothing, nothing, ROBOT) == ("", "")
     still = gross_mistake(twists, 0.0 * twists, ROBOT)  # no wheel answers: a fault
     assert still == ("", "")
+
+
+def test_a_robot_that_never_turns_shows_what_needs_no_turning() -> None:
+    twists = _twists() * [1.0, 1.0, 0.0]
+    backwards = DESCRIBED * [[1.0], [-1.0], [1.0]]
+    said, _ = gross_mistake(twists, twists @ backwards.T, ROBOT)
+    assert said.startswith("the encoder of wheel_2_joint counts against its sense")
+    assert gross_mistake(twists, twists @ (DESCRIBED * [1.0, 1.0, -1.0]).T, ROBOT) == ("", "")
+    # Half way around is as well all encoders backwards: which, turning would show.
+    assert gross_mistake(twists, -twists @ DESCRIBED.T, ROBOT) == ("", "")

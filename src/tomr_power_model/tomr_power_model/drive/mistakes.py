@@ -18,7 +18,7 @@ from tomr_power_model.robot import WHEELS, Robot
 Array = NDArray[np.float64]
 
 _FACTORS = (2.0, 0.5)
-_MOST_ALIKE = 100.0  # condition number of the twists: beyond, not all parts of them show
+_MOST_ALIKE = 30.0  # how much more of one direction of twists there may be than of another
 _LEAST_LENGTH = 0.05  # (rad/s)/(m/s): a wheel that answers to nothing
 _OFF = 0.3  # relative error of the answers as described from which on something is wrong
 _FITS = 0.15  # and with the mistake mended
@@ -44,36 +44,46 @@ def gross_mistake(asked: Array, speed: Array, robot: Robot) -> tuple[str, str]:
     """
     # In m/s all three, turning at the wheels.
     scale = np.array([1.0, 1.0, robot.robot_radius])
-    seen = _matrix(asked * scale, speed)
+    seen, shown = _answers(asked * scale, speed)
     if seen is None:
         return "", ""
     expected = twist_to_wheels(robot, nominal=True) / scale
-    error = _distance(seen, expected)
+    error = _distance(seen, expected @ shown)
     if error < _OFF:
         return "", ""
     # Of mistakes that look alike the first is the likeliest.
-    best = min(
-        _mistakes(robot, expected), key=lambda mistake: round(_distance(seen, mistake.matrix), 3)
+    found = sorted(
+        (
+            (round(_distance(seen, mistake.matrix @ shown), 3), mistake)
+            for mistake in _mistakes(robot, expected)
+        ),
+        key=lambda item: item[0],
     )
-    left = _distance(seen, best.matrix)
-    if left >= _FITS:
+    (left, best), (next_best, _) = found[:2]
+    is_ambiguous = shown.shape[1] < WHEELS and next_best < _FITS
+    if left >= _FITS or is_ambiguous:
         return "", ""
-    words = (
-        f"encoders against commands are {100 * error:.0f} % off as described, {100 * left:.0f} %"
+    return (
+        f"{best.seen}: encoders against commands are {100 * error:.0f} % off as described, "
+        f"{100 * left:.0f} % so",
+        best.remedy,
     )
-    return f"{best.seen}: {words} so", best.remedy
 
 
-def _matrix(asked: Array, speed: Array) -> Array | None:
-    """Wheel speeds by twist, (3, 3); None where the twists do not show them."""
+def _answers(asked: Array, speed: Array) -> tuple[Array | None, Array]:
+    """Wheel speeds by the directions of twists that are shown, (3, k), and these, (3, k); None
+    where fewer than two are, or a wheel answers to nothing."""
     known = np.isfinite(asked).all(axis=1) & np.isfinite(speed).all(axis=1)
     known &= np.abs(asked).any(axis=1)
     asked, speed = asked[known], speed[known]
-    if len(asked) < WHEELS or np.linalg.cond(asked) > _MOST_ALIKE:
-        return None
-    found, *_ = np.linalg.lstsq(asked, speed, rcond=None)
-    matrix = np.asarray(found.T)
-    return matrix if (np.linalg.norm(matrix, axis=1) > _LEAST_LENGTH).all() else None
+    if len(asked) < WHEELS:
+        return None, np.eye(WHEELS)
+    _, sizes, directions = np.linalg.svd(asked, full_matrices=False)
+    shown = directions[sizes > sizes[0] / _MOST_ALIKE].T
+    found, *_ = np.linalg.lstsq(asked @ shown, speed, rcond=None)
+    seen = np.asarray(found.T)
+    is_shown = shown.shape[1] > 1 and (np.linalg.norm(seen, axis=1) > _LEAST_LENGTH).all()
+    return (seen if is_shown else None), shown
 
 
 def _distance(seen: Array, expected: Array) -> float:

@@ -1,0 +1,64 @@
+"""Robots that are wired, or report, otherwise than described."""
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tomr_fault_diag.diagnosis.offline import find_topics
+from tomr_fault_diag.diagnosis.pipeline import Pipeline
+from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
+from tomr_power_model.recordings import open_recording
+from tomr_power_model.robot import shipped_robot
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "bench"))
+
+from descriptions import REWIRED  # noqa: E402
+
+ROBOT = shipped_robot("reference")
+Change = Callable[[str, Any], Iterator[tuple[str, Any]]]
+
+
+def _states(bag: str, change: Change | None = None) -> tuple[list[tuple[int, str]], str]:
+    """States and their stamps, and what is said of robot.yaml at last."""
+    pipeline = Pipeline(ROBOT, DiagnosisSettings.of({}, "test"))
+    found = []
+    with open_recording(ROOT / "bags" / bag) as recording:
+        topics = find_topics(recording, pipeline.inputs)
+        for topic, _, message, receive_ns in recording.messages(topics):
+            parts = [(topic, message)] if change is None else change(topic, message)
+            for place, part in parts:
+                step = pipeline.take(topics[place], part, receive_ns)
+                found += [(item.stamp_ns, item.state.name) for item in step.diagnoses]
+    return found, pipeline.misdescribed()
+
+
+def test_wheels_in_messages_of_their_own_are_diagnosed_alike() -> None:
+    whole, said = _states("circle_encoder_lost")
+    apart, same = _states("circle_encoder_lost", REWIRED["a message for each wheel and an arm"])
+    assert len(whole) > 20
+    assert len({name for _, name in whole}) > 2
+    later = whole[0][0] + 1_000_000_000  # the first sample has one wheel
+    assert apart[-1] == whole[-1]
+    assert [item for item in apart if item[0] > later] == [
+        item for item in whole if item[0] > later
+    ]
+    assert said == same == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("one encoder counts backwards", "the encoder of wheel_2_joint counts against its sense"),
+        ("powers of two motors exchanged", "wheel_1/power goes with the motion of wheel_2_joint"),
+    ],
+)
+def test_of_a_robot_that_is_wired_otherwise_nothing_is_known(name: str, words: str) -> None:
+    """The second square is all the same: nobody's fault, and said."""
+    states, said = _states("square", REWIRED[name])
+    assert words in said
+    assert states[-1][1] == "unknown"
+    assert _states("square")[1] == ""
