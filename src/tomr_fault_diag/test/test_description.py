@@ -126,7 +126,7 @@ def test_a_robot_as_described_and_one_with_a_dead_wheel_are_not_mistaken(
 def test_powers_with_the_wrong_sign_or_name_are_named() -> None:
     watch = DescriptionWatch(ROBOT, to_ns(0.05))
     _take(watch, 24.0, DESCRIBED, powers=lambda powers: powers * [1.0, -1.0, 1.0])
-    assert watch.words().startswith("wheel_2/power gives back what the motor draws: BatteryState")
+    assert watch.words().startswith("the power of wheel_2 has the wrong sign: mend it")
     watch = DescriptionWatch(ROBOT, to_ns(0.05))
     _take(watch, 24.0, DESCRIBED, powers=lambda powers: powers - 9.0)  # down a slope
     assert watch.words() == ""
@@ -135,6 +135,40 @@ def test_powers_with_the_wrong_sign_or_name_are_named() -> None:
     watch = DescriptionWatch(ROBOT, to_ns(0.05))
     _take(watch, 24.0, DESCRIBED, powers=lambda powers: powers[[1, 0, 2]])
     assert watch.words().startswith(
-        "wheel_1/power goes with the motion of wheel_2_joint, wheel_2/power goes with the motion "
-        "of wheel_1_joint: exchange"
+        "the power of wheel_1 is that of wheel_2_joint, the power of wheel_2 is that of "
+        "wheel_1_joint: exchange"
     )
+
+
+@pytest.mark.parametrize(
+    ("matrix", "is_gross"),
+    [
+        (DESCRIBED * [[1.0], [-1.0], [1.0]], True),
+        (0.5 * DESCRIBED, False),  # a speed limit between commands and drivers looks so
+        (1.03 * DESCRIBED, False),
+        (DESCRIBED, False),
+    ],
+)
+def test_a_gross_mistake_counts_once_it_is_seen_twice(matrix: np.ndarray, is_gross: bool) -> None:
+    watch = DescriptionWatch(ROBOT, to_ns(0.05))
+    _take(watch, 12.0, matrix)
+    assert watch.mistake == ""
+    _take(watch, 42.0, matrix)
+    assert bool(watch.mistake) == is_gross
+    assert bool(watch.words()) == (matrix is not DESCRIBED)
+
+
+@pytest.mark.parametrize("before", [8.0, 21.0, 42.0])
+def test_a_robot_that_is_stopped_is_the_one_described(before: float) -> None:
+    watch = DescriptionWatch(ROBOT, to_ns(0.05))
+    _take(watch, before, DESCRIBED)
+    for _ in range(8):
+        _take(watch, 21.0, 0.0 * DESCRIBED)
+        assert watch.words() == ""
+
+
+def test_many_decisions_a_second_show_no_more_than_twenty() -> None:
+    watch, sparse = (DescriptionWatch(ROBOT, to_ns(period)) for period in (0.01, 0.05))
+    _take(watch, 42.0, 1.08 * DESCRIBED, 0.01)
+    _take(sparse, 42.0, 1.08 * DESCRIBED, 0.05)
+    assert watch.words() == sparse.words() != ""

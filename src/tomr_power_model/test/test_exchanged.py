@@ -70,10 +70,17 @@ def test_on_a_circle_inertia_counts_as_much_as_speed() -> None:
     assert _exchanged(power, speed) is None
 
 
+def test_what_a_motor_draws_does_not_fall_with_what_it_should() -> None:
+    power = _powers(_speeds(), 0.1)
+    expected = power[:, [1, 0, 2], None]
+    assert exchanged(power, expected) == (1, 0, 2)
+    assert exchanged(power, -expected) is None
+
+
 def test_the_words_name_what_belongs_to_what() -> None:
     seen, remedy = exchange_words((1, 0, 2), ROBOT)
     assert seen == (
-        "wheel_1/power goes with the motion of wheel_2_joint, "
-        "wheel_2/power goes with the motion of wheel_1_joint"
+        "the power of wheel_1 is that of wheel_2_joint, the power of wheel_2 is that of "
+        "wheel_1_joint"
     )
     assert "plugs" in remedy

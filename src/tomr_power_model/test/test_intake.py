@@ -22,6 +22,7 @@ from tomr_power_model.messages.intake import (
     stamp_of,
     twist_of,
 )
+from tomr_power_model.messages.joined import WheelStream
 from tomr_power_model.messages.outgoing import (
     TYPES,
     DiagnosticMessage,
@@ -238,8 +239,44 @@ def test_a_flood_of_encoders_is_thinned(period_us: int, taken: int) -> None:
 def test_what_repeats_or_goes_back_is_not_thinned_but_reported() -> None:
     joints = model_inputs(shipped_robot("reference"), MagicMock())[1]
     assert joints.is_too_close is not None
-    answers = [joints.is_too_close(STAMP + shift) for shift in (0, 100, 0, -100, 0, 10**6)]
-    assert answers == [False, True, False, False, True, False]
+    joints.take(_joints(list(WHEELS), position=[1, 2, 3]), STAMP)
+    answers = [joints.is_too_close(STAMP + shift) for shift in (0, 100, -100, 10**6)]
+    assert answers == [False, True, False, False]
+
+
+def _stamped(names: list[str], stamp_ns: int) -> Any:
+    return bag_message(
+        "sensor_msgs/msg/JointState",
+        header=bag_header(stamp_ns),
+        name=names,
+        position=[1.0] * len(names),
+    )
+
+
+@pytest.mark.parametrize("shift_us", [-300, 0, 300])
+@pytest.mark.parametrize("first", [0, 4])
+def test_other_joints_right_before_or_after_cost_no_wheels(shift_us: int, first: int) -> None:
+    """Two stages that share a stream, as one process has them."""
+    stream, taken = WheelStream(WHEELS), [0, 0]
+
+    def count(stage: int) -> Any:
+        def take(*_: object) -> Arrival:
+            taken[stage] += 1
+            return Arrival.TAKEN
+
+        return take
+
+    robot = shipped_robot("reference")
+    stages = [measured_inputs(robot, count(stage), count(stage), stream)[0] for stage in (0, 1)]
+    for number in range(20):
+        stamp = STAMP + 20_000_000 * number
+        arm = _stamped(["elbow"], stamp + 1000 * shift_us)
+        wheels = _stamped(list(WHEELS), stamp)
+        for message in (arm, wheels) if shift_us <= 0 else (wheels, arm):
+            if message is not arm or number >= first:
+                for stage in stages:
+                    stage.take(message, stamp)
+    assert taken == [20, 20]
 
 
 def test_complaints_thin_out() -> None:

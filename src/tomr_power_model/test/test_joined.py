@@ -167,7 +167,7 @@ def test_two_stages_read_the_same_message() -> None:
     (first,) = stream.samples(message, START)
     assert stream.samples(message, START) == [first]
     assert first[1].absent == ("right", "back")
-    assert not stream.is_whole
+    assert stream.newest == 0
     whole = _joints(NAMES, 20.0)
     assert stream.samples(whole, START + 20 * MS)[0][1].absent == ()
-    assert stream.is_whole
+    assert stream.newest == START + 20 * MS

@@ -52,3 +52,22 @@ def test_a_robot_that_never_turns_shows_what_needs_no_turning() -> None:
     assert gross_mistake(twists, twists @ (DESCRIBED * [1.0, 1.0, -1.0]).T, ROBOT) == ("", "")
     # Half way around is as well all encoders backwards: which, turning would show.
     assert gross_mistake(twists, -twists @ DESCRIBED.T, ROBOT) == ("", "")
+
+
+def test_a_mixture_of_driving_and_standing_is_no_mistake() -> None:
+    """Half of the time stopped, a robot turns half as fast on average."""
+    twists = _twists()
+    for still in (slice(0, 150), slice(200, 300), slice(0, 300, 2)):
+        speed = twists @ DESCRIBED.T
+        speed[still] = 0.0
+        assert gross_mistake(twists, speed, ROBOT) == ("", "")
+
+
+def test_too_few_samples_say_nothing_and_sizes_may_be_left_out() -> None:
+    twists = _twists()
+    assert gross_mistake(twists, -twists @ DESCRIBED.T, ROBOT)[0]
+    few = np.where(np.arange(300)[:, None] < 150, twists, np.nan)
+    assert gross_mistake(few, -twists @ DESCRIBED.T, ROBOT) == ("", "")
+    half = 0.5 * twists @ DESCRIBED.T
+    assert "see what changes the commands" in gross_mistake(twists, half, ROBOT)[1]
+    assert gross_mistake(twists, half, ROBOT, scales=False) == ("", "")

@@ -100,7 +100,7 @@ def test_a_sign_is_judged_where_power_is_known(make_drive: MakeDrive) -> None:
 def test_powers_of_other_wheels_are_refused(make_drive: MakeDrive) -> None:
     drive = make_drive(ROBOT, 1)
     swapped = evolve(drive, power=drive.power[:, [0, 2, 1]], reading=drive.reading[:, [0, 2, 1]])
-    with pytest.raises(InputError, match="wheel_2/power goes with the motion of wheel_3_joint"):
+    with pytest.raises(InputError, match="the power of wheel_2 is that of wheel_3_joint"):
         refuse(faults(swapped))
 
 

@@ -95,6 +95,7 @@ def test_what_is_shown_too_little_or_not_alike_says_nothing() -> None:
     assert found is not None
     assert found.yaw is None
     assert misdescribed(found, ROBOT)[1].startswith("write robot.wheel_radius: 0.0463, as the")
+    assert misdescribed(answer(time, 0.0 * fast, expected, ROBOT), ROBOT) == ("", "")  # an e-stop
     half = np.where(time[:, None] < 30.0, fast, expected)  # a fault that begins
     assert misdescribed(answer(time, half, expected, ROBOT), ROBOT) == ("", "")
     assert misdescribed(answer(time, -expected, expected, ROBOT), ROBOT) == ("", "")

@@ -21,8 +21,10 @@ Array = NDArray[np.float64]
 
 _KEPT = to_ns(120.0)  # of driving
 _EVERY = to_ns(5.0)
+_CLOSEST = to_ns(0.05)  # of ticks: more of them show no more
 _LEAST = to_ns(5.0)  # of driving, before which a fault may be all that is seen
 _TURNS = 0.3  # rad/s: where all wheels are to turn slower, a tick shows nothing
+_MANY = 400  # ticks that a power's sign is judged by
 _REVERSED = -0.5  # correlation of what a motor draws with what it should
 
 
@@ -40,13 +42,16 @@ class _Driving:
 Said = tuple[str, str]  # what is seen and what to mend, empty where nothing
 
 
-def _mistaken(driving: _Driving, robot: Robot) -> Said:
+def _mistaken(driving: _Driving, robot: Robot, *, scales: bool = False) -> Said:
     twist = driving.asked @ np.linalg.inv(twist_to_wheels(robot, nominal=True)).T
-    seen, remedy = gross_mistake(twist, driving.speed, robot)
+    seen, remedy = gross_mistake(twist, driving.speed, robot, scales=scales)
     return f"wheels and commands: {seen}" if seen else "", remedy
 
 
-def _other_radii(driving: _Driving, robot: Robot) -> Said:
+def _other_sizes(driving: _Driving, robot: Robot) -> Said:
+    gross = _mistaken(driving, robot, scales=True)
+    if gross[0]:
+        return gross
     found = answer(driving.time, driving.speed, driving.asked, robot)
     seen, remedy = misdescribed(found, robot)
     return f"wheels and commands: {seen}" if seen else "", remedy
@@ -54,7 +59,7 @@ def _other_radii(driving: _Driving, robot: Robot) -> Said:
 
 def _reversed(driving: _Driving, robot: Robot) -> Said:
     names = [
-        f"{topic}/power"
+        f"the power of {topic}"
         for topic, drawn, expected in zip(
             robot.wheel_topics, driving.power.T, driving.expected.T, strict=True
         )
@@ -63,17 +68,17 @@ def _reversed(driving: _Driving, robot: Robot) -> Said:
     if not names:
         return "", ""
     return (
-        f"{', '.join(names)} gives back what the motor draws",
-        "BatteryState.current is negative while drawing: mend its sign in the driver, or set "
+        f"{', '.join(names)} has the wrong sign",
+        "mend it in the driver (BatteryState.current is negative while drawing), or set "
         "measurement.signed: false if the sensor gives magnitudes",
     )
 
 
 def _is_reversed(drawn: Array, expected: Array) -> bool:
-    """Whether a motor (n,) draws less the more it should; down a slope it only draws less."""
+    """Whether a motor (n,) draws less the more it should, for longer than a slope goes down."""
     known = np.isfinite(drawn) & np.isfinite(expected)
     drawn, expected = drawn[known], expected[known]
-    if not len(drawn) or np.sum(drawn) >= 0.0 or min(np.ptp(drawn), np.ptp(expected)) == 0.0:
+    if len(drawn) < _MANY or np.sum(drawn) >= 0.0 or min(np.ptp(drawn), np.ptp(expected)) == 0.0:
         return False
     return bool(np.corrcoef(drawn, expected)[0, 1] < _REVERSED)
 
@@ -100,20 +105,25 @@ class DescriptionWatch:
 
     def __init__(self, robot: Robot, period_ns: int) -> None:
         self._robot = robot
-        self._period = period_ns
-        self._ticks: deque[tuple[float, ...]] = deque(maxlen=_KEPT // period_ns)
+        self._period = max(period_ns, _CLOSEST)
+        self._ticks: deque[tuple[float, ...]] = deque(maxlen=_KEPT // self._period)
+        self._first = self._last = 0  # stamps of ticks that were taken [ns]
         self._slot = 0
         self._words = ""
-        self.mistake = ""  # a gross one, as it was looked at last
+        self._gross: Said = ("", "")
+        self.mistake = ""  # a gross one that was seen twice in a row
 
     def take(self, tick_ns: int, speeds: Sequence[Residual], powers: Sequence[Residual]) -> None:
         """Take the wheels' speeds and the motors' powers of a tick."""
         asked = [speed.modelled for speed in speeds]
-        if any(abs(speed) > _TURNS for speed in asked):  # false where unknown
+        is_new = not 0 <= tick_ns - self._last < self._period
+        if is_new and any(abs(speed) > _TURNS for speed in asked):  # false where unknown
+            self._first, self._last = self._first or tick_ns, tick_ns
+            seconds = 1e-9 * (tick_ns - self._first)
             measured = [measured_speed(speed) for speed in speeds]
             expected = [power.modelled for power in powers]
             drawn = [power.modelled + power.residual for power in powers]
-            self._ticks.append((*measured, *asked, *drawn, *expected))
+            self._ticks.append((seconds, *measured, *asked, *drawn, *expected))
         slot = tick_ns // _EVERY
         if slot != self._slot:
             self._slot = slot
@@ -127,12 +137,13 @@ class DescriptionWatch:
     def _look(self) -> None:
         if len(self._ticks) * self._period < _LEAST:
             return
-        time = np.linspace(0.0, 1e-9 * self._period * (len(self._ticks) - 1), len(self._ticks))
-        parts = np.hsplit(np.array(self._ticks), 4)
-        driving = _Driving(time, *parts)
+        rows = np.array(self._ticks)
+        driving = _Driving(rows[:, 0], *np.hsplit(rows[:, 1:], 4))
         gross = (check(driving, self._robot) for check in _GROSS)
-        self.mistake = next((_sentence(said) for said in gross if said[0]), "")
-        self._words = self.mistake or _sentence(_other_radii(driving, self._robot))
+        before, self._gross = self._gross, next((said for said in gross if said[0]), ("", ""))
+        # What is seen but once may be a mixture of what was before a stop and after.
+        self.mistake = _sentence(self._gross) if before[1] == self._gross[1] else ""
+        self._words = _sentence(self._gross) or _sentence(_other_sizes(driving, self._robot))
 
     def remark(self) -> Remark:
         """What is to be said of the description, as it was looked at last."""

@@ -57,13 +57,15 @@ def _explained(power: Array, expected: Array) -> float:
     """Share of a motor's variance, (n,), that columns (n, k) explain."""
     features = np.column_stack([np.ones(len(power)), expected])
     shape, *_ = np.linalg.lstsq(features, power, rcond=None)
+    if len(shape) == 2 and shape[1] <= 0.0:  # down a slope, say
+        return 0.0
     return float(1.0 - np.var(power - features @ shape) / max(float(np.var(power)), 1e-12))
 
 
 def exchange_words(order: tuple[int, ...], robot: Robot) -> tuple[str, str]:
     """What is seen of powers that are exchanged, and what to mend."""
     pairs = [
-        f"{robot.wheel_topics[motor]}/power goes with the motion of {robot.wheel_names[wheel]}"
+        f"the power of {robot.wheel_topics[motor]} is that of {robot.wheel_names[wheel]}"
         for motor, wheel in enumerate(order)
         if motor != wheel
     ]

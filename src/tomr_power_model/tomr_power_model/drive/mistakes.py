@@ -6,7 +6,7 @@ value is twice what it should be, or belongs to another wheel.
 
 import math
 from collections.abc import Iterator
-from itertools import permutations
+from itertools import chain, permutations
 
 import numpy as np
 from attrs import frozen
@@ -22,6 +22,9 @@ _MOST_ALIKE = 30.0  # how much more of one direction of twists there may be than
 _LEAST_LENGTH = 0.05  # (rad/s)/(m/s): a wheel that answers to nothing
 _OFF = 0.3  # relative error of the answers as described from which on something is wrong
 _FITS = 0.15  # and with the mistake mended
+_LEAST = 200  # samples
+_CLOSER = 0.4  # of what a sample is off as described, at which it is as mistaken
+_MOST = 0.7
 
 
 @frozen
@@ -33,7 +36,9 @@ class _Mistake:
     matrix: Array  # wheel speeds by twist, (3, 3)
 
 
-def gross_mistake(asked: Array, speed: Array, robot: Robot) -> tuple[str, str]:
+def gross_mistake(
+    asked: Array, speed: Array, robot: Robot, *, scales: bool = True
+) -> tuple[str, str]:
     """What is seen where wheels answer to commands as another description says, and what to mend;
     empty where they do not, or where it does not show.
 
@@ -41,10 +46,16 @@ def gross_mistake(asked: Array, speed: Array, robot: Robot) -> tuple[str, str]:
         asked: twists [m/s, m/s, rad/s], (n, 3), NaN where unknown.
         speed: of the wheels [rad/s], (n, 3), the same.
         robot: the description.
+        scales: look for sizes as well, which something that limits the commands looks like.
     """
+    known = np.isfinite(asked).all(axis=1) & np.isfinite(speed).all(axis=1)
+    known &= np.abs(asked).any(axis=1)
+    if np.count_nonzero(known) < _LEAST:
+        return "", ""
     # In m/s all three, turning at the wheels.
     scale = np.array([1.0, 1.0, robot.robot_radius])
-    seen, shown = _answers(asked * scale, speed)
+    asked, speed = asked[known] * scale, speed[known]
+    seen, shown = _answers(asked, speed)
     if seen is None:
         return "", ""
     expected = twist_to_wheels(robot, nominal=True) / scale
@@ -55,13 +66,13 @@ def gross_mistake(asked: Array, speed: Array, robot: Robot) -> tuple[str, str]:
     found = sorted(
         (
             (round(_distance(seen, mistake.matrix @ shown), 3), mistake)
-            for mistake in _mistakes(robot, expected)
+            for mistake in chain(_mistakes(robot, expected), _scales(robot, expected, scales))
         ),
         key=lambda item: item[0],
     )
     (left, best), (next_best, _) = found[:2]
     is_ambiguous = shown.shape[1] < WHEELS and next_best < _FITS
-    if left >= _FITS or is_ambiguous:
+    if left >= _FITS or is_ambiguous or not _is_better(asked, speed, best.matrix, expected):
         return "", ""
     return (
         f"{best.seen}: encoders against commands are {100 * error:.0f} % off as described, "
@@ -73,17 +84,20 @@ def gross_mistake(asked: Array, speed: Array, robot: Robot) -> tuple[str, str]:
 def _answers(asked: Array, speed: Array) -> tuple[Array | None, Array]:
     """Wheel speeds by the directions of twists that are shown, (3, k), and these, (3, k); None
     where fewer than two are, or a wheel answers to nothing."""
-    known = np.isfinite(asked).all(axis=1) & np.isfinite(speed).all(axis=1)
-    known &= np.abs(asked).any(axis=1)
-    asked, speed = asked[known], speed[known]
-    if len(asked) < WHEELS:
-        return None, np.eye(WHEELS)
     _, sizes, directions = np.linalg.svd(asked, full_matrices=False)
     shown = directions[sizes > sizes[0] / _MOST_ALIKE].T
     found, *_ = np.linalg.lstsq(asked @ shown, speed, rcond=None)
     seen = np.asarray(found.T)
     is_shown = shown.shape[1] > 1 and (np.linalg.norm(seen, axis=1) > _LEAST_LENGTH).all()
     return (seen if is_shown else None), shown
+
+
+def _is_better(asked: Array, speed: Array, mistaken: Array, described: Array) -> bool:
+    """Whether most of what is not as described is as mistaken: not a mixture of what is and wheels
+    that stand."""
+    off, others = (np.linalg.norm(speed - asked @ m.T, axis=1) for m in (described, mistaken))
+    strays = off > _OFF * np.linalg.norm(asked @ described.T, axis=1)
+    return bool(np.mean(others[strays] < _CLOSER * off[strays]) > _MOST) if strays.any() else False
 
 
 def _distance(seen: Array, expected: Array) -> float:
@@ -132,11 +146,14 @@ def _mistakes(robot: Robot, expected: Array) -> Iterator[_Mistake]:
             "commands are in base_link with y to the left and z up (REP 103): mend what sends them",
             flipped,
         )
-    for factor in _FACTORS:
+
+
+def _scales(robot: Robot, expected: Array, wanted: bool) -> Iterator[_Mistake]:
+    for factor in _FACTORS if wanted else ():
         yield _Mistake(
             f"the wheels turn {factor:g} times as fast as described",
             f"write robot.wheel_radius: {robot.wheel_radius / factor:g}, or mend the gear ratio "
-            "by which the driver counts",
+            "by which the driver counts, or see what changes the commands on their way",
             factor * expected,
         )
         wide = expected.copy()

@@ -105,10 +105,11 @@ def misdescribed(found: Answer | None, robot: Robot) -> tuple[str, str]:
     if found is None or robot.controller.integral <= 0.0:
         return "", ""
     linear, turned = found.linear, found.turned
+    # Gross mistakes are others': an order of wheels, a sign; and so are wheels that stand.
+    if not 1.0 / _GROSS < linear < _GROSS or abs(turned) > np.log(_GROSS):
+        return "", ""
     turn = 1.0 if found.yaw is None else found.yaw / linear
-    # Gross mistakes are others': an order of wheels, a sign.
-    is_near = all(_GROSS > ratio > 1.0 / _GROSS for ratio in (linear, turn))
-    if not (is_near and abs(turned) < np.log(_GROSS)):
+    if not 1.0 / _GROSS < turn < _GROSS:
         return "", ""
     seen, keys = [], []
     if abs(linear - 1.0) > _OFF:

@@ -115,8 +115,6 @@ class WheelFinder:
         self._names: Sequence[str] = ()
         self._places: tuple[int | None, ...] = ()
         self._missing: tuple[str, ...] = wheel_names
-        self._last: Any = None
-        self._found = Wheels(_UNKNOWN, _UNKNOWN, _UNKNOWN)
         self._turns = Turns(len(wheel_names))
         self._is_heard = False
 
@@ -127,15 +125,8 @@ class WheelFinder:
         self._find(message.name)
         return bool(self._names) and len(self._missing) == len(self._wheels)
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether the last message had all wheels, or none was read."""
-        return not (self._is_heard and self._missing)
-
     def read(self, message: Any) -> Wheels:
         """Wheels of a message; raises Unusable if none is there or the lengths disagree."""
-        if message is self._last:  # two stages read the same
-            return self._found
         self._find(message.name)
         if len(self._missing) == len(self._wheels):
             found = ", ".join(self._names) or "no joint"
@@ -145,10 +136,8 @@ class WheelFinder:
         velocity = self._pick(message.velocity, count, "velocity", LARGEST.speed)
         effort = self._pick(message.effort, count, "effort", LARGEST.current)
         a, b, c = self._turns.go_on(position, velocity)
-        self._found = Wheels((a, b, c), velocity, effort, self._missing)
-        self._last = message
         self._is_heard = True
-        return self._found
+        return Wheels((a, b, c), velocity, effort, self._missing)
 
     def _find(self, names: Sequence[str]) -> None:
         if names == self._names:

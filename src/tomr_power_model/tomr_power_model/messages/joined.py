@@ -98,6 +98,7 @@ class WheelStream:
         self._joined = Joined(len(wheel_names))
         self._last: Any = None
         self._samples: Sequence[tuple[int, Wheels]] = ()
+        self.newest = 0  # stamp of the last message of wheels [ns], 0 where that had not all
 
     def samples(self, message: Any, stamp_ns: int) -> Sequence[tuple[int, Wheels]]:
         """Samples that a message completes, with their stamps [ns], in order; none where it is of
@@ -108,13 +109,9 @@ class WheelStream:
             self._last = message
         return self._samples
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether the last message had all wheels, or none was read."""
-        return self._finder.is_whole
-
     def _completed(self, message: Any, stamp_ns: int) -> Sequence[tuple[int, Wheels]]:
         found = self._finder.read(message)
+        self.newest = 0 if found.absent else stamp_ns
         if not found.absent and self._joined.is_idle:
             return ((stamp_ns, found),)
         rows = zip(self._names, found.position, found.velocity, found.effort, strict=True)

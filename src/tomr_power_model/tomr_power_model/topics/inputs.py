@@ -56,16 +56,17 @@ class Thinning:
     """Leaves out samples that come more closely than nodes take those of a topic: they add nothing
     more. What `Flow` lets through of a flood is uneven, and recordings know nothing of it."""
 
-    def __init__(self, closest_ns: int = 0, applies: Callable[[], bool] = lambda: True) -> None:
+    def __init__(self, closest_ns: int = 0, newest: Callable[[], int] | None = None) -> None:
         """`closest_ns`: that samples may come, where that is farther than the nodes' limit;
-        `applies`: whether that counts now."""
-        self._applies = applies
+        `newest`: stamp of the sample that counts as the last, that asked about without."""
+        self._newest = newest
         self._closest = max(closest_ns, NANOSECONDS // limits().topic_rate)
         self._last = 0
 
     def is_too_close(self, stamp_ns: int) -> bool:
         """Whether to leave out a sample; what goes back or repeats is for others to judge."""
-        if 0 < stamp_ns - self._last < self._closest and self._applies():
+        last = self._last if self._newest is None else self._newest()
+        if 0 < stamp_ns - last < self._closest:
             return True
         self._last = stamp_ns
         return False
@@ -177,8 +178,8 @@ def measured_inputs(
         else:
             taker = guarded(_power(source, power), partial(refused, source.topic))
             inputs.append(Input(source.topic, source.type_name, taker))
-    # Wheels in messages of their own are stamped one right after the other.
-    thinning = Thinning(applies=lambda: wheels.is_whole)
+    # Wheels in messages of their own, and an arm's joints, are stamped right before and after.
+    thinning = Thinning(newest=lambda: wheels.newest)
     taker = guarded(thinning.around(take), partial(refused, ENCODER_TOPIC))
     encoder_input = Input(ENCODER_TOPIC, JOINT_STATE, taker, is_too_close=thinning.is_too_close)
     return (encoder_input, *inputs)
@@ -216,9 +217,10 @@ def _encoders(wheels: WheelStream, take: Callable[[int, Triple, Triple], Arrival
     def encoders(message: Any, receive_ns: int) -> Arrival | str | None:
         outcome: Arrival | str | None = None
         for stamp, found in wheels.samples(message, stamp_of(message, receive_ns)):
-            outcome = take(stamp, found.position, found.velocity)
-            if outcome is Arrival.TAKEN and found.absent:
-                outcome = f"no {', '.join(found.absent)} among its names"
+            arrival = take(stamp, found.position, found.velocity)
+            if arrival is Arrival.TAKEN and found.absent:
+                arrival = f"no {', '.join(found.absent)} among its names"
+            outcome = outcome if isinstance(outcome, str) else arrival
         return outcome
 
     return encoders
