@@ -68,7 +68,7 @@ def _reversed(driving: _Driving, robot: Robot) -> Said:
     if not names:
         return "", ""
     return (
-        f"{', '.join(names)} has the wrong sign",
+        f"{', '.join(names)} {'has' if len(names) == 1 else 'have'} the wrong sign",
         "mend it in the driver (BatteryState.current is negative while drawing), or set "
         "measurement.signed: false if the sensor gives magnitudes",
     )

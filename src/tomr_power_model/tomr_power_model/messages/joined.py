@@ -11,8 +11,6 @@ from tomr_power_model.messages.intake import NAN, WheelFinder, Wheels
 Reading = tuple[float, ...]  # what is known of a wheel, in the units of its message
 _LIVE = 250_000_000  # ns since a wheel was heard, within which it is waited for
 _AT_ONCE = 1_000_000  # ns: readings so close need no interpolation
-
-
 _UNKNOWN = (NAN, NAN, NAN)
 
 
