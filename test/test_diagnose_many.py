@@ -141,8 +141,8 @@ def test_pages_need_nothing_beside_them(tmp_path: Path, capsys: pytest.CaptureFi
     page.feed(text)
     assert page.fetched == []
     assert "url(" not in text
-    # Truth, two phases; seven inputs; probability, total, and for each wheel five panels.
-    assert page.counts["svg"] == 3 + 7 + 2 + 3 * 5
+    # Truth, two phases; eight inputs; probability, total, and for each wheel five panels.
+    assert page.counts["svg"] == 3 + 8 + 2 + 3 * 5
     assert "motor system fault 3 (wheel_3_joint) at" in text
     values = json.loads(re.findall(r'id="data">(.*?)</script>', text)[0])
     assert len(values["values"]) == 17

@@ -116,12 +116,10 @@ class WheelFinder:
         self._places: tuple[int | None, ...] = ()
         self._missing: tuple[str, ...] = wheel_names
         self._turns = Turns(len(wheel_names))
-        self._is_heard = False
+        self.is_heard = False  # whether wheels ever came
 
     def is_others(self, message: Any) -> bool:
-        """Whether a message is of other joints alone, as an arm sends, once wheels were heard."""
-        if not self._is_heard:
-            return False
+        """Whether a message is of other joints alone, as an arm sends."""
         self._find(message.name)
         return bool(self._names) and len(self._missing) == len(self._wheels)
 
@@ -136,7 +134,7 @@ class WheelFinder:
         velocity = self._pick(message.velocity, count, "velocity", LARGEST.speed)
         effort = self._pick(message.effort, count, "effort", LARGEST.current)
         a, b, c = self._turns.go_on(position, velocity)
-        self._is_heard = True
+        self.is_heard = True
         return Wheels((a, b, c), velocity, effort, self._missing)
 
     def _find(self, names: Sequence[str]) -> None:

@@ -103,7 +103,10 @@ class WheelStream:
         other joints alone. Raises Unusable as `WheelFinder.read`."""
         if message is not self._last:  # two stages read the same
             is_others = self._finder.is_others(message)
-            self._samples = () if is_others else self._completed(message, stamp_ns)
+            if not is_others:  # what cannot be read counts as well: a flood of it is left out
+                self.newest = stamp_ns
+            is_quiet = is_others and self._finder.is_heard
+            self._samples = () if is_quiet else self._completed(message, stamp_ns)
             self._last = message
         return self._samples
 
