@@ -29,7 +29,8 @@ from tomr_power_model.drive.clean import cleaned
 from tomr_power_model.drive.quality import other_radii
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.errors import InputError
-from tomr_power_model.messages.bag import bag_message
+from tomr_power_model.messages.bag import bag_header, bag_message
+from tomr_power_model.messages.intake import header_stamp_ns
 from tomr_power_model.messages.plain import NANOSECONDS, Level
 from tomr_power_model.messages.types import JOINT_STATE
 from tomr_power_model.recordings import RecordingWriter, open_recording
@@ -144,12 +145,13 @@ def a_message_for_each_wheel_and_an_arm(topic: str, message: Any) -> Iterator[Pa
     if not topic.endswith("joint_states"):
         yield topic, message
         return
+    before = bag_header((header_stamp_ns(message) or 0) - 300_000)
+    yield topic, bag_message(JOINT_STATE, header=before, name=["elbow"], position=[0.5])
     for number, name in enumerate(message.name):
         here = slice(number, number + 1)
         position, velocity = message.position[here], message.velocity[here]
         fields = {"header": message.header, "position": position, "velocity": velocity}
         yield topic, bag_message(JOINT_STATE, name=[name], **fields)
-    yield topic, bag_message(JOINT_STATE, header=message.header, name=["elbow"], position=[0.5])
 
 
 def recorded(bag: Path, change: Callable[[str, Any], Iterator[Part]], new: Path) -> None:

@@ -5,16 +5,22 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from tomr_fault_diag.diagnosis.offline import find_topics
+import numpy as np
+import pytest
+
+from tomr_fault_diag.diagnosis.offline import check_wheels, find_topics
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
+from tomr_odometry.reference import wheel_path
+from tomr_power_model.drive.read import read_drive
+from tomr_power_model.errors import InputError
 from tomr_power_model.recordings import open_recording
 from tomr_power_model.robot import shipped_robot
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "bench"))
 
-from descriptions import REWIRED  # noqa: E402
+from descriptions import REWIRED, recorded  # noqa: E402
 
 ROBOT = shipped_robot("reference")
 Change = Callable[[str, Any], Iterator[tuple[str, Any]]]
@@ -45,6 +51,26 @@ def test_wheels_in_messages_of_their_own_are_diagnosed_alike() -> None:
         item for item in whole if item[0] > later
     ]
     assert said == same == ""
+
+
+def test_tools_read_them_alike(tmp_path: Path) -> None:
+    bag, apart = ROOT / "bags" / "square", tmp_path / "apart"
+    recorded(bag, REWIRED["a message for each wheel and an arm"], apart)
+    one, other = (read_drive(path, ROBOT) for path in (bag, apart))
+    # The first sample has one wheel: nobody knows yet that others follow.
+    np.testing.assert_allclose(other.encoder_time, one.encoder_time, atol=1e-9)
+    np.testing.assert_array_equal(other.position[1:], one.position[1:])
+    np.testing.assert_array_equal(other.velocity[1:], one.velocity[1:])
+    ways = []
+    for path in (bag, apart):
+        with open_recording(path) as recording:
+            ways.append(wheel_path(recording, ROBOT))
+    np.testing.assert_array_equal(ways[1].stamps, ways[0].stamps[1:])
+    np.testing.assert_allclose(ways[1].pose[-1], ways[0].pose[-1], atol=1e-6)
+    with open_recording(apart) as recording:  # though an arm's message is the first
+        check_wheels(recording, "/joint_states", ROBOT.wheel_names)
+        with pytest.raises(InputError, match="has elbow, wheel_1_joint, wheel_2_joint"):
+            check_wheels(recording, "/joint_states", ("left", "right", "back"))
 
 
 def test_a_robot_that_is_wired_otherwise_is_told_so() -> None:

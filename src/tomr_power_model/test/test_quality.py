@@ -105,11 +105,21 @@ def test_powers_of_other_wheels_are_refused(make_drive: MakeDrive) -> None:
 
 
 def test_a_bag_of_another_robot_is_refused(make_drive: MakeDrive) -> None:
-    turned = evolve(ROBOT, wheel_offset=ROBOT.wheel_offset + np.pi / 3)
+    turned = evolve(ROBOT, wheel_offset=ROBOT.wheel_offset + np.pi / 4)
     with pytest.raises(
-        InputError, match=r"as a wheel at 60 degrees would, robot.yaml puts it at 0"
+        InputError, match=r"as a wheel at 45 degrees would, robot.yaml puts it at 0"
     ):
         refuse(faults(make_drive(turned, 1)))
+
+
+def test_a_mistake_that_has_a_name_is_named(make_drive: MakeDrive) -> None:
+    turned = evolve(ROBOT, wheel_offset=ROBOT.wheel_offset + np.pi / 3)
+    with pytest.raises(InputError, match="stand 60 degrees further around"):
+        refuse(faults(make_drive(turned, 1)))
+    drive, order = make_drive(ROBOT, 1), [1, 0, 2]
+    swapped = evolve(drive, position=drive.position[:, order], velocity=drive.velocity[:, order])
+    with pytest.raises(InputError, match="the order of the wheels is wrong"):
+        refuse(faults(swapped))
 
 
 def test_too_little_motion_is_refused(make_drive: MakeDrive) -> None:

@@ -93,6 +93,8 @@ def test_efforts_are_currents_and_blank_ones_say_nothing() -> None:
     first, third = topic.read(message, 9)
     assert same(first, 0, 7, NAN, 1.0, NAN)
     assert same(third, 2, 7, NAN, 3.0, NAN)
+    arm = bag_message(JOINT_STATE, header=bag_header(8), name=["elbow"], effort=[4.0])
+    assert list(topic.read(arm, 9)) == []
 
 
 def test_the_whole_robot_is_known_with_a_voltage_only() -> None:

@@ -40,6 +40,7 @@ class _Driving:
 
 
 Said = tuple[str, str]  # what is seen and what to mend, empty where nothing
+_NOTHING: Said = ("", "")
 
 
 def _mistaken(driving: _Driving, robot: Robot, *, scales: bool = False) -> Said:
@@ -50,7 +51,7 @@ def _mistaken(driving: _Driving, robot: Robot, *, scales: bool = False) -> Said:
 
 def _other_sizes(driving: _Driving, robot: Robot) -> Said:
     gross = _mistaken(driving, robot, scales=True)
-    if gross[0]:
+    if gross != _NOTHING:
         return gross
     found = answer(driving.time, driving.speed, driving.asked, robot)
     seen, remedy = misdescribed(found, robot)
@@ -66,7 +67,7 @@ def _reversed(driving: _Driving, robot: Robot) -> Said:
         if _is_reversed(drawn, expected)
     ]
     if not names:
-        return "", ""
+        return _NOTHING
     return (
         f"{', '.join(names)} {'has' if len(names) == 1 else 'have'} the wrong sign",
         "mend it in the driver (BatteryState.current is negative while drawing), or set "
@@ -85,7 +86,7 @@ def _is_reversed(drawn: Array, expected: Array) -> bool:
 
 def _exchanged(driving: _Driving, robot: Robot) -> Said:
     order = exchanged(driving.power, driving.expected[:, :, None])
-    return ("", "") if order is None else exchange_words(order, robot)
+    return _NOTHING if order is None else exchange_words(order, robot)
 
 
 # What no fault looks like: residuals mean nothing until it is mended.
@@ -110,7 +111,7 @@ class DescriptionWatch:
         self._first = self._last = 0  # stamps of ticks that were taken [ns]
         self._slot = 0
         self._words = ""
-        self._gross: Said = ("", "")
+        self._gross = _NOTHING  # as it was looked at last
         self.mistake = ""  # a gross one that was seen twice in a row
 
     def take(self, tick_ns: int, speeds: Sequence[Residual], powers: Sequence[Residual]) -> None:
@@ -127,23 +128,24 @@ class DescriptionWatch:
         slot = tick_ns // _EVERY
         if slot != self._slot:
             self._slot = slot
-            self._look()
+            gross, self._words = self._seen()
+            # What is seen but once may be a mixture of what was before a stop and after.
+            self.mistake = _sentence(gross) if gross[1] == self._gross[1] else ""
+            self._gross = gross
 
     def words(self) -> str:
         """What speaks against the description so far and what to mend, empty where nothing."""
-        self._look()
-        return self._words
+        return self._seen()[1]
 
-    def _look(self) -> None:
+    def _seen(self) -> tuple[Said, str]:
+        """A gross mistake, and in words that or what else is not as described."""
         if len(self._ticks) * self._period < _LEAST:
-            return
+            return _NOTHING, ""
         rows = np.array(self._ticks)
         driving = _Driving(rows[:, 0], *np.hsplit(rows[:, 1:], 4))
-        gross = (check(driving, self._robot) for check in _GROSS)
-        before, self._gross = self._gross, next((said for said in gross if said[0]), ("", ""))
-        # What is seen but once may be a mixture of what was before a stop and after.
-        self.mistake = _sentence(self._gross) if before[1] == self._gross[1] else ""
-        self._words = _sentence(self._gross) or _sentence(_other_sizes(driving, self._robot))
+        found = (check(driving, self._robot) for check in _GROSS)
+        gross = next((said for said in found if said != _NOTHING), _NOTHING)
+        return gross, _sentence(gross) or _sentence(_other_sizes(driving, self._robot))
 
     def remark(self) -> Remark:
         """What is to be said of the description, as it was looked at last."""

@@ -135,7 +135,7 @@ def _mistakes(robot: Robot, expected: Array) -> Iterator[_Mistake]:
         offset = round(math.remainder(robot.wheel_offset + angle, 2.0 * math.pi), 4) + 0.0
         yield _Mistake(
             f"the wheels stand {degrees} degrees further around than described",
-            f"write robot.wheel_offset: {offset:g}",
+            f"write robot.wheel_offset: {offset:g}, or this robot.yaml belongs to another robot",
             turned,
         )
     for axis, what in ((1, "linear.y"), (2, "angular.z")):

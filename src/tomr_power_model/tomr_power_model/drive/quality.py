@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from tomr_power_model.drive.exchanged import draws_by, exchange_words, exchanged
+from tomr_power_model.drive.mistakes import gross_mistake
 from tomr_power_model.drive.motion import measured_speed, median_period, wheel_motion
 from tomr_power_model.drive.quantum import quantum_of
 from tomr_power_model.drive.radii import SPAN, answer, misdescribed
@@ -166,6 +167,11 @@ def _geometry(item: Drive, robot: Robot) -> Iterator[Finding]:
     if len(item.command_time) < 2:
         return
     speed, asked = measured_speed(item), item.command_at(item.encoder_time)
+    mistake, remedy = gross_mistake(asked, speed, robot, scales=False)
+    if mistake:
+        start, end = float(item.encoder_time[0]), float(item.encoder_time[-1])
+        yield Finding(item.name, "all wheels", start, end, mistake, remedy)
+        return
     rows = np.isfinite(asked).all(axis=1) & np.isfinite(speed).all(axis=1)
     rows &= np.abs(asked).any(axis=1)
     if np.count_nonzero(rows) < 50 or np.linalg.cond(asked[rows][:, :2]) > 10.0:
