@@ -279,6 +279,18 @@ def test_other_joints_right_before_or_after_cost_no_wheels(shift_us: int, first:
     assert taken == [20, 20]
 
 
+def test_of_several_samples_at_once_a_problem_is_said() -> None:
+    """A wheel falls silent: what waited for it comes together."""
+    outcomes = iter([Arrival.TAKEN, "the first cannot be", *[Arrival.TAKEN] * 50])
+    robot = shipped_robot("reference")
+    take = measured_inputs(robot, lambda *_: next(outcomes), MagicMock())[0].take
+    said = []
+    for ms in range(0, 600, 20):
+        for name in WHEELS[:2] if ms >= 20 else (WHEELS[0], WHEELS[2], WHEELS[1]):
+            said.append(take(_stamped([name], STAMP + ms * 1_000_000), 0))
+    assert "the first cannot be" in said
+
+
 def test_complaints_thin_out() -> None:
     complaints = Complaints()
     lines = [complaints.note("topic", "odd") for _ in range(1000)]

@@ -81,11 +81,14 @@ def test_readings_of_other_times_are_those_of_the_first_wheels(
         assert (ms - offsets[0]) % PERIOD == pytest.approx(0.0)
         for wheel, reading in enumerate(sample.wheels):
             assert reading is not None
-            # Readings within a millisecond are taken for the same time.
-            near = 1e-3 * abs(_speed(wheel)) + 1e-9 if late == 0 else 1e-9
-            assert reading == pytest.approx(_reading(wheel, ms), abs=near)
+            if late:
+                assert reading == pytest.approx(_reading(wheel, ms), abs=1e-9)
+            else:  # within a millisecond: as they were read, counts of an encoder stay counts
+                assert reading == _reading(wheel, ms - offsets[0] + offsets[wheel])
     stamps = [sample.stamp_ns for sample in samples]
     assert stamps == sorted(set(stamps))
+    if not late:
+        assert stamps[-1] == START + round((PERIOD * 19 + offsets[0]) * MS)
 
 
 def test_a_wheel_that_falls_silent_is_not_there_a_quarter_second_later() -> None:
@@ -124,6 +127,7 @@ def test_a_message_with_all_wheels_ends_it() -> None:
     joined = Joined(3)
     for item in _apart((0.0, 0.0, 0.0), rounds=3):
         joined.add(item)
+        assert max(map(len, joined._readings)) < 4  # however long it goes on
     assert not joined.is_idle
     whole = _message([0, 1, 2], 60.0)
     assert joined.add(whole) == (whole,)
@@ -167,6 +171,14 @@ def test_two_stages_read_the_same_message() -> None:
     (first,) = stream.samples(message, START)
     assert stream.samples(message, START) == [first]
     assert first[1].absent == ("right", "back")
+    for names in (["right"], ["back"]):
+        _samples(stream, names, 0.0)
+    for names in (["left"], ["right"]):
+        assert _samples(stream, names, 10.0) == []
+    completing = _joints(["back"], 10.0)
+    (sample,) = stream.samples(completing, START + 10 * MS)
+    assert sample[1].absent == ()
+    assert stream.samples(completing, START + 10 * MS) == [sample]
     assert stream.newest == 0
     whole = _joints(NAMES, 20.0)
     assert stream.samples(whole, START + 20 * MS)[0][1].absent == ()

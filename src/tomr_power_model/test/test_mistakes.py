@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from tomr_power_model.drive.mistakes import gross_mistake
 from tomr_power_model.geometry.kinematics import twist_to_wheels
@@ -49,6 +50,11 @@ def test_a_robot_that_never_turns_shows_what_needs_no_turning() -> None:
     backwards = DESCRIBED * [[1.0], [-1.0], [1.0]]
     said, _ = gross_mistake(twists, twists @ backwards.T, ROBOT)
     assert said.startswith("the encoder of wheel_2_joint counts against its sense")
+    # What it turns by chance drowns in what encoders are off by, and some of what they say is lost.
+    noisy = twists @ backwards.T + np.random.default_rng(3).normal(0.0, 0.3, (300, 3))
+    noisy[::4, 0] = np.nan
+    said, _ = gross_mistake(twists + [0.0, 0.0, 0.001], noisy, ROBOT)
+    assert said.startswith("the encoder of wheel_2_joint counts against its sense")
     assert gross_mistake(twists, twists @ (DESCRIBED * [1.0, 1.0, -1.0]).T, ROBOT) == ("", "")
     # Half way around is as well all encoders backwards: which, turning would show.
     assert gross_mistake(twists, -twists @ DESCRIBED.T, ROBOT) == ("", "")
@@ -61,6 +67,25 @@ def test_a_mixture_of_driving_and_standing_is_no_mistake() -> None:
         speed = twists @ DESCRIBED.T
         speed[still] = 0.0
         assert gross_mistake(twists, speed, ROBOT) == ("", "")
+    share = np.arange(300)[:, None] % 3  # a third each: still, half as fast, as described
+    assert gross_mistake(twists, 0.5 * share * (twists @ DESCRIBED.T), ROBOT) == ("", "")
+
+
+@pytest.mark.parametrize("degrees", [20.0, 45.0])
+def test_what_no_mistake_explains_has_no_name(degrees: float) -> None:
+    """A little off, which others find, and far off, between two mistakes."""
+    twists = _twists()
+    other = evolve(ROBOT, wheel_offset=ROBOT.wheel_offset + np.radians(degrees))
+    speed = twists @ twist_to_wheels(other, nominal=True).T
+    assert gross_mistake(twists, speed, ROBOT) == ("", "")
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.4, 1.3, 2.0])
+def test_one_direction_shows_no_mistake(heading: float) -> None:
+    speed = np.random.default_rng(4).uniform(-0.5, 0.5, (300, 1))
+    straight = speed * [np.cos(heading), np.sin(heading), 0.3 * np.sin(5.0 * heading)]
+    for signs in ([1.0, -1.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, -1.0, -1.0]):
+        assert gross_mistake(straight, straight @ DESCRIBED.T * signs, ROBOT) == ("", "")
 
 
 def test_too_few_samples_say_nothing_and_sizes_may_be_left_out() -> None:

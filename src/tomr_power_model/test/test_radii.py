@@ -119,9 +119,23 @@ def test_of_one_motion_three_values_explain_any_three_speeds(
     assert misdescribed(found, ROBOT) == ("", "")
     found = answer(time, 1.05 * expected, expected, ROBOT)  # one value alone is believed
     assert misdescribed(found, ROBOT)[1].startswith("write robot.wheel_radius: 0.04762, as")
+    # What a simulation wobbles by is no other motion.
+    wobble = straight + 0.01 * np.sin(time)[:, None] * [1.0, 1.0, 0.0]
+    expected = wobble @ twist_to_wheels(ROBOT).T
+    assert misdescribed(answer(time, expected * [0.95, 1.0, 1.0], expected, ROBOT), ROBOT)[0] == ""
     both = np.where(time[:, None] < 15.0, straight, [[0.0, 0.3, 0.0]])
     expected = both @ twist_to_wheels(ROBOT).T
     assert answer(time, expected * [0.95, 1.0, 1.0], expected, ROBOT) is None
     assert answer(time, 1.05 * expected, expected, ROBOT) == Answer(
         pytest.approx(1.05), found.yaw and pytest.approx(1.05), pytest.approx(0.0), 2
     )
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"robot_radius": 0.4}, {"wheel_radius": 0.025}, {"wheel_offset": ROBOT.wheel_offset - 0.6}],
+)
+def test_gross_mistakes_are_left_to_others(changes: dict[str, float]) -> None:
+    found = _answer(evolve(ROBOT, **changes))
+    assert found is not None
+    assert misdescribed(found, ROBOT) == ("", "")

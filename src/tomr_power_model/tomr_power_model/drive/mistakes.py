@@ -19,7 +19,6 @@ Array = NDArray[np.float64]
 
 _FACTORS = (2.0, 0.5)
 _MOST_ALIKE = 30.0  # how much more of one direction of twists there may be than of another
-_LEAST_LENGTH = 0.05  # (rad/s)/(m/s): a wheel that answers to nothing
 _OFF = 0.3  # relative error of the answers as described from which on something is wrong
 _FITS = 0.15  # and with the mistake mended
 _LEAST = 200  # samples
@@ -83,13 +82,12 @@ def gross_mistake(
 
 def _answers(asked: Array, speed: Array) -> tuple[Array | None, Array]:
     """Wheel speeds by the directions of twists that are shown, (3, k), and these, (3, k); None
-    where fewer than two are, or a wheel answers to nothing."""
+    where fewer than two are, or no wheel answers."""
     _, sizes, directions = np.linalg.svd(asked, full_matrices=False)
     shown = directions[sizes > sizes[0] / _MOST_ALIKE].T
     found, *_ = np.linalg.lstsq(asked @ shown, speed, rcond=None)
     seen = np.asarray(found.T)
-    is_shown = shown.shape[1] > 1 and (np.linalg.norm(seen, axis=1) > _LEAST_LENGTH).all()
-    return (seen if is_shown else None), shown
+    return (seen if shown.shape[1] > 1 and seen.any() else None), shown
 
 
 def _is_better(asked: Array, speed: Array, mistaken: Array, described: Array) -> bool:

@@ -49,11 +49,9 @@ class Joined:
         newest = max((queue[-1][0] for queue in self._readings if queue), default=stamp)
         if stamp < newest - _LIVE:  # time went back
             self._clear()
-        is_known = True
         for queue, reading in zip(self._readings, message.wheels, strict=True):
             if reading is not None and (not queue or stamp > queue[-1][0]):
                 queue.append((stamp, reading))
-                is_known = False
             # One reading before the next sample is enough, and none of a wheel that is silent.
             while len(queue) > 1 and queue[1][0] <= self._done:
                 queue.popleft()
@@ -61,7 +59,7 @@ class Joined:
         if live == present:  # nothing to be joined, and repeats are judged by others
             self._done = stamp
             return (message,)
-        return () if is_known else self._complete(live)
+        return self._complete(live)
 
     def _clear(self) -> None:
         for queue in self._readings:
