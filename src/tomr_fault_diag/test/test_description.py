@@ -1,6 +1,7 @@
 """Whether the robot is the one that is described, tick by tick."""
 
 import math
+import warnings
 from collections.abc import Callable
 
 import numpy as np
@@ -128,10 +129,16 @@ def test_powers_with_the_wrong_sign_or_name_are_named() -> None:
     _take(watch, 24.0, DESCRIBED, powers=lambda powers: powers * [1.0, -1.0, 1.0])
     assert watch.words().startswith("the power of wheel_2 has the wrong sign: mend it")
     watch = DescriptionWatch(ROBOT, to_ns(0.05))
+    _take(watch, 21.0, DESCRIBED, powers=lambda powers: -powers)  # 18 s of driving: a slope, maybe
+    assert watch.words() == ""
+    watch = DescriptionWatch(ROBOT, to_ns(0.05))
     _take(watch, 24.0, DESCRIBED, powers=lambda powers: powers - 9.0)  # down a slope
     assert watch.words() == ""
-    _take(watch, 24.0, DESCRIBED, powers=lambda powers: 0.0 * powers - 9.0)  # stuck
-    assert watch.words() == ""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        watch = DescriptionWatch(ROBOT, to_ns(0.05))
+        _take(watch, 42.0, DESCRIBED, powers=lambda powers: 0.0 * powers - 9.0)  # stuck
+        assert watch.words() == ""
     watch = DescriptionWatch(ROBOT, to_ns(0.05))
     _take(watch, 24.0, DESCRIBED, powers=lambda powers: powers[[1, 0, 2]])
     assert watch.words().startswith(
@@ -151,8 +158,9 @@ def test_powers_with_the_wrong_sign_or_name_are_named() -> None:
 )
 def test_a_gross_mistake_counts_once_it_is_seen_twice(matrix: np.ndarray, is_gross: bool) -> None:
     watch = DescriptionWatch(ROBOT, to_ns(0.05))
-    _take(watch, 12.0, matrix)
+    _take(watch, 17.0, matrix)  # looked at after 5, 10 and 15 s; ten of driving show it
     assert watch.mistake == ""
+    assert (watch.remark().level is Level.WARN) == (matrix is not DESCRIBED)
     _take(watch, 42.0, matrix)
     assert bool(watch.mistake) == is_gross
     assert bool(watch.words()) == (matrix is not DESCRIBED)
@@ -172,3 +180,12 @@ def test_many_decisions_a_second_show_no_more_than_twenty() -> None:
     _take(watch, 42.0, 1.08 * DESCRIBED, 0.01)
     _take(sparse, 42.0, 1.08 * DESCRIBED, 0.05)
     assert watch.words() == sparse.words() != ""
+    assert abs(len(watch._ticks) - len(sparse._ticks)) < 10
+
+
+def test_what_is_long_past_is_forgotten() -> None:
+    watch = DescriptionWatch(ROBOT, to_ns(0.2))
+    _take(watch, 420.0, 1.08 * DESCRIBED, 0.2)
+    assert watch.words() != ""
+    _take(watch, 168.0, DESCRIBED, 0.2)  # two minutes of driving, and standing between
+    assert watch.words() == ""

@@ -53,7 +53,7 @@ def test_a_robot_that_never_turns_shows_what_needs_no_turning() -> None:
     # What it turns by chance drowns in what encoders are off by, and some of what they say is lost.
     noisy = twists @ backwards.T + np.random.default_rng(3).normal(0.0, 0.3, (300, 3))
     noisy[::4, 0] = np.nan
-    said, _ = gross_mistake(twists + [0.0, 0.0, 0.001], noisy, ROBOT)
+    said, _ = gross_mistake(np.add(twists, [0.0, 0.0, 0.001]), noisy, ROBOT)
     assert said.startswith("the encoder of wheel_2_joint counts against its sense")
     assert gross_mistake(twists, twists @ (DESCRIBED * [1.0, 1.0, -1.0]).T, ROBOT) == ("", "")
     # Half way around is as well all encoders backwards: which, turning would show.

@@ -25,7 +25,7 @@ _CLOSEST = to_ns(0.05)  # of ticks: more of them show no more
 _LEAST = to_ns(5.0)  # of driving, before which a fault may be all that is seen
 _TURNS = 0.3  # rad/s: where all wheels are to turn slower, a tick shows nothing
 _MANY = 400  # ticks that a power's sign is judged by
-_REVERSED = -0.5  # correlation of what a motor draws with what it should
+_REVERSED = -0.5  # W that a motor draws more for each that it should
 
 
 @frozen
@@ -79,9 +79,10 @@ def _is_reversed(drawn: Array, expected: Array) -> bool:
     """Whether a motor (n,) draws less the more it should, for longer than a slope goes down."""
     known = np.isfinite(drawn) & np.isfinite(expected)
     drawn, expected = drawn[known], expected[known]
-    if len(drawn) < _MANY or np.sum(drawn) >= 0.0 or min(np.ptp(drawn), np.ptp(expected)) == 0.0:
+    if len(drawn) < _MANY or np.sum(drawn) >= 0.0:
         return False
-    return bool(np.corrcoef(drawn, expected)[0, 1] < _REVERSED)
+    change = expected - np.mean(expected)
+    return bool(drawn @ change < _REVERSED * (change @ change))
 
 
 def _exchanged(driving: _Driving, robot: Robot) -> Said:
