@@ -9,6 +9,7 @@ named and noted then.
 """
 
 import argparse
+import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -120,6 +121,29 @@ def wheels_in_another_order(topic: str, message: Any) -> Iterator[Part]:
 
 
 @_rewired
+def encoders_count_on_shafts_of_motors(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("joint_states"):
+        message.position = message.position * 15.0
+        message.velocity = message.velocity * 15.0
+    yield topic, message
+
+
+@_rewired
+def speeds_alone_in_revolutions_per_minute(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("joint_states"):
+        message.position = message.position[:0]
+        message.velocity = message.velocity * (30.0 / math.pi)
+    yield topic, message
+
+
+@_rewired
+def angles_in_revolutions(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("joint_states"):
+        message.position = message.position * (0.5 / math.pi)
+    yield topic, message
+
+
+@_rewired
 def commands_turn_the_other_way(topic: str, message: Any) -> Iterator[Part]:
     if topic.endswith("cmd_vel"):
         twist = getattr(message, "twist", message)
@@ -131,6 +155,13 @@ def commands_turn_the_other_way(topic: str, message: Any) -> Iterator[Part]:
 def currents_are_positive_while_drawing(topic: str, message: Any) -> Iterator[Part]:
     if topic.endswith("/power"):
         message.current *= -1.0
+    yield topic, message
+
+
+@_rewired
+def currents_in_milliamperes(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("/power"):
+        message.current *= 1000.0
     yield topic, message
 
 

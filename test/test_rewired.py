@@ -79,4 +79,6 @@ def test_a_robot_that_is_wired_otherwise_is_told_so() -> None:
     states, said = _states("square", REWIRED["powers of two motors exchanged"])
     assert "the power of wheel_1 is that of wheel_2_joint" in said
     assert states[-1][1] == "unknown"
+    _, said = _states("square", REWIRED["angles in revolutions"])
+    assert "joint_states seems to give revolutions in place of radians" in said
     assert _states("square")[1] == ""

@@ -151,6 +151,7 @@ def test_powers_with_the_wrong_sign_or_name_are_named() -> None:
     ("matrix", "is_gross"),
     [
         (DESCRIBED * [[1.0], [-1.0], [1.0]], True),
+        (9.549 * DESCRIBED, True),  # in revolutions per minute
         (0.5 * DESCRIBED, False),  # a speed limit between commands and drivers looks so
         (1.03 * DESCRIBED, False),
         (DESCRIBED, False),

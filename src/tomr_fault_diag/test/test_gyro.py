@@ -253,7 +253,10 @@ def test_a_bus_that_answers_with_zeros_measures_nothing() -> None:
         for status in report.statuses
         if status.name == "inputs: imu/data"
     )
-    assert (status.level, status.message) == (Level.WARN, "sends what cannot be used")
+    assert (status.level, status.message) == (
+        Level.WARN,
+        "sends what cannot be used: nothing but zeros",
+    )
 
 
 def test_without_an_imu_nothing_is_said_of_one() -> None:

@@ -289,13 +289,21 @@ def test_what_no_supply_can_deliver_is_no_sample() -> None:
 @pytest.mark.parametrize(
     ("topic", "bad", "words"),
     [
-        ("wheel_2/power", lambda t: _battery(t, 24.0, NAN), "sends what cannot be used"),
-        ("wheel_2/power", lambda t: _battery(t, 1e30, 1.0), "sends what cannot be used"),
-        ("battery_state", lambda t: _battery(t, NAN, -1.0), "sends what cannot be used"),
+        (
+            "wheel_2/power",
+            lambda t: _battery(t, 24.0, NAN),
+            "sends what cannot be used: the current",
+        ),
+        ("wheel_2/power", lambda t: _battery(t, 24e3, 1.0), "sends what cannot be used: more V"),
+        (
+            "battery_state",
+            lambda t: _battery(t, NAN, -1.0),
+            "sends what cannot be used: the voltage",
+        ),
         (
             "joint_states",
             lambda t: Message(header=_joints(t).header, name=None),
-            "sends what cannot be used",
+            "sends what cannot be used: malformed",
         ),
         ("joint_states", lambda t: _unstamped(_joints(t)), "its stamps do not fit"),
         ("battery_state", lambda t: _unstamped(ALL["battery_state"](t)), "its stamps do not fit"),
@@ -308,7 +316,7 @@ def test_an_input_that_sends_what_cannot_be_used_says_so(
         return bad(stamp) if stamp > BASE + 500 * MS else ALL[topic](stamp)
 
     said, _ = _health({**ALL, topic: ails})
-    assert said.pop(f"inputs: {topic}") == words
+    assert words in said.pop(f"inputs: {topic}")
     assert set(said.values()) == {"as it should be"}
 
 

@@ -22,6 +22,12 @@ def _twists() -> np.ndarray:
         (DESCRIBED * [1.0, 1.0, -1.0], "angular.z of the commands has the wrong sign", "REP 103"),
         (DESCRIBED * [1.0, 1.0, 2.0], "2 times as far out", "robot.robot_radius: 0.4"),
         (0.5 * DESCRIBED, "turn 0.5 times as fast", "robot.wheel_radius: 0.1,"),
+        (1.9 * DESCRIBED, "turn 2 times as fast", "robot.wheel_radius: 0.025,"),
+        (2.7 * DESCRIBED, "turn 2.7 times as fast", "robot.wheel_radius: 0.0185,"),
+        (55.0 * DESCRIBED, "turn 55 times as fast", "joint_states seems to give degrees"),
+        (9.5493 * DESCRIBED, "turn 9.55 times as fast", "give revolutions per minute in place of"),
+        (10.0 * DESCRIBED, "turn 10 times as fast", "robot.wheel_radius: 0.005,"),
+        (DESCRIBED / 6.2832, "turn 0.159 times as fast", "give revolutions in place of radians"),
         (DESCRIBED[[0, 2, 1]], "the order of the wheels", "robot.wheel_names: [wheel_1_joint, "),
     ],
 )
@@ -88,11 +94,25 @@ def test_one_direction_shows_no_mistake(heading: float) -> None:
         assert gross_mistake(straight, straight @ DESCRIBED.T * signs, ROBOT) == ("", "")
 
 
-def test_too_few_samples_say_nothing_and_sizes_may_be_left_out() -> None:
+def test_too_few_samples_say_nothing_and_what_limits_may_be_left_out() -> None:
     twists = _twists()
     assert gross_mistake(twists, -twists @ DESCRIBED.T, ROBOT)[0]
     few = np.where(np.arange(300)[:, None] < 150, twists, np.nan)
     assert gross_mistake(few, -twists @ DESCRIBED.T, ROBOT) == ("", "")
     half = 0.5 * twists @ DESCRIBED.T
     assert "see what changes the commands" in gross_mistake(twists, half, ROBOT)[1]
-    assert gross_mistake(twists, half, ROBOT, scales=False) == ("", "")
+    assert gross_mistake(twists, half, ROBOT, slower=False) == ("", "")
+    near = twists @ (DESCRIBED * [1.0, 1.0, 0.5]).T
+    assert "0.5 times as far out" in gross_mistake(twists, near, ROBOT)[0]
+    assert gross_mistake(twists, near, ROBOT, slower=False) == ("", "")
+
+
+def test_what_turns_faster_than_commanded_is_always_a_mistake() -> None:
+    """Nothing on a robot's way makes that of all its wheels."""
+    twists = _twists()
+    motors = tuple(evolve(motor, gear_ratio=15.0) for motor in ROBOT.motors)
+    geared = evolve(ROBOT, motors=motors)
+    seen, remedy = gross_mistake(twists, 14.5 * twists @ DESCRIBED.T, geared, slower=False)
+    assert "14.5 times as fast" in seen
+    assert "joint_states seems to give the motor's shaft in place of the wheel" in remedy
+    assert gross_mistake(twists, 1.5 * twists @ DESCRIBED.T, geared, slower=False) == ("", "")

@@ -43,14 +43,14 @@ Said = tuple[str, str]  # what is seen and what to mend, empty where nothing
 _NOTHING: Said = ("", "")
 
 
-def _mistaken(driving: _Driving, robot: Robot, *, scales: bool = False) -> Said:
+def _mistaken(driving: _Driving, robot: Robot, *, slower: bool = False) -> Said:
     twist = driving.asked @ np.linalg.inv(twist_to_wheels(robot, nominal=True)).T
-    seen, remedy = gross_mistake(twist, driving.speed, robot, scales=scales)
+    seen, remedy = gross_mistake(twist, driving.speed, robot, slower=slower)
     return f"wheels and commands: {seen}" if seen else "", remedy
 
 
 def _other_sizes(driving: _Driving, robot: Robot) -> Said:
-    gross = _mistaken(driving, robot, scales=True)
+    gross = _mistaken(driving, robot, slower=True)
     if gross != _NOTHING:
         return gross
     found = answer(driving.time, driving.speed, driving.asked, robot)

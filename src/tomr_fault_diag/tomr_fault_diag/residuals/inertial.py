@@ -32,7 +32,7 @@ class InertialWatch:
     def add(self, stamp_ns: int, yaw_rate: float, force: Force) -> None:
         """Take a yaw rate [rad/s] and a specific force [m/s^2], NaN for what is not measured."""
         if not yaw_rate and not any(force):  # a bus that answers with zeros
-            self._flow.refuse()
+            self._flow.refuse("nothing but zeros")
             return
         self._flow.take(stamp_ns)
         self._gyro.add(stamp_ns, yaw_rate)

@@ -30,7 +30,7 @@ from tomr_fault_diag.residuals.scatter import ScatterWatch
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
 from tomr_fault_diag.residuals.voltages import VoltageWatch
 from tomr_fault_diag.residuals.widths import transient_ticks, width
-from tomr_power_model.drive.plausible import PowerLimits, fastest_wheel
+from tomr_power_model.drive.plausible import IGNORED, PowerLimits, fastest_wheel
 from tomr_power_model.drive.sources import (
     ARRAY_TOPIC,
     TOTAL,
@@ -62,6 +62,7 @@ PREDICTIONS = "predictions"
 ENCODERS = "joint_states"
 
 _NO_PREDICTION = "no prediction: power_model does not run, or waits for what it reads"
+_TOO_FAST = "by robot.yaml no wheel can turn so far so fast (rad of the wheel, not of its motor)"
 _UNSURE = 1.0  # bands: a speed is not known whose standard deviation is larger
 _TURNS = 0.3  # rad/s: a slower wheel may rest
 
@@ -144,10 +145,8 @@ class ResidualStage:
         arrival = self._arrive(ENCODERS, stamp_ns)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
             if not self._encoders.add(EncoderSample(stamp_ns, position, velocity)):
-                self._encoders.continuity.refuse()
-                return (
-                    "by robot.yaml no wheel can turn so far so fast (in rad); the sample is ignored"
-                )
+                self._encoders.continuity.refuse(_TOO_FAST)
+                return f"{_TOO_FAST}; {IGNORED}"
         else:
             self._encoders.continuity.ignore(arrival, stamp_ns, self._clock.off(ENCODERS))
         return arrival
@@ -157,8 +156,8 @@ class ResidualStage:
         supply, stamp = reading.wheel, reading.stamp_ns
         problem = self._limits.problem(reading)
         if problem is not None:
-            self._flows[supply].refuse()
-            return problem
+            self._flows[supply].refuse(problem)
+            return f"{problem}; {IGNORED}"
         arrival = self._arrive(self._supplies[supply], stamp)
         if arrival is Arrival.TAKEN and stamp <= self._decided - self.settings.stale:
             self._flows[supply].misplace()
@@ -183,15 +182,15 @@ class ResidualStage:
             self._inertial.ignore(arrival, stamp_ns, self._clock.off(IMU))
         return arrival
 
-    def refused(self, topic: str) -> None:
-        """Take note of a message that nothing can be read from."""
+    def refused(self, topic: str, problem: str) -> None:
+        """Take note of a message that nothing can be read from, and why."""
         if topic == ENCODERS:
-            self._encoders.continuity.refuse()
+            self._encoders.continuity.refuse(problem)
         for supply, flow in zip(self._supplies, self._flows, strict=True):
             if topic in (supply, f"{supply}/power") or (
                 topic == ARRAY_TOPIC and supply != TOTAL_TOPIC
             ):
-                flow.refuse()
+                flow.refuse(problem)
 
     def due(self) -> list[ResidualFrame]:
         """Residuals for the ticks that the stamps have reached, in order."""

@@ -36,11 +36,12 @@ def test_a_sensor_that_dies_is_a_warning_and_commands_may_end() -> None:
 def test_what_comes_may_be_bad() -> None:
     stream = flow(1000)
     assert said(InputState("x", stream, "frozen"), 1000) == (Level.WARN, "frozen")
-    stream.refuse()
-    assert said(InputState("x", stream), 1000) == (Level.WARN, "sends what cannot be used at times")
-    stream.refuse()
-    stream.refuse()
-    assert said(InputState("x", stream), 1000) == (Level.WARN, "sends what cannot be used")
+    stream.refuse("in mV")
+    words = "sends what cannot be used at times: in mV"
+    assert said(InputState("x", stream), 1000) == (Level.WARN, words)
+    stream.refuse("in\nmV")
+    stream.refuse("in mA")
+    assert said(InputState("x", stream), 1000) == (Level.WARN, "sends what cannot be used: in mA")
     for t in range(1000, 4000, 20):
         stream.take(BASE + t * MS)
     assert said(InputState("x", stream), 4000)[0] is Level.OK
@@ -189,7 +190,7 @@ def test_what_is_no_sample_takes_nothing_from_the_order_of_those_that_are(refuse
         stream.take(BASE + t * MS)
         for _ in range(3):
             if refused:
-                stream.refuse()
+                stream.refuse("why")
             else:
                 stream.precedes(BASE + t * MS)
     stream.misplace()

@@ -1,23 +1,31 @@
 """Gross mistakes in a description that encoders against commands show: which, and what to mend.
 
 The order, directions, places and radius of the wheels. What is a little off is for `radii`; here a
-value is twice what it should be, or belongs to another wheel.
+value is twice what it should be, in other units, or belongs to another wheel.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import chain, permutations
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.drive.sources import ENCODER_TOPIC
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import WHEELS, Robot
 
 Array = NDArray[np.float64]
 
-_FACTORS = (2.0, 0.5)
+_GROSS = 1.6  # of sizes: what is nearer to 1 is for `radii`
+_LAG, _ABOVE = 0.12, 0.03  # relative: a factor seems smaller, for wheels lag behind commands
+_ROUND = (2.0, 0.5)  # a diameter for a radius, a radius for a diameter
+_UNITS: Mapping[str, float] = {
+    "degrees in place of radians": 180.0 / math.pi,
+    "revolutions per minute in place of rad/s": 30.0 / math.pi,
+    "revolutions in place of radians": 0.5 / math.pi,
+}
 _MOST_ALIKE = 30.0  # how much more of one direction of twists there may be than of another
 _OFF = 0.3  # relative error of the answers as described from which on something is wrong
 _FITS = 0.15  # and with the mistake mended
@@ -33,10 +41,11 @@ class _Mistake:
     seen: str
     remedy: str
     matrix: Array  # wheel speeds by twist, (3, 3)
+    is_slower: bool = False  # all wheels, as if something limited the commands
 
 
 def gross_mistake(
-    asked: Array, speed: Array, robot: Robot, *, scales: bool = True
+    asked: Array, speed: Array, robot: Robot, *, slower: bool = True
 ) -> tuple[str, str]:
     """What is seen where wheels answer to commands as another description says, and what to mend;
     empty where they do not, or where it does not show.
@@ -45,7 +54,7 @@ def gross_mistake(
         asked: twists [m/s, m/s, rad/s], (n, 3), NaN where unknown.
         speed: of the wheels [rad/s], (n, 3), the same.
         robot: the description.
-        scales: look for sizes as well, which something that limits the commands looks like.
+        slower: look for wheels that turn slower throughout as well, as if something limited them.
     """
     known = np.isfinite(asked).all(axis=1) & np.isfinite(speed).all(axis=1)
     known &= np.abs(asked).any(axis=1)
@@ -61,11 +70,13 @@ def gross_mistake(
     error = _distance(seen, expected @ shown)
     if error < _OFF:
         return "", ""
+    scales = _scales(robot, expected, _factor(seen, expected @ shown))
     # Of mistakes that look alike the first is the likeliest.
     found = sorted(
         (
             (round(_distance(seen, mistake.matrix @ shown), 3), mistake)
-            for mistake in chain(_mistakes(robot, expected), _scales(robot, expected, scales))
+            for mistake in chain(_mistakes(robot, expected), scales)
+            if slower or not mistake.is_slower
         ),
         key=lambda item: item[0],
     )
@@ -93,14 +104,22 @@ def _answers(asked: Array, speed: Array) -> tuple[Array | None, Array]:
 def _is_better(asked: Array, speed: Array, mistaken: Array, described: Array) -> bool:
     """Whether most of what is not as described is as mistaken: not a mixture of what is and wheels
     that stand."""
-    off, others = (np.linalg.norm(speed - asked @ m.T, axis=1) for m in (described, mistaken))
-    strays = off > _OFF * np.linalg.norm(asked @ described.T, axis=1)
-    return bool(np.mean(others[strays] < _CLOSER * off[strays]) > _MOST) if strays.any() else False
+    as_described, as_mistaken = asked @ described.T, asked @ mistaken.T
+    off, others = (np.linalg.norm(speed - to, axis=1) for to in (as_described, as_mistaken))
+    strays = off > _OFF * np.linalg.norm(as_described, axis=1)
+    # A wheel that stands is near to what turns slowly.
+    near = _CLOSER * np.minimum(off, 2.0 * np.linalg.norm(as_mistaken, axis=1))
+    return bool(np.mean((others < near)[strays]) > _MOST) if strays.any() else False
+
+
+def _factor(seen: Array, expected: Array) -> float:
+    """How many times what is expected is seen."""
+    return float(np.sum(seen * expected) / np.sum(expected**2))
 
 
 def _distance(seen: Array, expected: Array) -> float:
     """Relative difference; answers that lag seem a little small, so their size is free by 15 %."""
-    scale = float(np.clip(np.sum(seen * expected) / np.sum(expected**2), 0.85, 1.05))
+    scale = float(np.clip(_factor(seen, expected), 0.85, 1.05))
     return float(np.linalg.norm(seen - scale * expected) / np.linalg.norm(seen))
 
 
@@ -146,21 +165,37 @@ def _mistakes(robot: Robot, expected: Array) -> Iterator[_Mistake]:
         )
 
 
-def _scales(robot: Robot, expected: Array, wanted: bool) -> Iterator[_Mistake]:
-    for factor in _FACTORS if wanted else ():
-        yield _Mistake(
-            f"the wheels turn {factor:g} times as fast as described",
-            f"write robot.wheel_radius: {robot.wheel_radius / factor:g}, or mend the gear ratio "
-            "by which the driver counts, or see what changes the commands on their way",
-            factor * expected,
-        )
+def _scales(robot: Robot, expected: Array, factor: float) -> Iterator[_Mistake]:
+    """Sizes that are off; `factor`: by which all wheels seem to be faster than expected."""
+    if factor > _GROSS or 0.0 < factor < 1.0 / _GROSS:
+        factor = next((much for much in _ROUND if _is_about(factor, much)), factor)
+        seen = f"the wheels turn {factor:.3g} times as fast as described"
+        matrix, is_slower = factor * expected, factor < 1.0
+        yield _Mistake(seen, _remedy(robot, factor), matrix, is_slower=is_slower)
+    for far in _ROUND:
         wide = expected.copy()
-        wide[:, 2] *= factor
+        wide[:, 2] *= far
         yield _Mistake(
-            f"the wheels stand {factor:g} times as far out as described",
-            f"write robot.robot_radius: {factor * robot.robot_radius:g}",
+            f"the wheels stand {far:g} times as far out as described",
+            f"write robot.robot_radius: {far * robot.robot_radius:g}",
             wide,
+            is_slower=far < 1.0,
         )
+
+
+def _remedy(robot: Robot, factor: float) -> str:
+    shaft = ("the motor's shaft in place of the wheel", robot.motors[0].gear_ratio)
+    for name, much in (shaft, *_UNITS.items()):
+        if _is_about(factor, much):
+            return f"{ENCODER_TOPIC} seems to give {name}: mend the driver that sends it"
+    return (
+        f"write robot.wheel_radius: {robot.wheel_radius / factor:.3g}, or mend the gear ratio "
+        "by which the driver counts, or see what changes the commands on their way"
+    )
+
+
+def _is_about(factor: float, much: float) -> bool:
+    return -_LAG < factor / much - 1.0 < _ABOVE
 
 
 def _rotation(angle: float) -> Array:

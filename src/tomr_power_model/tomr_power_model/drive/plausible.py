@@ -8,7 +8,9 @@ from attrs import frozen
 from tomr_power_model.drive.sources import TOTAL, PowerReading
 from tomr_power_model.robot import Robot
 
+IGNORED = "the sample is ignored"  # what then becomes of it
 _MARGIN = 2.0
+_CLEARLY = 5.0  # times what can be: more than a spike, a robot that rests draws a hundredth
 _DEAD = 0.1  # of the nominal voltage: a supply below it feeds no driver that could report it
 
 
@@ -52,7 +54,7 @@ class PowerLimits:
             return None  # as nearly all are
         name = "the robot" if reading.wheel == TOTAL else f"motor {reading.wheel + 1}"
         if reading.voltage < self.dead:
-            return f"under {self.dead:.3g} V feed nothing of {name}; the sample is ignored"
+            return f"under {self.dead:.3g} V feed nothing of {name}"
         for value, most, unit in (
             (reading.voltage, self.voltage, "V"),
             (reading.current, self.current[reading.wheel], "A"),
@@ -60,5 +62,7 @@ class PowerLimits:
         ):
             if abs(value) > most:
                 limit = f"{most:.3g} {unit} is twice what it can"
-                return f"more {unit} of {name} than can be ({limit}); the sample is ignored"
+                is_milli = _CLEARLY * most < abs(value) < 1e3 * most
+                guess = f", is it in m{unit}?" if is_milli else ""
+                return f"more {unit} of {name} than can be ({limit}{guess})"
         return None

@@ -167,7 +167,7 @@ def _geometry(item: Drive, robot: Robot) -> Iterator[Finding]:
     if len(item.command_time) < 2:
         return
     speed, asked = measured_speed(item), item.command_at(item.encoder_time)
-    mistake, remedy = gross_mistake(asked, speed, robot, scales=False)
+    mistake, remedy = gross_mistake(asked, speed, robot, slower=False)
     if mistake:
         start, end = float(item.encoder_time[0]), float(item.encoder_time[-1])
         yield Finding(item.name, "all wheels", start, end, mistake, remedy)

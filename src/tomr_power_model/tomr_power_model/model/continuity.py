@@ -11,6 +11,7 @@ from statistics import median
 
 from attrs import frozen
 
+from tomr_power_model.errors import one_line
 from tomr_power_model.model.ticks import Arrival, to_ns
 
 _USUAL = 3.0  # intervals: a longer silence is a gap
@@ -71,6 +72,8 @@ class Continuity:
         self.refused = 0  # messages up to the last tick
         self.refused_at = 0  # newest stamp before the last of them, 0: there was none
         self.refused_since = 0  # the newest sample
+        self.reason = ""  # why the last one was refused
+        self._reasons: deque[str] = deque()
         self.gaps = 0
         self.resumed = 0  # first stamp after the last gap, 0: there was none
         self.silence = 0  # how long that was [ns]
@@ -108,8 +111,9 @@ class Continuity:
         else:
             self.precedes(stamp_ns)
 
-    def refuse(self) -> None:
-        """Take note of a message that cannot be used."""
+    def refuse(self, reason: str) -> None:
+        """Take note of a message that cannot be used, and why."""
+        self._reasons.append(one_line(reason))
         self._ahead.append((self._read, _REFUSED))
 
     def restart(self, stamp_ns: int) -> None:
@@ -191,7 +195,9 @@ class Continuity:
 
     def _ignore(self, stamp: int, back: int) -> None:
         """Count a message that is none of the samples."""
-        if back != _REFUSED:
+        if back == _REFUSED:
+            self.reason = self._reasons.popleft()
+        else:
             self._misplaced += 1
         if back not in (_REFUSED, _REPEATED):
             self._in_order.append(False)

@@ -40,7 +40,7 @@ class InputState:
         if flow.is_misplaced(tick_ns):
             return Level.WARN, apart(flow.ahead) if flow.ahead else "its stamps do not fit"
         if flow.refused_since >= _MANY:
-            return Level.WARN, "sends what cannot be used"
+            return Level.WARN, f"sends what cannot be used: {flow.reason}"
         if flow.is_rare(tick_ns):
             return Level.WARN, f"comes every {1e-9 * flow.silence:.1f} s: too rarely to be compared"
         if not last:
@@ -52,7 +52,7 @@ class InputState:
         if self.ailment:
             return Level.WARN, self.ailment
         if flow.refused_at and tick_ns - flow.refused_at < _RECENT:
-            return Level.WARN, "sends what cannot be used at times"
+            return Level.WARN, f"sends what cannot be used at times: {flow.reason}"
         paused = self.is_optional and flow.silence >= _PAUSE
         if flow.resumed and tick_ns - flow.resumed < _RECENT and not paused:
             return Level.WARN, "a gap a moment ago"

@@ -1,6 +1,7 @@
 """Read robot.yaml: an ordinary ROS 2 parameter file."""
 
 from collections.abc import Iterable, Mapping
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -76,8 +77,9 @@ def shipped_robots() -> list[str]:
     )
 
 
+@cache
 def shipped_robot(name: str) -> Robot:
-    """A robot that comes with the package, by name."""
+    """A robot that comes with the package, by name; read once."""
     if name not in shipped_robots():
         raise InputError(f"robot {name!r} is not shipped: give one of {shipped_robots()}")
     return load_robot(name)

@@ -6,7 +6,7 @@ from typing import Any
 
 from attrs import frozen
 
-from tomr_power_model.drive.plausible import PowerLimits
+from tomr_power_model.drive.plausible import IGNORED, PowerLimits
 from tomr_power_model.drive.sources import (
     ENCODER_TOPIC,
     VOLTAGE_TOPIC,
@@ -83,22 +83,22 @@ class Thinning:
 
 
 def guarded(
-    take: Take, refused: Callable[[], None] = lambda: None
+    take: Take, refused: Callable[[str], None] = lambda problem: None
 ) -> Callable[[Any, int], str | None]:
     """Turn an unusable message or stamp into a complaint: no message may stop a stage.
 
-    `refused` is called for each message that nothing can be read from.
+    `refused` gets why nothing can be read from a message.
     """
 
     def taken(message: Any, receive_ns: int) -> str | None:
         try:
             return _complaint(take(message, receive_ns))
         except Unusable as error:
-            problem = f"{error}; the message is ignored"
+            problem = str(error)
         except MALFORMED as error:
-            problem = f"malformed ({error}); the message is ignored"
-        refused()
-        return problem
+            problem = f"malformed ({error})"
+        refused(problem)
+        return f"{problem}; the message is ignored"
 
     return taken
 
@@ -135,8 +135,9 @@ def model_inputs(
     limits = PowerLimits.of(robot)
 
     def power(reading: PowerReading) -> Arrival | str:
-        problem = limits.problem(reading)
-        return problem or predictor.measured(reading.wheel, reading.stamp_ns)
+        if problem := limits.problem(reading):
+            return f"{problem}; {IGNORED}"
+        return predictor.measured(reading.wheel, reading.stamp_ns)
 
     inputs = [
         Input("cmd_vel", TWIST_STAMPED, guarded(command), (TWIST, TWIST_STAMPED)),
@@ -163,11 +164,11 @@ def measured_inputs(
     power: Callable[[PowerReading], Arrival | str],
     wheels: WheelStream | None = None,
     *,
-    refused: Callable[[str], None] = lambda topic: None,
+    refused: Callable[[str, str], None] = lambda topic, problem: None,
 ) -> tuple[Input, ...]:
     """Inputs of a stage that takes encoders and power; `wheels` may be shared with another one.
 
-    `refused` gets the topic of each message that nothing can be read from.
+    `refused` gets the topic of each message that nothing can be read from, and why.
     """
     wheels = wheels or WheelStream(robot.wheel_names)
     take = _encoders(wheels, encoders)
