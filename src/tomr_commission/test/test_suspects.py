@@ -111,6 +111,15 @@ def test_wrong_value(ideal: Drive, key: str, value: float, said: str) -> None:
         check_wheels([ideal], described, "robot.yaml")
 
 
+def test_what_nobody_commanded_shows_nothing_of_the_wheels(ideal: Drive) -> None:
+    """That commands are missing is for others to say."""
+    silent = evolve(ideal, command_time=np.empty(0), command=np.empty((0, 3)))
+    check_wheels([silent], ROBOT, "robot.yaml")
+    reversed_too = evolve(ideal, position=-ideal.position, velocity=-ideal.velocity)
+    with pytest.raises(InputError, match="turn against their sense"):
+        check_wheels([silent, reversed_too], ROBOT, "robot.yaml")
+
+
 @pytest.mark.parametrize("key", ["motor.gear_ratio", "robot.mass"])
 def test_value_twice_too_large(key: str) -> None:
     value = VALUES[key]

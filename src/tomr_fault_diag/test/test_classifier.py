@@ -206,6 +206,15 @@ def test_of_a_robot_that_is_not_the_one_described_nothing_is_known() -> None:
     assert dict(status.values)["evidence 1"] == f"robot.yaml: {words}"
 
 
+def test_a_mistake_is_no_reason_to_speak_of_what_hardly_comes() -> None:
+    classifier = _classifier()
+    for tick in range(1, 40):
+        classifier.classify(_frame(tick, HEALTHY, stale=True))
+    said = classifier.classify(evolve(_frame(40, HEALTHY), mistake="exchange the plugs"))
+    assert said is not None
+    assert said.state.name == "not enough data"
+
+
 def test_a_clock_that_goes_back_starts_afresh() -> None:
     classifier = _classifier()
     for tick in range(100, 130):

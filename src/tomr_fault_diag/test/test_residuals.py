@@ -55,6 +55,12 @@ def _unstamped(message: Any) -> Any:
     return message
 
 
+def _speeds_in_degrees(message: Any) -> Any:
+    message.position = []
+    message.velocity = [math.degrees(speed) for speed in message.velocity]
+    return message
+
+
 def _joints(stamp: int, effort: tuple[float, ...] = ()) -> Any:
     robot = shipped_robot("reference")
     seconds = 1e-9 * (stamp - BASE)
@@ -304,6 +310,11 @@ def test_what_no_supply_can_deliver_is_no_sample() -> None:
             "joint_states",
             lambda t: Message(header=_joints(t).header, name=None),
             "sends what cannot be used: malformed",
+        ),
+        (
+            "joint_states",
+            lambda t: _speeds_in_degrees(_joints(t)),
+            "sends what cannot be used: by robot.yaml no wheel can turn so far so fast (rad of",
         ),
         ("joint_states", lambda t: _unstamped(_joints(t)), "its stamps do not fit"),
         ("battery_state", lambda t: _unstamped(ALL["battery_state"](t)), "its stamps do not fit"),

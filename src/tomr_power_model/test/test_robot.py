@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from tomr_power_model.errors import InputError
-from tomr_power_model.robot import load_robot, read_node_sections, shipped_robots
+from tomr_power_model.robot import load_robot, read_node_sections, shipped_robot, shipped_robots
 
 REFERENCE = files("tomr_power_model").joinpath("robots").joinpath("reference.yaml").read_text()
 
@@ -42,6 +42,7 @@ def test_shipped_robots_load() -> None:
     assert {"reference", "robotino_v2"} <= set(shipped_robots())
     for name in shipped_robots():
         assert load_robot(name).mass > 0.0
+    assert shipped_robot("reference") is shipped_robot("reference")  # tests take it by the thousand
 
 
 @pytest.mark.parametrize(

@@ -39,12 +39,22 @@ def test_what_comes_may_be_bad() -> None:
     stream.refuse("in mV")
     words = "sends what cannot be used at times: in mV"
     assert said(InputState("x", stream), 1000) == (Level.WARN, words)
-    stream.refuse("in\nmV")
     stream.refuse("in mA")
-    assert said(InputState("x", stream), 1000) == (Level.WARN, "sends what cannot be used: in mA")
+    stream.refuse("in\nmV")
+    assert said(InputState("x", stream), 1000) == (Level.WARN, "sends what cannot be used: in mV")
     for t in range(1000, 4000, 20):
         stream.take(BASE + t * MS)
     assert said(InputState("x", stream), 4000)[0] is Level.OK
+
+
+def test_why_it_cannot_be_used_is_said_as_of_the_tick() -> None:
+    stream = flow(1000)
+    stream.refuse("in mV")
+    stream.take(BASE + 1100 * MS)
+    stream.refuse("in mA")
+    for at_ms, unit in ((1020, "mV"), (1120, "mA")):
+        words = f"sends what cannot be used at times: in {unit}"
+        assert said(InputState("x", stream), at_ms) == (Level.WARN, words)
 
 
 def test_a_gap_is_a_warning_for_a_while() -> None:

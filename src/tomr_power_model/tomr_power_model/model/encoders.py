@@ -100,6 +100,10 @@ class EncoderWindow:
 
     def add(self, sample: EncoderSample) -> bool:
         """Take a sample newer than those before; returns whether it can be true."""
+        if _exceeds(sample.velocity, (0.0, 0.0, 0.0), self._fastest):
+            if any(map(math.isnan, sample.position)):
+                return False
+            sample = EncoderSample(sample.stamp_ns, sample.position, UNKNOWN)  # angles tell more
         if self._leaps_to(sample):
             self._leaps += 1
             if self._leaps < _NEW_ZERO:
@@ -120,9 +124,7 @@ class EncoderWindow:
         return []
 
     def _leaps_to(self, sample: EncoderSample) -> bool:
-        """Whether no wheel can have turned so far since the last sample, or turns so fast."""
-        if _exceeds(sample.velocity, (0.0, 0.0, 0.0), self._fastest):
-            return True
+        """Whether no wheel can have turned so far since the last sample."""
         if not self._samples:
             return False
         last = self._samples[-1]
