@@ -1,6 +1,8 @@
 """Recordings that must not be taken for physics: refused in a line with place and remedy."""
 
+import math
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -86,6 +88,36 @@ def test_faults_are_refused_with_wheel_interval_and_remedy(
     assert seen in text
     assert remedy in text
     assert "\n" not in text
+
+
+@pytest.mark.parametrize(
+    ("quantity", "given", "volts", "unit"),
+    [
+        ("power", 1e3, 24.0, "A"),  # power is current times voltage
+        ("power", 1e3, math.nan, "W"),
+        ("power", 1.0, 24e3, "V"),
+        ("supply_current", 1e3, math.nan, "A"),
+        ("motor_current", 1e3 / 24.0, 0.0, "A"),
+    ],
+)
+def test_other_units_are_refused(
+    make_drive: MakeDrive,
+    quantity: Literal["power", "motor_current", "supply_current"],
+    given: float,
+    volts: float,
+    unit: str,
+) -> None:
+    motors = tuple(evolve(motor, resistance=8.0) for motor in ROBOT.motors)  # of 3 A
+    measurement = evolve(ROBOT.measurement, quantity=quantity)
+    robot = evolve(ROBOT, motors=motors, measurement=measurement)
+    drive = make_drive(ROBOT, 1)
+    plain = evolve(drive, power=drive.power / (24.0 if quantity == "motor_current" else 1.0))
+    assert list(sensor_faults(plain, robot)) == []
+    voltage = np.full_like(drive.power, volts)
+    found = list(sensor_faults(evolve(drive, power=given * drive.power, voltage=voltage), robot))
+    assert [item.where for item in found] == list(robot.wheel_names)
+    assert f"more {unit} of motor 3 than can be" in found[2].seen
+    assert f"is it in m{unit}?" in found[2].seen
 
 
 def test_a_sign_is_judged_where_power_is_known(make_drive: MakeDrive) -> None:

@@ -10,7 +10,7 @@ from tomr_power_model.robot import Robot
 
 IGNORED = "the sample is ignored"  # what then becomes of it
 _MARGIN = 2.0
-_CLEARLY = 5.0  # times what can be: more than a spike, a robot that rests draws a hundredth
+_CLEARLY = 2.0  # times what can be: more than a spike, mostly
 _DEAD = 0.1  # of the nominal voltage: a supply below it feeds no driver that could report it
 
 

@@ -14,9 +14,11 @@ from scipy.ndimage import gaussian_filter1d
 from tomr_power_model.drive.exchanged import draws_by, exchange_words, exchanged
 from tomr_power_model.drive.mistakes import gross_mistake
 from tomr_power_model.drive.motion import measured_speed, median_period, wheel_motion
+from tomr_power_model.drive.plausible import PowerLimits
 from tomr_power_model.drive.quantum import quantum_of
 from tomr_power_model.drive.radii import SPAN, answer, misdescribed
 from tomr_power_model.drive.record import Drive
+from tomr_power_model.drive.sources import PowerReading
 from tomr_power_model.errors import InputError
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import WHEELS, Robot
@@ -36,6 +38,7 @@ _LOST = 1.5  # s: a wheel that does not follow for a shorter time may be slow
 _ASTRAY = 0.65  # rms difference over rms of what is expected or measured
 _NOTABLE = 1.5  # rad/s, rms of what is expected or measured
 _MOSTLY = 0.5  # of the time in which wheels turn: no fault, the description
+_MUCH = 90.0  # percentile of what moving motors draw
 _CUT = "leave it out with --skip {name}={start:.1f}:{end:.1f}"
 
 
@@ -319,6 +322,35 @@ def _wrong_sign(item: Drive, robot: Robot) -> Iterator[Finding]:
             )
 
 
+def _power_that_cannot_be(item: Drive, robot: Robot) -> Iterator[Finding]:
+    """Power beyond what motors can draw, again and again: in another unit, say."""
+    limits = PowerLimits.of(robot)
+    for wheel, name in enumerate(robot.wheel_names):
+        time, _, speed = _of_wheel(item, wheel)
+        drawn, volts = (
+            values[np.isfinite(item.reading[:, wheel]), wheel]
+            for values in (item.power, item.voltage)
+        )
+        moving = (np.abs(speed) > _MOVING) & np.isfinite(drawn)
+        if np.count_nonzero(moving) <= 20:
+            continue
+        much = float(np.percentile(np.abs(drawn[moving]), _MUCH))
+        seen = limits.problem(_as_read(wheel, much, float(np.median(volts[moving])), robot))
+        if seen is not None:
+            remedy = "messages are in V, A and W: mend the driver, or motor.resistance is far off"
+            yield Finding(item.name, name, float(time[0]), float(time[-1]), seen, remedy)
+
+
+def _as_read(wheel: int, drawn: float, volts: float, robot: Robot) -> PowerReading:
+    """What a sensor of W or A that are drawn, and of V, must have said."""
+    quantity = robot.measurement.quantity
+    if quantity == "motor_current":
+        return PowerReading(wheel, 0, math.nan, drawn, volts)
+    supplied = robot.supply.nominal_voltage if quantity == "supply_current" else volts
+    current = drawn / supplied if supplied > 0.0 else math.nan
+    return PowerReading(wheel, 0, drawn, current, volts)
+
+
 def _exchanged_power(item: Drive, robot: Robot) -> Iterator[Finding]:
     """Powers that go with the motion of other wheels than their own."""
     time, power = item.power_time, item.power
@@ -352,5 +384,6 @@ SENSOR_CHECKS: tuple[Check, ...] = (
     _saturated_power,
     _stuck_power,
     _wrong_sign,
+    _power_that_cannot_be,
     _exchanged_power,
 )
