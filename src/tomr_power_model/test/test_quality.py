@@ -120,6 +120,19 @@ def test_other_units_are_refused(
     assert f"is it in m{unit}?" in found[2].seen
 
 
+def test_units_are_judged_by_motors_that_turn_and_not_by_spikes(make_drive: MakeDrive) -> None:
+    drive = make_drive(ROBOT, 1)
+    far, rows = 1e5 * drive.power, np.arange(len(drive.power))[:, None]
+    spikes = evolve(drive, power=np.where(rows % 20 == 0, far, drive.power))
+    standing = evolve(drive, power=far, velocity=0.0 * drive.velocity)
+    for item in (spikes, standing):
+        assert not any("than can be" in found.seen for found in sensor_faults(item, ROBOT))
+    gaps = evolve(drive, power=np.where(rows % 20 == 0, math.nan, far))
+    assert sum("than can be" in found.seen for found in sensor_faults(gaps, ROBOT)) == 3
+    dead = evolve(drive, voltage=np.zeros_like(drive.power))
+    assert sum("V feed nothing of" in found.seen for found in sensor_faults(dead, ROBOT)) == 3
+
+
 def test_a_sign_is_judged_where_power_is_known(make_drive: MakeDrive) -> None:
     drive = make_drive(ROBOT, 1)
     unknown, reversed_ = drive.power.copy(), reverse(drive).power

@@ -42,6 +42,14 @@ def test_speeds_that_cannot_be_are_refused_where_they_are_all_there_is() -> None
     assert _taken(10, (0.0, 0.0, -39.0), angles=False)[0] == {True}
 
 
+def test_two_angles_are_too_few_for_a_speed_and_speeds_that_cannot_be_are_none() -> None:
+    for velocity, seen in ((SPEED, SPEED), ((38.2, -19.1, 400.0), UNKNOWN)):
+        window = EncoderWindow(70 * MS, 50 * MS, 200 * MS, FASTEST)
+        for t in (10, 20):
+            assert window.add(EncoderSample(t * MS, _angles(t), velocity))
+        np.testing.assert_allclose(window.at(20 * MS).speed, seen)
+
+
 @pytest.mark.parametrize("wheel", [0, 1, 2])
 def test_a_wheel_without_an_angle_has_its_speed_alone(wheel: int) -> None:
     window = EncoderWindow(70 * MS, 50 * MS, 200 * MS, FASTEST)
