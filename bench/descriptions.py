@@ -137,6 +137,21 @@ def speeds_alone_in_revolutions_per_minute(topic: str, message: Any) -> Iterator
 
 
 @_rewired
+def speeds_in_revolutions_per_minute_beside_angles(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("joint_states"):
+        message.velocity = message.velocity * (30.0 / math.pi)
+    yield topic, message
+
+
+@_rewired
+def angles_and_speeds_in_degrees(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("joint_states"):
+        message.position = message.position * (180.0 / math.pi)
+        message.velocity = message.velocity * (180.0 / math.pi)
+    yield topic, message
+
+
+@_rewired
 def angles_in_revolutions(topic: str, message: Any) -> Iterator[Part]:
     if topic.endswith("joint_states"):
         message.position = message.position * (0.5 / math.pi)
