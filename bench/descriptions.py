@@ -181,6 +181,56 @@ def currents_in_milliamperes(topic: str, message: Any) -> Iterator[Part]:
 
 
 @_rewired
+def gyro_turns_the_other_way(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("imu/data"):
+        message.angular_velocity.z *= -1.0
+    yield topic, message
+
+
+@_rewired
+def imu_in_degrees_and_g(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("imu/data"):
+        for values, unit in (
+            (message.angular_velocity, math.pi / 180.0),
+            (message.linear_acceleration, 9.80665),
+        ):
+            values.x, values.y, values.z = values.x / unit, values.y / unit, values.z / unit
+    yield topic, message
+
+
+@_rewired
+def imu_upside_down(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("imu/data"):
+        for values in (message.angular_velocity, message.linear_acceleration):
+            values.y, values.z = -values.y, -values.z
+    yield topic, message
+
+
+@_rewired
+def imu_turned_to_the_left(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("imu/data"):
+        for values in (message.angular_velocity, message.linear_acceleration):
+            values.x, values.y = values.y, -values.x
+    yield topic, message
+
+
+@_rewired
+def imu_facing_backwards(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("imu/data"):
+        for values in (message.angular_velocity, message.linear_acceleration):
+            values.x, values.y = -values.x, -values.y
+    yield topic, message
+
+
+@_rewired
+def imu_on_its_side(topic: str, message: Any) -> Iterator[Part]:
+    if topic.endswith("imu/data"):
+        for values in (message.angular_velocity, message.linear_acceleration):
+            values.y, values.z = values.z, -values.y
+    yield topic, message
+
+
+@_rewired
 def powers_of_two_motors_exchanged(topic: str, message: Any) -> Iterator[Part]:
     other = {"/wheel_1/power": "/wheel_2/power", "/wheel_2/power": "/wheel_1/power"}
     yield other.get(topic, topic), message

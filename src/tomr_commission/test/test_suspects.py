@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from tomr_commission.suspects import check_values, check_wheels
+from tomr_commission.suspects import check_values, check_wheels, notes_on
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
-from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.geometry.kinematics import twist_to_wheels, wheels_to_twist
 from tomr_power_model.robot import (
     load_robot,
     read_description,
@@ -46,8 +46,8 @@ def ideal() -> Drive:
         command=command,
         voltage=nothing,
         total_voltage=none,
-        yaw_time=none,
-        yaw_rate=none,
+        imu_time=none,
+        inertial=np.empty((0, 6)),
     )
 
 
@@ -139,3 +139,14 @@ def test_values_that_fit_as_well_are_all_named(monkeypatch: pytest.MonkeyPatch) 
     seems, checks = str(error.value).split(": check ")
     assert "the gear ratio seems half or the " in seems
     assert checks.startswith("motor.gear_ratio = 40.0 and ")
+
+
+def test_what_is_wrong_with_an_imu_is_noted(ideal: Drive) -> None:
+    """A drive that turns, by a gyro that turns the other way."""
+    twist = ideal.velocity @ wheels_to_twist(ROBOT).T
+    inertial = np.full((len(twist), 6), np.nan)
+    inertial[:, 2] = -twist[:, 2]
+    drive = evolve(ideal, imu_time=ideal.encoder_time, inertial=inertial, notes=("said",))
+    said, found = notes_on([drive], ROBOT)
+    assert said == "said"
+    assert "the gyro of imu/data turns the other way" in found

@@ -27,7 +27,7 @@ from tomr_commission.rehearsal import Rehearsal, Shoved, Usage, electrical_off, 
 from tomr_commission.request import CommissionRequest
 from tomr_commission.simulated import try_simulated
 from tomr_commission.store import Store, digest, fingerprint
-from tomr_commission.suspects import check_values, check_wheels
+from tomr_commission.suspects import check_values, check_wheels, notes_on
 from tomr_commission.trials import Floor, Trial, floors_of
 from tomr_commission.verdict import Outcome, Reason, Recorded, early_reasons, reasons
 from tomr_fault_diag.classifier.commissioned import stamp_of
@@ -128,7 +128,7 @@ def commission(request: CommissionRequest, progress: Progress, say: Say) -> Comm
     said = decided([*held, *fitted], bands, chosen, robot)
     held_said, fitted_said = said[: len(held)], said[len(held) :]
     trials = try_injected(longest, bands, chosen, kinds_for(longest), robot)
-    notes = [note for drive in work.drives for note in drive.notes]
+    notes = notes_on(work.drives, load_robot(request.robot))
     if not chosen.small_faults:
         notes.append(
             "small faults that last are not looked for: healthy driving looks like one within its "

@@ -116,6 +116,10 @@ class Observed:
         missing[:, list(channels)] = NOT_MEASURED
         return evolve(self, residual=residual, missing=missing)
 
+    def without_imu(self) -> "Observed":
+        """The drive of a robot without an IMU."""
+        return evolve(self, yaw=self.yaw * np.nan, along=self.along * np.nan)
+
     def without(self, spans: Sequence[tuple[float, float]]) -> "Observed":
         """The drive without some intervals [s]."""
         keep = np.ones(len(self.stamp_ns), dtype=bool)
@@ -149,7 +153,8 @@ def observe(bag: Path, name: str, robot: Robot, settings: DiagnosisSettings) -> 
     pipeline = Pipeline(robot, settings)
     with open_recording(bag) as recording:
         frames = [frame for _, step in diagnose(recording, pipeline) for frame in step.frames]
-    return Observed.of(name, frames)
+    found = Observed.of(name, frames)
+    return found.without_imu() if pipeline.imu_mistake else found
 
 
 def unit_of_motors(drive: Observed) -> str:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tomr_power_model.drive.clean import cleaned
 from tomr_power_model.drive.cut import without
+from tomr_power_model.drive.inertial import without_mistaken_imu
 from tomr_power_model.drive.mistakes import gross_mistake
 from tomr_power_model.drive.motion import measured_speed
 from tomr_power_model.drive.record import Drive
@@ -41,6 +42,13 @@ def check_wheels(drives: Sequence[Drive], robot: Robot, place: str) -> None:
     seen, remedy = gross_mistake(np.concatenate(asked), np.concatenate(speed), robot)
     if seen:
         raise InputError(f"{place}: {seen}: {remedy}")
+
+
+def notes_on(drives: Sequence[Drive], robot: Robot) -> list[str]:
+    """What is to be said of recordings, and of an IMU that is not as described."""
+    return [
+        note for drive in drives for note in (*drive.notes, *without_mistaken_imu(drive, robot)[1])
+    ]
 
 
 _VALUES: Mapping[str, str] = {

@@ -15,6 +15,7 @@ from tomr_fault_diag.classifier.settings import ClassifierSettings
 from tomr_fault_diag.classifier.stage import FaultClassifier
 from tomr_fault_diag.classifier.states import SLIP
 from tomr_fault_diag.residuals.frame import (
+    IMU_MISTAKEN,
     IMU_REPEATS,
     NO_IMU,
     NOT_BELIEVED,
@@ -71,7 +72,7 @@ def frames(
         stage.encoders(stamp, (first, second, third), SPEED)
         rate = gyro(at_ms)
         if rate is not None:
-            stage.imu(stamp, rate, (0.1 * rate - RATE * across, RATE * along, GRAVITY))
+            stage.imu(stamp, (0.0, 0.0, rate), (0.1 * rate - RATE * across, RATE * along, GRAVITY))
         found.update({(frame.stamp_ns - BASE) // MS: frame for frame in stage.due()})
     return found
 
@@ -131,6 +132,7 @@ def test_a_gyro_that_is_mounted_otherwise_is_never_believed(rate: float) -> None
     found = frames(lambda at_ms: rate)
     assert {frame.yaw.missing for frame in found.values()} <= {
         NOT_BELIEVED,
+        IMU_MISTAKEN if rate == -RATE else "",
         "no fresh joint_states",
     }
 
@@ -189,7 +191,7 @@ def moving(
             turning = (change * along - rate * share * across, rate * share * along, GRAVITY)
             noise = random.normal(0.0, 0.01, 4)
             last = tuple(np.array([rate + more, *turning]) + noise)
-        stage.imu(stamp, last[0], last[1:])
+        stage.imu(stamp, (0.0, 0.0, last[0]), last[1:])
         found.update({(frame.stamp_ns - BASE) // MS: frame for frame in stage.due()})
         said += [
             (status.name, status.level, status.message)
@@ -244,7 +246,7 @@ def test_a_bus_that_answers_with_zeros_measures_nothing() -> None:
         if at_ms % 50 == 0:
             stage.prediction(Prediction(stamp, rest, rest, (reading,) * 3, reading, (reading,) * 3))
         stage.encoders(stamp, rest, rest)
-        stage.imu(stamp, 0.01 if at_ms < 200 else 0.0, rest)
+        stage.imu(stamp, (0.0, 0.0, 0.01 if at_ms < 200 else 0.0), rest)
     last = stage.due()[-1]
     assert last.yaw.missing == NO_IMU
     (status,) = (

@@ -1,5 +1,7 @@
 """What the odometry knows at a tick."""
 
+from collections.abc import Collection, Iterator
+
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
@@ -9,6 +11,7 @@ from tomr_odometry.grip import Grid
 Array = NDArray[np.float64]
 SLIDES = 0.5  # probability from which a wheel is said to slide that an IMU shows
 SLIDES_UNAIDED = 0.3  # and without one: from 0.5 on a fifth of the sliding is missed
+NOT_USED = "not used"  # of a sensor, before why
 _SLOW = 0.02  # m/s: sliding slower than that is none
 
 
@@ -45,7 +48,13 @@ class Estimate:
         said = "slipping" if self.is_slipping else "gripping"
         said += f": loss of traction at wheel {', '.join(lost)}" if lost else ""
         said += ": creep" if self.is_creeping and not lost else ""
-        return f"{said}; without {', '.join(self.missing)}" if self.missing else said
+        return f"{said}; without {', '.join(self._without())}" if self.missing else said
+
+    def _without(self) -> Iterator[str]:
+        uses = dict(self.sensors)
+        for name in self.missing:
+            use = uses.get(name, "")
+            yield f"{name} ({use})" if use.startswith(NOT_USED) else name
 
     @property
     def loses_traction(self) -> NDArray[np.bool_]:
@@ -66,3 +75,17 @@ class Estimate:
     def is_creeping(self) -> bool:
         """Whether any wheel creeps enough to matter."""
         return bool((np.abs(self.creeping) > _SLOW).any())
+
+
+def assumptions(missing: Collection[str], *, creeps: bool, by_power: bool) -> Iterator[str]:
+    """What is taken for granted without the sensors that are `missing`, where it is not learnt how
+    wheels creep, and where power shows that they slide."""
+    if not creeps:
+        yield "wheels do not creep: not learnt, see tomr_odometry learn"
+    if "imu/data" in missing and by_power:
+        yield "wheels slide as the motors' power shows: less surely than an IMU would"
+    elif "imu/data" in missing:
+        yield (
+            "wheels do not slide: to show that takes an IMU, or cmd_vel and the power of two "
+            "motors, with its sign"
+        )

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomr_odometry.aided import Aided, mean_of
-from tomr_odometry.estimate import SLIDES, SLIDES_UNAIDED, Estimate
+from tomr_odometry.belief import Belief
+from tomr_odometry.estimate import NOT_USED, SLIDES, SLIDES_UNAIDED, Estimate, assumptions
 from tomr_odometry.grip import Available, Floor
 from tomr_odometry.hindsight import Inputs
 from tomr_odometry.kernel import AX, CREEP, GYRO, RIM, SLOPE, VX, WZ, step
@@ -16,7 +17,6 @@ from tomr_odometry.lifted import Lifted
 from tomr_odometry.rims import Rims
 from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.start import Beginning, start
-from tomr_odometry.stuck import StuckImu
 from tomr_odometry.traction import Traction, Tractions
 from tomr_odometry.unaided import FEWEST_POWERS, Unaided
 from tomr_odometry.used import UsedTraction
@@ -73,6 +73,7 @@ class SlipOdometry:
             names = enumerate(robot.wheel_topics)
             self._wanted |= {f"power {wheel}": f"{name}/power" for wheel, name in names}
         self._by_power = Unaided(robot, self._body, self._radius)
+        self._belief = Belief(robot, self._body.to_twist)
         self._clear()
 
     def _clear(self) -> None:
@@ -95,7 +96,7 @@ class SlipOdometry:
         self._heard: dict[str, int] = {}
         self._is_aided = False
         self._lifted = Lifted()
-        self._stuck = StuckImu(self._body.to_twist)
+        self._belief.clear(np.zeros(3))
         self._seen = np.zeros(3)  # m/s, m/s, rad/s: the twist at the last sample of the IMU
 
     def _start_afresh(self, stamp_ns: int) -> None:
@@ -107,6 +108,7 @@ class SlipOdometry:
         pose, spread = self._x[:3].copy(), self._P[:3, :3] + (_LOST_SPEED * leap) ** 2 * np.eye(3)
         self._clear()
         self._x[:3] += pose
+        self._belief.clear(pose)
         self._P[:3, :3] += spread
 
     def command(self, stamp_ns: int, twist: Triple) -> Arrival:
@@ -140,7 +142,7 @@ class SlipOdometry:
         """Estimates for the ticks that the stamps have reached, in order."""
         for tick in self._clock.due():
             for stamp, stream, values in self._until(tick):
-                if stream == "imu" and self._stuck.take(stamp, values):
+                if stream == "imu" and not self._belief.take(stamp, values):
                     continue
                 self._heard[stream] = stamp
                 self._take(stamp, stream, values)
@@ -195,8 +197,9 @@ class SlipOdometry:
         noise = self.settings.noise
         ways = self._rims.take(time, angle, noise.jitter)
         ways[1] += noise.rim**2
-        if self._stuck.look(time, self._rims.speed) and self._is_aided:
-            self._disbelieve()
+        is_stuck, is_mistaken = self._belief.look(time, self._rims.speed, ways[0])
+        if (is_stuck or is_mistaken) and self._is_aided:
+            self._disbelieve(all_along=is_mistaken)
         self._tractions.encoders(time, counted)
         if self._time:
             self._step(time, ways)
@@ -209,13 +212,18 @@ class SlipOdometry:
         for place in (0, 1):
             self._P[place, place] += lost
 
-    def _disbelieve(self) -> None:
-        """The IMU has repeated itself for a while: what came of that is forgotten."""
+    def _disbelieve(self, *, all_along: bool) -> None:
+        """The IMU has repeated itself for a while, or was wrong `all_along`: what came of that is
+        forgotten."""
+        was = self._x
+        self._x = was.copy()
+        if all_along:
+            self._x, self._P = start(self.settings.noise, self.settings.creep)
+            self._x[:3], self._x[RIM : RIM + WHEELS] = self._belief.pose, was[RIM : RIM + WHEELS]
         self._lose_sight()
-        twist = self._body.to_twist @ self._rims.speed
-        for place, off in enumerate(self._x[VX : WZ + 1] - twist, VX):
+        self._x[VX : WZ + 1] = self._body.to_twist @ self._rims.speed
+        for place, off in enumerate(was[: WZ + 1] - self._x[: WZ + 1]):
             self._P[place, place] += off**2
-        self._x[VX : WZ + 1] = twist
         self._heard["imu"] -= _FRESH_NS
         self._is_aided = False
 
@@ -333,7 +341,11 @@ class SlipOdometry:
             is_carried=tick < self._lifted.until,
             missing=missing,
             sensors=sensors,
-            assumed=self._assumed(missing),
+            assumed=tuple(
+                assumptions(
+                    missing, creeps=self.settings.creep.is_known, by_power=self._by_power.is_at_work
+                )
+            ),
             learnt=self._learnt(),
         )
 
@@ -374,21 +386,11 @@ class SlipOdometry:
                 found.append((said, "used"))
                 continue
             missing.append(said)
-            found.append((said, "silent" if name in self._heard else "not there"))
+            why = "silent" if name in self._heard else "not there"
+            if name == "imu" and self._belief.mistake and not is_off:
+                why = f"{NOT_USED}: {self._belief.mistake}"
+            found.append((said, why))
         return tuple(missing), tuple(found)
-
-    def _assumed(self, missing: tuple[str, ...]) -> tuple[str, ...]:
-        found = []
-        if not self.settings.creep.is_known:
-            found.append("wheels do not creep: not learnt, see tomr_odometry learn")
-        if "imu/data" in missing and self._by_power.is_at_work:
-            found.append("wheels slide as the motors' power shows: less surely than an IMU would")
-        elif "imu/data" in missing:
-            found.append(
-                "wheels do not slide: to show that takes an IMU, or cmd_vel and the power of two "
-                "motors, with its sign"
-            )
-        return tuple(found)
 
     def _learnt(self) -> tuple[tuple[str, float], ...]:
         x = self._x

@@ -10,7 +10,8 @@ from tomr_odometry.estimate import Estimate
 from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.grip import SIDE, Grid
 from tomr_odometry.settings import OdometrySettings
-from tomr_power_model.messages.intake import inertial_of, stamp_of, twist_of
+from tomr_power_model.messages.inertial import Imu
+from tomr_power_model.messages.intake import stamp_of, twist_of
 from tomr_power_model.messages.joined import WheelStream
 from tomr_power_model.messages.motion import odometry, quaternion, transform_of
 from tomr_power_model.messages.plain import (
@@ -66,8 +67,10 @@ def odometry_inputs(robot: Robot, core: SlipOdometry) -> tuple[Input, ...]:
     def command(message: Any, receive_ns: int) -> Arrival:
         return core.command(stamp_of(message, receive_ns, fallback=True), twist_of(message))
 
+    inertial = Imu(robot.imu_rpy)
+
     def imu(message: Any, receive_ns: int) -> Arrival:
-        rate, force = inertial_of(message)
+        rate, force = inertial.read(message)
         return core.imu(stamp_of(message, receive_ns), (*rate, *force))
 
     inputs = [Input("cmd_vel", TWIST_STAMPED, guarded(command), (TWIST, TWIST_STAMPED))]

@@ -87,8 +87,8 @@ def make_drive() -> MakeDrive:
             command=tour.twist[::5],
             voltage=np.full((len(power), 3), robot.supply.nominal_voltage),
             total_voltage=np.full(len(power), robot.supply.nominal_voltage),
-            yaw_time=np.empty(0),
-            yaw_rate=np.empty(0),
+            imu_time=np.empty(0),
+            inertial=np.empty((0, 6)),
         )
 
     return make

@@ -1,5 +1,6 @@
 """What is left out of a recording before it is used, and what is said about it."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -7,9 +8,12 @@ import pytest
 from attrs import evolve
 
 from tomr_power_model.drive.clean import check_duration, cleaned
+from tomr_power_model.drive.motion import wheel_motion
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
-from tomr_power_model.robot import shipped_robot
+from tomr_power_model.geometry.kinematics import wheels_to_twist
+from tomr_power_model.messages.inertial import rotation
+from tomr_power_model.robot import GRAVITY, shipped_robot
 
 MakeDrive = Callable[..., Drive]
 ROBOT = shipped_robot("reference")
@@ -82,3 +86,36 @@ def test_short_recordings_are_refused(make_drive: MakeDrive) -> None:
         cleaned(make_drive(ROBOT, 1, seconds=1.0), ROBOT)
     with pytest.raises(InputError, match=r"8\.0 s are too short to decide anything"):
         check_duration((make_drive(ROBOT, 1, seconds=4.0), make_drive(ROBOT, 2, seconds=4.0)))
+
+
+def with_imu(drive: Drive, rpy: tuple[float, float, float]) -> Drive:
+    """And an IMU that is turned against base_link."""
+    time = np.arange(0.0, drive.duration, 0.01)
+    motion = wheel_motion(drive.encoder_time, drive.position, drive.velocity, time, 0.06)
+    to_twist = wheels_to_twist(ROBOT)
+    twist, rate = (np.nan_to_num(one @ to_twist.T) for one in (motion.speed, motion.acceleration))
+    zero = np.zeros(len(time))
+    turning = np.stack([zero, zero, twist[:, 2]], axis=1)
+    across = np.stack([-twist[:, 1], twist[:, 0]], axis=1) * twist[:, 2:]
+    force = np.column_stack([rate[:, :2] + across, zero + GRAVITY])
+    axes = rotation(rpy)
+    return evolve(drive, imu_time=time, inertial=np.hstack([turning @ axes, force @ axes]))
+
+
+def test_an_imu_that_is_as_described_is_used(drive: Drive) -> None:
+    found = cleaned(with_imu(drive, (0.0, 0.0, 0.0)), ROBOT)
+    assert found.notes == ()
+    assert len(found.imu_time) > 3000
+    turned = evolve(ROBOT, imu_rpy=(math.pi, 0.0, 0.0))
+    # What is read by the key is in base_link: nothing is turned twice.
+    assert len(cleaned(with_imu(drive, (0.0, 0.0, 0.0)), turned).imu_time) > 3000
+
+
+def test_one_that_is_not_is_left_out_and_noted(drive: Drive) -> None:
+    found = cleaned(with_imu(drive, (math.pi, 0.0, 0.0)), ROBOT)
+    assert found.notes == (
+        "tour: imu/data is mounted otherwise than described: write robot.imu_rpy: [3.1416, 0, 0]; "
+        "imu/data is left out",
+    )
+    assert len(found.imu_time) == len(found.yaw_rate) == 0
+    assert len(found.power) == len(drive.power)

@@ -17,7 +17,6 @@ from tomr_power_model.messages.intake import (
     Unusable,
     WheelFinder,
     battery_of,
-    inertial_of,
     numbers_of,
     stamp_of,
     twist_of,
@@ -114,31 +113,6 @@ def test_twists_with_and_without_stamp() -> None:
     assert stamp_of(_twist(1.0, 0), 7, fallback=True) == 7
     with pytest.raises(Unusable, match="finite"):
         twist_of(_twist(math.nan))
-
-
-def _imu(rate: float = 0.5, force: float = 1.0) -> Any:
-    turning = bag_message("geometry_msgs/msg/Vector3", z=rate)
-    pull = bag_message("geometry_msgs/msg/Vector3", x=force, y=-2.0, z=9.8)
-    return bag_message("sensor_msgs/msg/Imu", angular_velocity=turning, linear_acceleration=pull)
-
-
-def test_an_imu_says_what_it_measures() -> None:
-    assert inertial_of(_imu()) == ((0.0, 0.0, 0.5), (1.0, -2.0, 9.8))
-    # What no robot on wheels feels is none, and a value that is not finite neither.
-    assert np.isnan(inertial_of(_imu(force=1e6))[1]).all()
-    assert np.isnan(inertial_of(_imu(rate=1e6))[0]).all()
-    assert np.isnan(inertial_of(_imu(rate=math.nan))[0]).tolist() == [False, False, True]
-    assert np.isnan(inertial_of(_imu(force=math.inf))[1]).tolist() == [True, False, False]
-
-
-def test_what_an_imu_says_that_it_does_not_measure_is_not_known() -> None:
-    message = _imu()
-    message.linear_acceleration_covariance[0] = -1.0
-    assert np.isnan(inertial_of(message)[1]).all()
-    assert inertial_of(message)[0] == (0.0, 0.0, 0.5)
-    message.angular_velocity_covariance[0] = -1.0
-    with pytest.raises(Unusable, match="neither"):
-        inertial_of(message)
 
 
 def test_battery_voltage_may_be_missing_but_not_the_current() -> None:

@@ -317,6 +317,12 @@ def test_a_commissioning_hangs_on_every_value_of_a_table() -> None:
     assert len(digests) == 3
 
 
+def test_a_commissioning_outlives_keys_that_came_later() -> None:
+    """Until one is used: the digest of the reference robot as it was before `robot.imu_rpy`."""
+    assert digest_of(ROBOT) == "4f9430fcc9ae02e6"
+    assert digest_of(evolve(ROBOT, imu_rpy=(0.0, 0.0, 1.0))) != digest_of(ROBOT)
+
+
 # Curves whose steepest part is 1 N m s/rad, 0.6 N m/A or 671 N s/m, scaled to what drivers hold.
 @pytest.mark.parametrize("stable", [True, False])
 @pytest.mark.parametrize(

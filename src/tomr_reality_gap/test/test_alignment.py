@@ -48,8 +48,8 @@ def _recorded(robot: Robot) -> Drive:
         command=command,
         voltage=blank + robot.supply.nominal_voltage,
         total_voltage=blank[:, 0] + robot.supply.nominal_voltage,
-        yaw_time=np.empty(0),
-        yaw_rate=np.empty(0),
+        imu_time=np.empty(0),
+        inertial=np.empty((0, 6)),
     )
 
 

@@ -43,8 +43,8 @@ def _recorded(robot: Robot, command: np.ndarray, time: np.ndarray) -> Drive:
         command=command,
         voltage=np.full((len(time), 3), np.nan),
         total_voltage=np.empty(0),
-        yaw_time=np.empty(0),
-        yaw_rate=np.empty(0),
+        imu_time=np.empty(0),
+        inertial=np.empty((0, 6)),
     )
 
 

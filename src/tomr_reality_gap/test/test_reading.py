@@ -60,7 +60,9 @@ def test_what_is_not_a_number_is_left_out(recorded: Drive, robot: Robot) -> None
 def test_a_gap_of_the_gyro_stays_a_gap(recorded: Drive, robot: Robot) -> None:
     time = np.delete(np.arange(0.0, 4.0, 0.01), np.arange(202, 250))
     rate = np.where(time < 2.1, 1.0, -1.0)
-    found = _channel(evolve(recorded, yaw_time=time, yaw_rate=rate), robot, "imu/data")
+    inertial = np.zeros((len(time), 6))
+    inertial[:, 2] = rate
+    found = _channel(evolve(recorded, imu_time=time, inertial=inertial), robot, "imu/data")
     assert set(np.abs(found.value)) == {1.0}
     assert found.span == pytest.approx(np.full(len(found.time), 0.05))
     assert not ((found.time > 2.1) & (found.time < 2.5)).any()

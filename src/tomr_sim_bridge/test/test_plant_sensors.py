@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tomr_power_model.messages.inertial import rotation
 from tomr_power_model.robot import Robot
 from tomr_sim_bridge.plant.moments import LENGTH, Memory, Moment
 from tomr_sim_bridge.plant.sensors import Clock
@@ -89,6 +90,23 @@ def test_imu_feels_gravity_acceleration_and_turning(make_robot: MakeRobot, drive
     pull, turning = means(2.0, (0.0, 0.0, 0.8), skip=1.5)
     assert turning == pytest.approx(0.8, abs=0.005)
     assert pull == pytest.approx([0.0, 0.0, 9.80665], abs=0.05)
+
+
+def test_imu_measures_along_its_own_axes(make_robot: MakeRobot, drive: Callable) -> None:
+    """Read as it is described, it is in base_link again, to the last bit of its noise."""
+    rpy = [math.pi, 0.0, 0.5 * math.pi]
+    straight, turned = (
+        drive(Simulation(make_robot(given)), 1.0, (0.5, 0.0, 0.4)).fields("imu/data")
+        for given in ({}, {"robot.imu_rpy": rpy})
+    )
+    axes = rotation(rpy)
+    for name in ("angular_velocity", "linear_acceleration"):
+        seen, known = (
+            np.array([list(fields[name].fields.values()) for fields in run])
+            for run in (turned, straight)
+        )
+        assert seen @ axes.T == pytest.approx(known, abs=1e-9)
+        assert np.abs(seen - known).max() > 0.1
 
 
 def test_imu_on_a_slope(make_robot: MakeRobot, drive: Callable) -> None:

@@ -103,9 +103,14 @@ class Pipeline:
         self._residuals.retune(settings.residuals.bands)
         self._classifier.settings = settings.classifier
 
-    def misdescribed(self) -> str:
-        """What speaks against robot.yaml so far and what to write there, empty where nothing."""
-        return self._residuals.description.words()
+    @property
+    def imu_mistake(self) -> str:
+        """In which way the IMU is not as described, in words; empty if it is."""
+        return self._residuals.imu_mistake
+
+    def misdescribed(self) -> tuple[str, ...]:
+        """What speaks against robot.yaml and the sensors so far, and what to mend."""
+        return self._residuals.misdescribed()
 
     def release(self) -> str:
         """Let go of a named fault, latched or not; returns its name, empty if there was none."""

@@ -130,7 +130,7 @@ def replay_one(task: Task, progress: Progress | None = None) -> Replayed:
     heard = Heard()
     with open_recording(task.bag) as recording:
         _run(recording, task, listeners, heard, progress)
-        said = recording.warning, _outdated(task, robot), listeners[0].pipeline.misdescribed()
+        said = recording.warning, _outdated(task, robot), *listeners[0].pipeline.misdescribed()
         notes = tuple(filter(None, said))
         start_ns, end_ns = recording.start_ns, recording.end_ns
     first = listeners[0].pipeline

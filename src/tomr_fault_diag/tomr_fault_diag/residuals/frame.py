@@ -36,6 +36,7 @@ NO_IMU = f"{NO_FRESH}imu/data"
 NO_ENCODERS = f"{NO_FRESH}joint_states"
 NO_WEIGHT = "imu/data does not feel gravity along z"
 IMU_REPEATS = "imu/data repeats itself while the robot moves"
+IMU_MISTAKEN = "imu/data is not as described"
 FROZEN = " repeats itself while the motor works"  # and before it which stream
 
 Unit = Literal["W", "A", "V", "rad/s", "m/s^2"]

@@ -122,11 +122,11 @@ class ResidualStage:
         lately = transient_ticks(period)
         self._recent: deque[_Modelled] = deque(maxlen=lately)
         self._scatter = ScatterWatch(fastest)
-        self._inertial = InertialWatch(period, lately)
+        self._inertial = InertialWatch(robot, period, lately)
         self._voltages = VoltageWatch(lately)
         self._flaws = EncoderFlaws.of(robot)
         self._to_twist = Body.of(robot).to_twist
-        self.description = DescriptionWatch(robot, period)
+        self._description = DescriptionWatch(robot, period)
         self._decided = 0  # newest tick
 
     def retune(self, bands: BandSettings) -> None:
@@ -172,12 +172,12 @@ class ResidualStage:
             self._flows[supply].ignore(arrival, stamp, ahead)
         return arrival
 
-    def imu(self, stamp_ns: int, yaw_rate: float, force: Triple = (NAN, NAN, NAN)) -> Arrival:
-        """Take a gyro's yaw rate [rad/s] and an accelerometer's specific force [m/s^2], NaN for
-        what is not measured."""
+    def imu(self, stamp_ns: int, rate: Triple, force: Triple) -> Arrival:
+        """Take angular rates [rad/s] and specific forces [m/s^2] in base_link, NaN for what is not
+        measured."""
         arrival = self._arrive(IMU, stamp_ns)
         if arrival in (Arrival.TAKEN, Arrival.RESTARTED):
-            self._inertial.add(stamp_ns, yaw_rate, force)
+            self._inertial.add(stamp_ns, rate, force)
         else:
             self._inertial.ignore(arrival, stamp_ns, self._clock.off(IMU))
         return arrival
@@ -205,6 +205,16 @@ class ResidualStage:
         """How the sensors do, as far as it is to be said anew; after `due`."""
         return self._health.due()
 
+    def misdescribed(self) -> tuple[str, ...]:
+        """What speaks against robot.yaml and the IMU so far, and what to mend."""
+        return tuple(filter(None, (self._description.words(), self.imu_mistake)))
+
+    @property
+    def imu_mistake(self) -> str:
+        """In which way the IMU is not as described, in words; empty if it is."""
+        # Wheels that are not as described show no IMU.
+        return "" if self._description.mistake else self._inertial.mistake
+
     def _inputs(self, tick: int, frame: ResidualFrame) -> list[InputState | Remark]:
         absent = [self._robot.wheel_names[wheel] for wheel in self._encoders.absent(tick)]
         without = f"no {', '.join(absent)} among its names" if absent else ""
@@ -219,7 +229,7 @@ class ResidualStage:
         if self._robot.measurement.total == TOTAL_TOPIC:
             found.append(InputState(TOTAL_TOPIC, self._flows[TOTAL]))
         found += self._inertial.states(tick, frame)
-        return [*found, self.description.remark()]
+        return [*found, self._description.remark()]
 
     def _arrive(self, stream: str, stamp_ns: int) -> Arrival:
         arrival = self._clock.arrive(stream, stamp_ns)
@@ -249,7 +259,7 @@ class ResidualStage:
         speeds = self._speeds(tick, estimate, absent)
         motors = [self._supply(tick, wheel, speeds[wheel]) for wheel in range(WHEELS)]
         powers = [self._motor(wheel, motors[wheel], absent) for wheel in range(WHEELS)]
-        self.description.take(tick, speeds, powers)
+        self._description.take(tick, speeds, powers)
         derived = [self._derived(wheel, motors[wheel], absent) for wheel in range(WHEELS)]
         twist, bands = self._twist(estimate, speeds), self.settings.bands
         moves = float(np.abs(estimate.speed).max()) > _TURNS  # false where it is NaN
@@ -262,7 +272,7 @@ class ResidualStage:
             yaw,
             along,
             self._voltages.residuals(known, bands),
-            self.description.mistake,
+            self._description.mistake,
         )
 
     def _supply_share(self, tick: int) -> float:

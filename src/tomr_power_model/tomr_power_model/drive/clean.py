@@ -7,6 +7,7 @@ from attrs import evolve
 from numpy.typing import NDArray
 
 from tomr_power_model.drive.cut import measured_when, without
+from tomr_power_model.drive.inertial import without_mistaken_imu
 from tomr_power_model.drive.lost import lost_commands
 from tomr_power_model.drive.motion import measured_speed
 from tomr_power_model.drive.record import Drive
@@ -34,7 +35,9 @@ def cleaned(drive: Drive, robot: Robot) -> Drive:
             samples, or too many commands lost.
     """
     _refuse_useless(drive)
-    trimmed, notes = _trimmed(drive)
+    believed, notes = without_mistaken_imu(drive, robot)
+    trimmed, said = _trimmed(believed)
+    notes += said
     notes += _blanks(trimmed, robot)
     settled = _settled(trimmed)
     if settled is not trimmed:
@@ -110,7 +113,7 @@ def _trimmed(drive: Drive) -> tuple[Drive, list[str]]:
     streams = {
         "motor power": drive.power_time,
         "battery_state": drive.total_time,
-        "imu/data": drive.yaw_time,
+        "imu/data": drive.imu_time,
     }
     for what, time in streams.items():
         rows = inside(time)

@@ -71,8 +71,8 @@ def without(drive: Drive, intervals: Sequence[tuple[float, float]]) -> Drive:
 
 def measured_when(drive: Drive, kept: Callable[[Array], Mask]) -> Drive:
     """A recording with the measurements of power and gyro of some times alone."""
-    power, total, yaw = (
-        kept(time) for time in (drive.power_time, drive.total_time, drive.yaw_time)
+    power, total, imu = (
+        kept(time) for time in (drive.power_time, drive.total_time, drive.imu_time)
     )
     return evolve(
         drive,
@@ -83,6 +83,6 @@ def measured_when(drive: Drive, kept: Callable[[Array], Mask]) -> Drive:
         total_time=drive.total_time[total],
         total=drive.total[total],
         total_voltage=drive.total_voltage[total],
-        yaw_time=drive.yaw_time[yaw],
-        yaw_rate=drive.yaw_rate[yaw],
+        imu_time=drive.imu_time[imu],
+        inertial=drive.inertial[imu],
     )

@@ -21,9 +21,9 @@ from tomr_power_model.drive.sources import (
 )
 from tomr_power_model.errors import InputError, counted, one_line
 from tomr_power_model.limits import limits, too_large
+from tomr_power_model.messages.inertial import Imu
 from tomr_power_model.messages.intake import (
     MALFORMED,
-    inertial_of,
     stamp_of,
     twist_of,
 )
@@ -34,7 +34,7 @@ from tomr_power_model.robot import WHEELS, Robot
 Array = NDArray[np.float64]
 Taker = Callable[[Any, int], None]
 
-_ENCODERS, _COMMANDS, _GYRO = ENCODER_TOPIC, "cmd_vel", "imu/data"
+_ENCODERS, _COMMANDS, _IMU = ENCODER_TOPIC, "cmd_vel", "imu/data"
 _AROUND = 60.0  # s before and after the encoders, in which commands count
 _TOGETHER = 2e-4  # s: samples of several supplies that were taken at once
 _CLOCK_OFF = 5e-3  # by which two clocks may run apart
@@ -52,10 +52,11 @@ class _Collector:
         self.encoders = Series(2 * WHEELS)
         self.supplies = [Series(3) for _ in range(WHEELS + 1)]  # power, current, voltage
         self.commands = Series(3)
-        self.gyro = Series(1)
+        self.imu = Series(6)
         self.takers: dict[str, list[Taker]] = {}
         self.complaints: dict[str, int] = {}
         self._wheels = WheelStream(robot.wheel_names)
+        self._inertial = Imu(robot.imu_rpy)
 
     def find(self) -> None:
         """Find the topics; raises InputError for one that must be there."""
@@ -73,7 +74,7 @@ class _Collector:
             found = self._required if not motors else self._found
             self._on(found(item.topic), self._power(item))
         self._on(self._found(_COMMANDS), self._command)
-        self._on(self._found(_GYRO), self._imu)
+        self._on(self._found(_IMU), self._imu)
 
     def read(self) -> None:
         """Take all messages; what cannot be used is counted and left out."""
@@ -97,7 +98,7 @@ class _Collector:
         """The sensors' streams by name; commands come when they like."""
         names = [f"{name}/power" for name in self.robot.wheel_topics]
         named = zip([*names, TOTAL_TOPIC], self.supplies, strict=True)
-        return {_ENCODERS: self.encoders, **dict(named), _GYRO: self.gyro}
+        return {_ENCODERS: self.encoders, **dict(named), _IMU: self.imu}
 
     def _found(self, topic: str) -> str | None:
         return resolve_topic(self.recording, topic, self.namespace)
@@ -118,9 +119,9 @@ class _Collector:
         self.commands.add(stamp, receive_ns, *twist_of(message))
 
     def _imu(self, message: Any, receive_ns: int) -> None:
-        (_, _, rate), _ = inertial_of(message)
-        if math.isfinite(rate):
-            self.gyro.add(stamp_of(message, receive_ns), receive_ns, rate)
+        rate, force = self._inertial.read(message)
+        if math.isfinite(rate[2]):
+            self.imu.add(stamp_of(message, receive_ns), receive_ns, *rate, *force)
 
     def _power(self, source: PowerTopic) -> Taker:
         def take(message: Any, receive_ns: int) -> None:
@@ -164,7 +165,7 @@ def read_drive(path: Path, robot: Robot, namespace: str | None = None) -> Drive:
         ],
     )
     command_time, command = _in_force(*collector.commands.since(start), encoder_time[-1])
-    yaw_time, yaw_rate = collector.gyro.since(start)
+    imu_time, inertial = collector.imu.since(start)
     if not len(power_time) and not len(times[TOTAL]):
         raise InputError(_no_power(path, collector))
     return Drive(
@@ -181,8 +182,8 @@ def read_drive(path: Path, robot: Robot, namespace: str | None = None) -> Drive:
         total_voltage=rows[TOTAL][:, 2],
         command_time=on_grid(command_time),
         command=command,
-        yaw_time=on_grid(yaw_time),
-        yaw_rate=yaw_rate[:, 0],
+        imu_time=on_grid(imu_time),
+        inertial=inertial,
         start_ns=start,
         notes=tuple(notes),
     )

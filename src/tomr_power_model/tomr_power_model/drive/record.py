@@ -28,8 +28,8 @@ class Drive:
     command: Array  # m/s, m/s, rad/s in base_link, (c, 3)
     voltage: Array  # of each driver's supply [V], NaN where not given, (m, 3)
     total_voltage: Array  # V, (l,)
-    yaw_time: Array  # (g,)
-    yaw_rate: Array  # of the gyro [rad/s], (g,)
+    imu_time: Array  # (g,)
+    inertial: Array  # angular rates [rad/s] and specific forces [m/s^2], x, y and z each, (g, 6)
     start_ns: int = 0  # stamp of time 0
     notes: tuple[str, ...] = ()
 
@@ -37,6 +37,11 @@ class Drive:
         """The command in force at some times [s], NaN before the first, (m, 3)."""
         latest = np.searchsorted(self.command_time, time, side="right")
         return np.concatenate([np.full((1, 3), np.nan), self.command])[latest]
+
+    @property
+    def yaw_rate(self) -> Array:
+        """Of the gyro [rad/s], (g,)."""
+        return self.inertial[:, 2]
 
     @property
     def duration(self) -> float:

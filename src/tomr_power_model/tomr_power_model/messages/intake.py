@@ -71,29 +71,6 @@ def twist_of(message: Any) -> Triple:
     return values
 
 
-def inertial_of(message: Any) -> tuple[Triple, Triple]:
-    """Angular rate [rad/s] and specific force [m/s^2] of an Imu along x, y and z; NaN where it says
-    none. Raises Unusable where it says neither a yaw rate nor a force."""
-    rate = _axes(message.angular_velocity, message.angular_velocity_covariance, LARGEST.rate)
-    force = _axes(
-        message.linear_acceleration, message.linear_acceleration_covariance, LARGEST.force
-    )
-    if not math.isfinite(rate[2]) and not math.isfinite(force[0]):
-        raise Unusable("it measures neither a yaw rate nor a force that can be")
-    return rate, force
-
-
-def _axes(vector: Any, covariance: Sequence[float], largest: float) -> Triple:
-    # A covariance that begins with -1 says that the quantity is not measured.
-    if len(covariance) and float(covariance[0]) == -1.0:
-        return _UNKNOWN
-    values = (float(vector.x), float(vector.y), float(vector.z))
-    if any(abs(value) > largest for value in values if math.isfinite(value)):
-        return _UNKNOWN
-    x, y, z = (value if math.isfinite(value) else math.nan for value in values)
-    return x, y, z
-
-
 @frozen
 class Wheels:
     """Angle, speed and effort of the wheels in one JointState, NaN for what is missing."""

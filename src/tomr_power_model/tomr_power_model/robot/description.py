@@ -114,6 +114,7 @@ class Robot:
     measurement: Measurement
     physics: Mapping[str, PerWheel]
     unmodelled: tuple[LearntTerm, ...] = ()  # what was learnt and has no name
+    imu_rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)  # rad, of the IMU in base_link
 
     @property
     def wheel_topics(self) -> tuple[str, str, str]:
@@ -160,6 +161,7 @@ def robot_from_parameters(values: Mapping[str, object], place: str) -> Robot:
         mass=number("robot.mass"),
         inertia_z=number("robot.inertia_z"),
         mass_center=cast(tuple[float, float, float], checked["robot.mass_center"]),
+        imu_rpy=cast(tuple[float, float, float], checked["robot.imu_rpy"]),
         motors=_motors(checked, values, names, place),
         controller=Controller(
             **number.group("controller"), integrator=str(checked["controller.integrator"])

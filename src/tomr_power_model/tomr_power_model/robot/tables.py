@@ -53,6 +53,16 @@ ROBOT_PARAMETERS: tuple[ParameterSpec, ...] = (
         minimum=-10.0,
         maximum=10.0,
     ),
+    _S(
+        "robot.imu_rpy",
+        "roll, pitch, yaw of the IMU's axes in base_link, as in a URDF",
+        kind="floats",
+        default=(0.0,) * 3,
+        unit="rad",
+        length=3,
+        minimum=-10.0,
+        maximum=10.0,
+    ),
     *MOTOR_PARAMETERS,
     _S("controller.rate", "wheel speed loop", unit="Hz", default=200.0, minimum=1.0, maximum=1e4),
     _S(

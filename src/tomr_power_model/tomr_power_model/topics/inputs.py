@@ -17,12 +17,12 @@ from tomr_power_model.drive.sources import (
 )
 from tomr_power_model.errors import one_line
 from tomr_power_model.limits import limits
+from tomr_power_model.messages.inertial import Imu
 from tomr_power_model.messages.intake import (
     MALFORMED,
     Triple,
     Unusable,
     header_stamp_ns,
-    inertial_of,
     numbers_of,
     stamp_of,
     twist_of,
@@ -124,8 +124,10 @@ def model_inputs(
     def command(message: Any, receive_ns: int) -> Arrival:
         return predictor.command(stamp_of(message, receive_ns, fallback=True), twist_of(message))
 
+    inertial = Imu(robot.imu_rpy)
+
     def imu(message: Any, receive_ns: int) -> Arrival:
-        (_, _, rate), _ = inertial_of(message)
+        (_, _, rate), _ = inertial.read(message)
         return predictor.imu(stamp_of(message, receive_ns), rate)
 
     def voltages(message: Any, receive_ns: int) -> Arrival:

@@ -53,7 +53,7 @@ class Channel:
 def channels_of(recorded: Drive, robot: Robot) -> tuple[Channel, ...]:
     """All channels of a recording that hold enough to determine their noise."""
     found = [*_powers(recorded, robot), *_speeds(recorded, robot)]
-    if len(recorded.yaw_time) > 1:
+    if len(recorded.imu_time) > 1:
         found.append(_blocks(recorded))
     known = (channel.at(np.isfinite(channel.value)) for channel in found)
     return tuple(channel for channel in known if len(channel.time) >= _FEWEST)
@@ -97,7 +97,7 @@ def _quantum(reading: Array, drawn: Array) -> float:
 
 def _blocks(recorded: Drive) -> Channel:
     """The gyro's yaw rate, means over blocks of `_BLOCK`."""
-    time, rate = recorded.yaw_time, recorded.yaw_rate
+    time, rate = recorded.imu_time, recorded.yaw_rate
     every = max(1, round(_BLOCK / median_period(time)))
     rows = np.arange(len(time) // every * every).reshape(-1, every)
     usual = every * median_period(time)

@@ -258,7 +258,7 @@ def filled(found: Array, parts: Iterable[Iterator[Array]]) -> Array:
 
 
 def _times(recorded: Drive) -> list[Array]:
-    found = [recorded.encoder_time, recorded.power_time, recorded.total_time, recorded.yaw_time]
+    found = [recorded.encoder_time, recorded.power_time, recorded.total_time, recorded.imu_time]
     return [time for time in found if len(time)]
 
 

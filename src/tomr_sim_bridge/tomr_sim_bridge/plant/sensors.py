@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from tomr_power_model.messages.inertial import rotation
 from tomr_power_model.messages.plain import (
     NANOSECONDS,
     Level,
@@ -83,6 +84,7 @@ class Sensors:
             (given.imu_rate, self._imu),
             (given.odometry_rate, self._odometry),
         )
+        self._imu_axes = rotation(robot.imu_rpy)  # from the IMU's to base_link
         self._streams = [(Clock(rate, start, jitter, random), read) for rate, read in rates]
         self._fault_clock = Clock(FAULT_RATE, start, 0.0, random)
         self._last_encoder = (start, self._counts(start))
@@ -142,6 +144,7 @@ class Sensors:
         given = self._robot.sensors
         force += given.accelerometer_noise * self._random.standard_normal(3)
         turning = state[moments.ANGULAR] + given.gyro_noise * self._random.standard_normal(3)
+        turning, force = self._imu_axes.T @ turning, self._imu_axes.T @ force
         return [Sample("imu/data", stamp, samples.imu(stamp, turning.tolist(), force.tolist()))]
 
     def _odometry(self, stamp: int) -> list[Sample]:
