@@ -1,11 +1,14 @@
 """Whether a robot that is not as described, or not wired so, is found, and a right one left alone.
 
-    .venv/bin/python bench/descriptions.py BAG... --robot robot.yaml [--live | --wrong | --rewired]
+    .venv/bin/python bench/descriptions.py BAG... --robot robot.yaml
+        [--live | --wrong | --rewired | --odometry]
 
 Counts the recordings in which `other_radii` finds something as described; with --live those in
-which `inputs: robot.yaml` ever warns. --wrong diagnoses the first with one value off at a time,
---rewired as a robot that is wired or reports otherwise would have recorded it; both say what is
-named and noted then.
+which `inputs: robot.yaml` ever warns, or the IMU is said to be otherwise.
+--wrong diagnoses the first with one value off at a time, --rewired as a robot that is wired or
+reports otherwise would have recorded it; both say what is named and noted then. --odometry asks
+`tomr_odometry` where the first ends with its IMU otherwise, beside where the wheels alone have it,
+which is right where none slides.
 """
 
 import argparse
@@ -24,6 +27,9 @@ from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.replayed import Task, replay_one
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
+from tomr_odometry.estimator import SlipOdometry
+from tomr_odometry.offline import estimates
+from tomr_odometry.settings import OdometrySettings
 from tomr_power_model.calibration.following import expected_speed
 from tomr_power_model.cli import EXIT_OK, run_main
 from tomr_power_model.drive.clean import cleaned
@@ -37,6 +43,7 @@ from tomr_power_model.messages.types import JOINT_STATE
 from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import load_robot
 from tomr_power_model.robot.files import robot_file
+from tomr_power_model.topics.inputs import Complaints
 
 # By how much each value is off: factors, but of the offset radians.
 WRONG: Sequence[Mapping[str, float]] = (
@@ -66,6 +73,8 @@ def warned(bag: Path, robot: str) -> str | None:
         with open_recording(bag) as recording:
             pipeline = Pipeline(load_robot(robot), DiagnosisSettings.of({}, "bench"))
             for receive_ns, step in diagnose(recording, pipeline):
+                if pipeline.imu_mistake:
+                    return pipeline.imu_mistake
                 for report in step.reports:
                     for status in report.statuses:
                         if status.name == "inputs: robot.yaml" and status.level is not Level.OK:
@@ -285,6 +294,36 @@ def _table(options: argparse.Namespace) -> list[str]:
         return list(_rows(names, [Task(bag, robot, settings) for robot in robots]))
 
 
+def ended(bag: Path, robot: str) -> str:
+    """Cells of a table: how far the odometry ends from where the wheels have it, how long it says
+    that wheels slip, and what it makes of the IMU."""
+    described = load_robot(robot)
+    cores = [
+        SlipOdometry(described, OdometrySettings(use_imu=is_used)) for is_used in (True, False)
+    ]
+    ends, slips = [], 0.0
+    for core in reversed(cores):
+        with open_recording(bag) as recording:
+            found = list(estimates(recording, described, core, Complaints()))
+        ends.append(found[-1].pose)
+        slips = sum(item.is_slipping for item in found) / len(found)
+    (wheels, ours), use = ends, dict(found[-1].sensors)["imu/data"]
+    off = math.hypot(*(ours[:2] - wheels[:2]))
+    return f"{off:.3f} m | {ours[2] - wheels[2]:+.3f} rad | {slips:.1%} | {use}"
+
+
+def _ends(bag: Path, robot: str) -> Iterator[str]:
+    yield "| otherwise | end off | heading off | said to slip | the IMU |"
+    yield "|---|---|---|---|---|"
+    with TemporaryDirectory() as name:
+        names = ["as it is", *(name for name in REWIRED if "imu" in name or "gyro" in name)]
+        bags = [bag, *(Path(name) / str(number) for number in range(1, len(names)))]
+        for other, new in zip(names[1:], bags[1:], strict=True):
+            recorded(bag, REWIRED[other], new)
+        for row, cells in zip(names, each(partial(ended, robot=robot), bags), strict=True):
+            yield f"| {row} | {cells} |"
+
+
 def _main(arguments: Sequence[str] | None) -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -296,7 +335,11 @@ def _main(arguments: Sequence[str] | None) -> int:
     )
     parser.add_argument("--wrong", action="store_true", help="put values wrong, one at a time")
     parser.add_argument("--rewired", action="store_true", help="wire the robot otherwise")
+    parser.add_argument("--odometry", action="store_true", help="where the odometry ends then")
     options = parser.parse_args(arguments)
+    if options.odometry:
+        print("\n".join(_ends(options.bags[0], options.robot)))
+        return EXIT_OK
     if options.wrong or options.rewired:
         print("\n".join(_table(options)))
         return EXIT_OK

@@ -52,6 +52,18 @@ def slow(message: Message, _: Random) -> bool:
 
 
 @_sensors
+def encoders_20_hz(message: Message, _: Random) -> bool:
+    """Encoders at 20 Hz: every fifth message that came."""
+    return not message.is_encoder or message.number % 5 == 0
+
+
+@_sensors
+def encoders_10_hz(message: Message, _: Random) -> bool:
+    """Encoders at 10 Hz: every tenth message that came."""
+    return not message.is_encoder or message.number % 10 == 0
+
+
+@_sensors
 def coarse_currents(message: Message, random: Random) -> bool:
     """Motors' currents in steps of 0.1 A with 0.03 A of noise, their voltages of 0.1 V."""
     if message.topic.endswith("/power"):

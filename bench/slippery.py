@@ -27,7 +27,7 @@ from odometry import ratio
 from pool import each
 from record import record_mission
 
-from tomr_odometry.estimate import Estimate
+from tomr_odometry.estimate import NOT_USED, Estimate
 from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.offline import estimates
 from tomr_odometry.reference import reference_of
@@ -130,6 +130,7 @@ class Met:
     false: float  # share of the rest
     slip: float  # RMSE of the ratios
     inside: float  # share of the time in the ellipse
+    is_left_out: bool  # the IMU, taken for one that is not as described
 
 
 class _Biased(SlipOdometry):
@@ -215,6 +216,7 @@ def met(bag: Path, description: Path, use_imu: bool) -> Met:
         false=float(reported[~slides].mean()),
         slip=slip_error(np.array([item.slip for item in ours]), sliding, (off[0] + real) @ rows.T),
         inside=_inside(ours, poses),
+        is_left_out=any(dict(item.sensors)["imu/data"].startswith(NOT_USED) for item in ours),
     )
 
 
@@ -241,6 +243,7 @@ def _line(kind: str, found: Sequence[Met]) -> str:
         f"slip ratio {np.sqrt(np.mean([item.slip**2 for item in found])):.3f} (median "
         f"{np.median([item.slip for item in found]):.3f}); in the ellipse "
         f"{100 * np.mean([item.inside for item in found]):.0f} %"
+        f"; IMU left out of {sum(item.is_left_out for item in found)}"
     )
 
 

@@ -27,7 +27,7 @@ Change = Callable[[str, Any], Iterator[tuple[str, Any]]]
 
 
 def _states(bag: str, change: Change | None = None) -> tuple[list[tuple[int, str]], str]:
-    """States and their stamps, and what is said of robot.yaml at last."""
+    """States and their stamps, and what is said of robot.yaml and the IMU at last."""
     pipeline = Pipeline(ROBOT, DiagnosisSettings.of({}, "test"))
     found = []
     with open_recording(ROOT / "bags" / bag) as recording:
@@ -37,7 +37,7 @@ def _states(bag: str, change: Change | None = None) -> tuple[list[tuple[int, str
             for place, part in parts:
                 step = pipeline.take(topics[place], part, receive_ns)
                 found += [(item.stamp_ns, item.state.name) for item in step.diagnoses]
-    return found, pipeline.misdescribed()
+    return found, "; ".join(pipeline.misdescribed())
 
 
 def test_wheels_in_messages_of_their_own_are_diagnosed_alike() -> None:
@@ -82,3 +82,26 @@ def test_a_robot_that_is_wired_otherwise_is_told_so() -> None:
     _, said = _states("square", REWIRED["angles in revolutions"])
     assert "joint_states seems to give revolutions in place of radians" in said
     assert _states("square")[1] == ""
+
+
+def test_an_imu_that_lies_on_its_side_is_said_to() -> None:
+    states, said = _states("square", REWIRED["imu on its side"])
+    assert said.startswith("imu/data is mounted otherwise than described: write robot.imu_rpy: [")
+    assert {name for _, name in states} <= {"normal", "waiting", "not observable in this motion"}
+
+
+@pytest.mark.parametrize("every", [5, 7, 10])
+def test_encoders_of_20_to_10_hz_are_no_fault(every: int) -> None:
+    count = -1
+
+    def rarely(topic: str, message: Any) -> Iterator[tuple[str, Any]]:
+        nonlocal count
+        count += topic == "/joint_states"
+        if topic != "/joint_states" or count % every == 0:
+            yield topic, message
+
+    states, said = _states("square", rarely)
+    named = [name for _, name in states]
+    assert set(named) <= {"normal", "waiting", "not observable in this motion", "not enough data"}
+    assert named.count("normal") > 0.6 * len(named)
+    assert said == ""

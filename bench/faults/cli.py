@@ -31,6 +31,8 @@ _FITTING = {
 }
 _SENSORS = (
     "slow",
+    "encoders-20-hz",
+    "encoders-10-hz",
     "coarse-currents",
     "coarse-everywhere",
     "motor-encoders",

@@ -2,9 +2,10 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from tomr_fault_diag.diagnosis.heard import Heard, out_of_step
+from tomr_fault_diag.diagnosis.heard import Heard, out_of_step, rare_commands
 from tomr_fault_diag.diagnosis.summary import LACKING, Episode, Summary
 from tomr_power_model.model.ticks import to_ns
 
@@ -63,6 +64,8 @@ def heard(late: dict[str, float]) -> Heard:
         ({"joint_states": 0.4}, ""),
         ({"cmd_vel": 0.21, "joint_states": 0.01}, "cmd_vel comes 0.20 s later"),
         ({"cmd_vel": 0.0, "joint_states": 0.4}, "joint_states comes 0.40 s later"),
+        ({"joint_states": 0.0, "wheel_1/power": -0.3}, "wheel_1/power is stamped 0.30 s later"),
+        ({"joint_states": 0.0, "wheel_1/power": 0.3, "battery_state": 0.0}, ""),  # slow to come
     ],
 )
 def test_commands_and_encoders_of_different_clocks_are_named(
@@ -71,3 +74,28 @@ def test_commands_and_encoders_of_different_clocks_are_named(
     found = out_of_step(heard(late))
     assert found.startswith(words)
     assert bool(found) == bool(words)
+
+
+@pytest.mark.parametrize(
+    ("times", "is_rare"),
+    [
+        (np.arange(0.0, 30.0, 0.1), False),
+        (np.arange(0.0, 30.0, 1.5), True),
+        (
+            np.concatenate([np.arange(0.0, 9.0, 0.1), [60.0, 120.0], np.arange(200.0, 209.0, 0.1)]),
+            False,
+        ),
+        (np.array([0.0, 5.0, 10.0]), False),  # too few to know
+    ],
+    ids=["steady", "on a change", "with rests", "few"],
+)
+def test_commands_that_come_on_a_change_only_need_no_timeout(
+    times: np.ndarray, is_rare: bool
+) -> None:
+    heard = Heard()
+    for time in times:
+        heard.note("cmd_vel", SimpleNamespace(), to_ns(100.0 + time))
+        heard.note("joint_states", SimpleNamespace(), to_ns(100.0 + time))
+    assert ("set command_timeout: 0" in rare_commands(heard, 0.5)) is is_rare
+    assert rare_commands(heard, 0.0) == ""
+    assert rare_commands(Heard(), 0.5) == ""

@@ -7,6 +7,8 @@ from itertools import permutations, product
 import numpy as np
 import pytest
 from attrs import evolve
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tomr_power_model.drive.imu_mistakes import Felt, imu_mistake
@@ -154,6 +156,22 @@ def test_accelerations_along_one_line_show_a_turned_one() -> None:
     assert named(imu_mistake(straight, STRAIGHT)) == pytest.approx(
         rotation((0.0, 0.0, math.pi / 2.0)), abs=1e-3
     )
+
+
+@given(
+    st.tuples(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1)),
+    st.integers(1, 12),
+    st.sampled_from([0.0, 1e-9, 1.0, 1e4]),
+)
+def test_whatever_is_measured_has_an_answer(
+    rpy: tuple[float, float, float], rows: int, size: float
+) -> None:
+    """Without noise as well, and of sensors that measure next to nothing or far too much."""
+    seen = felt(rotation(rpy), rows=rows, noise=0.0)
+    few = evolve(seen, rate=size * seen.rate, force=size * seen.force)
+    for described in (STRAIGHT, rpy):
+        assert isinstance(imu_mistake(few, described), str | None)
+        assert isinstance(imu_mistake(seen, described), str | None)
 
 
 def test_a_few_degrees_take_more_than_noise() -> None:

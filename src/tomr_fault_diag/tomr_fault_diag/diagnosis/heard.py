@@ -11,6 +11,8 @@ from tomr_power_model.messages.intake import header_stamp_ns
 from tomr_power_model.messages.plain import NANOSECONDS
 
 _APART = NANOSECONDS  # stamps of two inputs that have no time in common
+_PAUSE = NANOSECONDS // 2
+_FEW = 5  # commands
 _OUT_OF_STEP = 0.1  # s, between commands and encoders, of which diagnoses suffer
 
 
@@ -24,6 +26,7 @@ class Stream:
     first_ns: int = 0  # receive stamps
     last_ns: int = 0
     silence_ns: int = 0  # longest time without a message
+    pauses: int = 0  # times without one that are longer than commands are usually held
 
     @property
     def stamps_ns(self) -> tuple[int, int] | None:
@@ -57,6 +60,7 @@ class Heard:
         silence = receive_ns - stream.last_ns
         if silence > stream.silence_ns:
             stream.silence_ns = silence
+        stream.pauses += silence > _PAUSE
         stream.last_ns = receive_ns
         stream.last = message
 
@@ -95,8 +99,26 @@ def _backwards(heard: Heard) -> str:
 
 
 def out_of_step(heard: Heard) -> str:
-    """What to see to where commands reach the recording sooner or later after their stamps than
-    the encoders do; empty where they do not, or are not stamped."""
+    """What to see to where inputs are stamped by clocks that differ; empty where they are not, or
+    have no stamps."""
+    return _commands_out_of_step(heard) or _power_ahead(heard)
+
+
+def _power_ahead(heard: Heard) -> str:
+    """A power that is stamped long after the encoders: what comes late is stamped before."""
+    encoders = heard.streams["joint_states"].late_s if "joint_states" in heard.streams else None
+    for name, stream in heard.streams.items():
+        late = stream.late_s if name.endswith(("/power", "battery_state")) else None
+        if late is not None and encoders is not None and encoders - late > _OUT_OF_STEP:
+            return (
+                f"{name} is stamped {encoders - late:.2f} s later than joint_states that come at "
+                "the same time: synchronise the clocks"
+            )
+    return ""
+
+
+def _commands_out_of_step(heard: Heard) -> str:
+    """Commands that reach the recording sooner or later after their stamps than the encoders."""
     commands, encoders = (
         heard.streams[name].late_s if name in heard.streams else None
         for name in ("cmd_vel", "joint_states")
@@ -108,6 +130,21 @@ def out_of_step(heard: Heard) -> str:
         f"{names[0]} comes {abs(commands - encoders):.2f} s later after its stamps than "
         f"{names[1]}: clocks differ, or messages are held up: synchronise the clocks, or describe "
         "how late commands act as controller.delay (tomr_gap check finds it)"
+    )
+
+
+def rare_commands(heard: Heard, timeout_s: float) -> str:
+    """What to see to where commands come on a change only, and end after a timeout; empty where
+    they do not."""
+    commands = heard.streams.get("cmd_vel")
+    if commands is None or not timeout_s or commands.count < _FEW:
+        return ""
+    if 2 * commands.pauses < commands.count:
+        return ""
+    return (
+        f"cmd_vel mostly pauses for longer than {1e-9 * _PAUSE:g} s between two messages, and a "
+        f"command is taken to end after command_timeout = {timeout_s:g} s: set "
+        "command_timeout: 0 if this robot holds each until the next"
     )
 
 

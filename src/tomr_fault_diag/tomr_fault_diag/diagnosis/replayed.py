@@ -14,7 +14,7 @@ from tomr_fault_diag.classifier.commissioned import commissioned_words
 from tomr_fault_diag.classifier.messages import diagnosis_message, evidence_of
 from tomr_fault_diag.classifier.stage import Diagnosis
 from tomr_fault_diag.classifier.states import WAITING
-from tomr_fault_diag.diagnosis.heard import Heard, Stream, out_of_step, why_undecided
+from tomr_fault_diag.diagnosis.heard import Heard, Stream, out_of_step, rare_commands, why_undecided
 from tomr_fault_diag.diagnosis.labels import Label, recorded_labels
 from tomr_fault_diag.diagnosis.offline import replay
 from tomr_fault_diag.diagnosis.pipeline import Pipeline, Step
@@ -130,9 +130,7 @@ def replay_one(task: Task, progress: Progress | None = None) -> Replayed:
     heard = Heard()
     with open_recording(task.bag) as recording:
         _run(recording, task, listeners, heard, progress)
-        said = recording.warning, _outdated(task, robot), *listeners[0].pipeline.misdescribed()
-        notes = tuple(filter(None, said))
-        start_ns, end_ns = recording.start_ns, recording.end_ns
+        warning, start_ns, end_ns = recording.warning, recording.start_ns, recording.end_ns
     first = listeners[0].pipeline
     phases = tuple(item.phase(share) for item, share in zip(listeners, shares, strict=True))
     complaints, undecided, clocks = first.complaints.counts, "", out_of_step(heard)
@@ -141,8 +139,9 @@ def replay_one(task: Task, progress: Progress | None = None) -> Replayed:
     if not any(phase.summary.is_decided(lacking) for phase in phases):
         wanted = [item.topic for item in first.inputs]
         undecided = why_undecided(heard, wanted, complaints, phases[0].summary)
-    elif clocks:
-        notes = (*notes, clocks)
+    rare = rare_commands(heard, 1e-9 * task.settings.model.command_timeout)
+    said = warning, _outdated(task, robot), *first.misdescribed(), rare
+    notes = tuple(filter(None, (*said, "" if undecided else clocks)))
     for stream in heard.streams.values():
         stream.first = stream.last = None  # messages need not travel between processes
     found = Replayed(task, start_ns, end_ns, phases, heard.streams, notes, complaints, undecided)

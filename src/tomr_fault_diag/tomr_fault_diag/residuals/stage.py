@@ -28,6 +28,7 @@ from tomr_fault_diag.residuals.inertial import IMU, InertialWatch
 from tomr_fault_diag.residuals.measured import Measured, SupplyWindow
 from tomr_fault_diag.residuals.scatter import ScatterWatch
 from tomr_fault_diag.residuals.settings import BandSettings, ResidualSettings
+from tomr_fault_diag.residuals.slow_encoders import ExpectedMotion
 from tomr_fault_diag.residuals.voltages import VoltageWatch
 from tomr_fault_diag.residuals.widths import transient_ticks, width
 from tomr_power_model.drive.plausible import IGNORED, PowerLimits, fastest_wheel
@@ -122,6 +123,7 @@ class ResidualStage:
         lately = transient_ticks(period)
         self._recent: deque[_Modelled] = deque(maxlen=lately)
         self._scatter = ScatterWatch(fastest)
+        self._expected = ExpectedMotion(period)
         self._inertial = InertialWatch(robot, period, lately)
         self._voltages = VoltageWatch(lately)
         self._flaws = EncoderFlaws.of(robot)
@@ -247,6 +249,7 @@ class ResidualStage:
             self._voltages.clear()
             self._predictions.clear()
             self._recent.clear()
+            self._expected.clear()
         return arrival
 
     def _frame(self, tick: int) -> ResidualFrame:
@@ -255,7 +258,7 @@ class ResidualStage:
         known = self._predictions.pop(tick, None)
         self._recent.append(_Modelled.of(known or _no_prediction(tick)))
         absent = "" if known else _NO_PREDICTION
-        estimate = self._encoders.at(tick)
+        estimate = self._expected.estimate(tick, self._recent[-1].speed, self._encoders)
         speeds = self._speeds(tick, estimate, absent)
         motors = [self._supply(tick, wheel, speeds[wheel]) for wheel in range(WHEELS)]
         powers = [self._motor(wheel, motors[wheel], absent) for wheel in range(WHEELS)]

@@ -67,7 +67,8 @@ class _Shown:
     def along(self, turned: Array, sign: float) -> float:
         """Cosine between what a rotation (3, 3) and a sign make of it and what it is."""
         seen = sign * turned @ self.measured
-        return float(seen @ self.true / np.linalg.norm(seen))
+        cosine = float(seen @ self.true / np.linalg.norm(seen))
+        return min(max(cosine, -1.0), 1.0)
 
 
 def imu_mistake(felt: Felt, rpy: Sequence[float]) -> str | None:
@@ -79,7 +80,7 @@ def imu_mistake(felt: Felt, rpy: Sequence[float]) -> str | None:
         return None if is_upright else _OTHERWISE
     shown = [item for item in (up, turning, *along) if item is not None]
     units = list(_units(up, turning, along))
-    off = math.acos(min(min(item.along(np.eye(3), 1.0) for item in shown), 1.0))
+    off = math.acos(min(item.along(np.eye(3), 1.0) for item in shown))
     if off < _ALIKE:
         is_all = turning is not None or not np.isfinite(felt.rate).any()
         is_all &= bool(along) or not np.isfinite(felt.force).any()

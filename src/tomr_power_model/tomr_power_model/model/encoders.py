@@ -17,7 +17,8 @@ from tomr_power_model.model.stamps import RecentStamps
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 LONG_S = 0.2  # of the fit beside a simulation
-_FIT = 5  # samples that it takes
+_FIT, _LINE = 6, 3  # samples that it takes, and a straight one
+_SLOW = 40_000_000  # ns between samples, from which on they are few in any window
 _PART = 50_000_000  # ns of a window for which a fit stands
 _ALONE = 3.0  # times as far as the others' does the angle of one wheel scatter that is at fault
 _FREE = 2  # more samples than unknowns, to show how they scatter
@@ -170,15 +171,27 @@ class EncoderWindow:
         simulated, angle, speed, acceleration = reference.beside(
             [middle + time for time in times], tick_ns, self._period
         )
-        if len(samples) < _FIT or np.isnan(positions).any():
+        if len(samples) < _LINE or np.isnan(positions).any():
             measured = self.at(tick_ns)
         else:
             ahead = positions - simulated
-            offset = _weights(times, 2) @ (ahead - ahead[0])
+            # Of few samples a line: they span as long, and are not many enough for more.
+            degree = 2 if len(samples) >= _FIT else 1
+            weights = _weights(times, degree)
+            offset = weights @ (ahead - ahead[0])
+            bent = 2.0 * offset[2] if degree > 1 else 0.0
+            gain = math.sqrt(float((weights[1] ** 2).sum()))
             measured = WheelEstimate(
-                speed + offset[1], acceleration + 2.0 * offset[2], angle + ahead[0] + offset[0]
+                speed + offset[1], acceleration + bent, angle + ahead[0] + offset[0], gain=gain
             )
         return measured, WheelEstimate(speed, acceleration, measured.angle)
+
+    def slow_since(self, tick_ns: int) -> int | None:
+        """When the samples begin that `beside` fits [ns], where they come rarely; else None."""
+        samples = self._until(tick_ns, max(self._span, round(1e9 * LONG_S)))
+        if len(samples) < _LINE or samples[-1].stamp_ns - samples[-3].stamp_ns < 2 * _SLOW:
+            return None
+        return samples[0].stamp_ns
 
     def _until(self, tick_ns: int, span: int | None = None) -> list[EncoderSample]:
         """Samples of the window, and the two newest where encoders are slower than it."""
