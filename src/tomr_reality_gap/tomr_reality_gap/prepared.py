@@ -26,6 +26,7 @@ from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
 from tomr_reality_gap.fit.integrator import INTEGRATOR, WAYS, summed_otherwise
 from tomr_reality_gap.fit.learnt import with_terms
 from tomr_reality_gap.fit.simulator_discrepancy import DiscrepancyTorques, discrepancy_torques
+from tomr_reality_gap.fit.window import WINDOW, window_of
 from tomr_reality_gap.hypotheses.scales import scales_of, traction_ratios_of
 from tomr_reality_gap.request import Request
 
@@ -68,6 +69,10 @@ def prepared(request: Request) -> Prepared:
     _check_same_commands(real, sim)
     values[INTEGRATOR] = integrator_of(_simulation((*sim, *real)[0], robot))
     robot = robot_from_parameters(values, place)
+    window = window_of(_simulation(real[0], robot))
+    if window is not None:
+        values[WINDOW] = window
+        robot = robot_from_parameters(values, place)
     base = per_wheel(values, robot.wheel_names, place)
     recordings, held_out, simulations = (
         tuple(_simulation(item, robot) for item in group) for group in (real, held, sim)
@@ -89,11 +94,20 @@ def prepared(request: Request) -> Prepared:
         scales=scales,
         notes=(
             *notes,
+            *_averaging(window),
             *_sim_notes(simulations, discrepancy),
             *_beyond((*recordings, *held_out)),
             *_coarse((*recordings, *held_out)),
         ),
     )
+
+
+def _averaging(window: float | None) -> Iterator[str]:
+    if window is not None:
+        yield (
+            f"what power sensors say is averaged over {window:g} s: taken and written as {WINDOW}, "
+            "by which nodes and tools go"
+        )
 
 
 def _described(request: Request) -> dict[str, object]:
