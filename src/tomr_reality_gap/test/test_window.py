@@ -1,6 +1,9 @@
 """Over how long power sensors average, read off a recording."""
 
+from collections import deque
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,10 +11,13 @@ from attrs import evolve
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
-from tomr_reality_gap.fit.window import window_of
+from tomr_reality_gap.fit.window import WINDOW, window_of
+from tomr_reality_gap.prepared import prepared
+from tomr_reality_gap.request import Request
 
 from .test_alignment import _recorded as recorded_drive
 from .test_alignment import as_recorded
@@ -19,6 +25,7 @@ from .test_alignment import as_recorded
 Array = NDArray[np.float64]
 
 ROBOT = shipped_robot("reference")
+SQUARE = Path(__file__).resolve().parents[3] / "bags" / "square"
 PERIOD = 0.02  # s between two samples of power
 
 
@@ -95,3 +102,35 @@ def test_without_signs_or_power_nothing_shows(true: RecordingSimulation) -> None
     assert window_of(evolve(averaged, channels=speeds)) is None
     still = _measured(true, lambda value: 0.0 * value)
     assert window_of(still) is None
+
+
+class _Mean:
+    """Currents that are averaged over the last samples of each topic."""
+
+    def __init__(self, samples: int) -> None:
+        self._samples = samples
+        self._last: dict[str, deque[float]] = {}
+
+    def __call__(self, topic: str, message: Any) -> Any:
+        if topic.endswith(("/power", "battery_state")):
+            last = self._last.setdefault(topic, deque(maxlen=self._samples))
+            last.append(message.current)
+            message.current = sum(last) / len(last)
+        return message
+
+
+def test_what_is_found_is_taken_and_said(tmp_path: Path) -> None:
+    mean, averaged = _Mean(20), tmp_path / "averaged"
+    with open_recording(SQUARE) as recording, RecordingWriter(averaged) as writer:
+        for topic, type_name, message, receive_ns in recording.messages():
+            writer.write(topic, type_name, mean(topic, message), receive_ns)
+    ready = prepared(Request("reference", (averaged,)))
+    assert ready.robot.sensors.power_window == pytest.approx(0.39, abs=0.03)
+    assert ready.base.values[WINDOW] == ready.robot.sensors.power_window
+    (said,) = (note for note in ready.notes if WINDOW in note)
+    assert said.startswith("what power sensors say is averaged over 0.")
+    span = {float(item.span[0]) for item in ready.real[0].channels if item.kind == "power"}
+    assert span == {ready.robot.sensors.power_window}
+    plain = prepared(Request("reference", (SQUARE,)))
+    assert plain.robot.sensors.power_window == ROBOT.sensors.power_window
+    assert not any(WINDOW in note for note in plain.notes)
