@@ -207,36 +207,21 @@ def imu_in_degrees_and_g(topic: str, message: Any) -> Iterator[Part]:
     yield topic, message
 
 
-@_rewired
-def imu_upside_down(topic: str, message: Any) -> Iterator[Part]:
+def _imu_turned(
+    turned: Callable[[float, float, float], tuple[float, float, float]], topic: str, message: Any
+) -> Iterator[Part]:
     if topic.endswith("imu/data"):
         for values in (message.angular_velocity, message.linear_acceleration):
-            values.y, values.z = -values.y, -values.z
+            values.x, values.y, values.z = turned(values.x, values.y, values.z)
     yield topic, message
 
 
-@_rewired
-def imu_turned_to_the_left(topic: str, message: Any) -> Iterator[Part]:
-    if topic.endswith("imu/data"):
-        for values in (message.angular_velocity, message.linear_acceleration):
-            values.x, values.y = values.y, -values.x
-    yield topic, message
-
-
-@_rewired
-def imu_facing_backwards(topic: str, message: Any) -> Iterator[Part]:
-    if topic.endswith("imu/data"):
-        for values in (message.angular_velocity, message.linear_acceleration):
-            values.x, values.y = -values.x, -values.y
-    yield topic, message
-
-
-@_rewired
-def imu_on_its_side(topic: str, message: Any) -> Iterator[Part]:
-    if topic.endswith("imu/data"):
-        for values in (message.angular_velocity, message.linear_acceleration):
-            values.y, values.z = values.z, -values.y
-    yield topic, message
+REWIRED |= {
+    "imu upside down": partial(_imu_turned, lambda x, y, z: (x, -y, -z)),
+    "imu turned to the left": partial(_imu_turned, lambda x, y, z: (y, -x, z)),
+    "imu facing backwards": partial(_imu_turned, lambda x, y, z: (-x, -y, z)),
+    "imu on its side": partial(_imu_turned, lambda x, y, z: (x, z, -y)),
+}
 
 
 @_rewired

@@ -55,6 +55,24 @@ def test_one_that_is_as_described_has_no_mistake() -> None:
     assert imu_mistake(tilted, STRAIGHT) == ""
 
 
+@pytest.mark.parametrize("has_gyro", [True, False])
+def test_a_slope_is_none(has_gyro: bool) -> None:
+    """Up one of 12 degrees all the time: the wheels turn and accelerate along it."""
+    seen = felt()
+    if not has_gyro:
+        seen = evolve(seen, rate=np.full((300, 3), math.nan))
+    seen.force[:] += GRAVITY * np.array([math.sin(0.21), 0.0, math.cos(0.21) - 1.0])
+    assert imu_mistake(seen, STRAIGHT) == ""
+    turned = evolve(seen, rate=-seen.rate)
+    if has_gyro:
+        assert "the gyro of imu/data turns the other way" in str(imu_mistake(turned, STRAIGHT))
+    aside = rotation((0.0, 0.0, math.pi / 2.0))
+    across = evolve(seen, rate=seen.rate @ aside, force=seen.force @ aside)
+    assert named(imu_mistake(across, STRAIGHT)) == pytest.approx(
+        aside, abs=1e-3 if has_gyro else 0.3
+    )
+
+
 @pytest.mark.parametrize("turned", RIGHT_ANGLED, ids=str)
 def test_whichever_way_it_is_mounted_is_named(turned: Array) -> None:
     words = imu_mistake(felt(turned), STRAIGHT)

@@ -79,14 +79,16 @@ def imu_mistake(felt: Felt, rpy: Sequence[float]) -> str | None:
     if turning is None and not along:
         return None if is_upright else _OTHERWISE
     shown = [item for item in (up, turning, *along) if item is not None]
+    # What is a little off from upright may be a slope.
+    sure = [item for item in shown if item is not up or not is_upright]
     units = list(_units(up, turning, along))
-    off = math.acos(min(item.along(np.eye(3), 1.0) for item in shown))
+    off = math.acos(min(item.along(np.eye(3), 1.0) for item in sure))
     if off < _ALIKE:
         is_all = turning is not None or not np.isfinite(felt.rate).any()
         is_all &= bool(along) or not np.isfinite(felt.force).any()
         return "; ".join(units) if units or is_all else None
     is_clear = off > _SIGMAS * max(item.error for item in shown)
-    mounting = _mounting(shown, rpy) if is_clear else ""
+    mounting = _mounting(shown, shown if turning is None else sure, rpy) if is_clear else ""
     if not mounting and is_upright:
         return None
     return "; ".join([mounting or _OTHERWISE, *units])
@@ -161,7 +163,8 @@ def _is_whole(shown: Sequence[_Shown]) -> bool:
     return all(abs(math.log(size)) < _WHOLE for size in sizes)
 
 
-def _mounting(shown: Sequence[_Shown], rpy: Sequence[float]) -> str:
+def _mounting(shown: Sequence[_Shown], sure: Sequence[_Shown], rpy: Sequence[float]) -> str:
+    """What explains all that is shown; `sure`: what a rotation is taken from."""
     if not _is_whole(shown):
         return ""
     is_reversed = any(item.along(np.eye(3), 1.0) < 0.0 for item in shown)
@@ -170,7 +173,7 @@ def _mounting(shown: Sequence[_Shown], rpy: Sequence[float]) -> str:
             item.along(np.eye(3), turning if item.is_turning else force) > _FITS for item in shown
         ):
             return f"{seen}: {remedy}"
-    turned, is_known = _rotation(shown)
+    turned, is_known = _rotation(sure)
     if not is_known or any(item.along(turned, 1.0) < _FITS for item in shown):
         return ""
     roll, pitch, yaw = rpy_of(_squared(turned @ rotation(rpy)))
