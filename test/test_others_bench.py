@@ -69,8 +69,8 @@ def forward(base: ParameterisedRobot) -> RecordingSimulation:
         command=command,
         voltage=blank,
         total_voltage=blank[:, 0],
-        yaw_time=encoder_time,
-        yaw_rate=np.zeros(len(encoder_time)),
+        imu_time=encoder_time,
+        inertial=np.zeros((len(encoder_time), 6)),
     )
     return RecordingSimulation.of(recorded, robot, channels_of(recorded, robot))
 

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from tomr_reality_gap.alignment.channels import Channel
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
@@ -40,8 +39,7 @@ class _Drawn:
         [s]."""
         power = self.power
         if lag:
-            keep = np.exp(-self.period / lag)
-            power = lfilter([1.0 - keep], [1.0, -keep], power)
+            power = _lagging(power, self.period / lag)
         sums = np.concatenate([[0.0], np.cumsum(power) * self.period])
         edges = self.begin + self.period * np.arange(len(sums))
         end = self.channel.time - delay
@@ -74,6 +72,14 @@ def window_of(simulation: RecordingSimulation) -> float | None:
         return None
     fine = window * np.linspace(0.85, 1.15, 31)
     return round(float(least(fine, lambda item, one: item.left(one))[1]), _DIGITS)
+
+
+def _lagging(power: Array, share: float) -> Array:
+    """Through a first-order lag, so much of its time constant a period; from rest, (k,)."""
+    size = 2 * len(power)  # what is late does not come round to the start
+    kernel = -np.expm1(-share) * np.exp(-share * np.arange(len(power)))
+    found = np.fft.irfft(np.fft.rfft(power, size) * np.fft.rfft(kernel, size), size)
+    return np.asarray(found[: len(power)])
 
 
 def _drawn(simulation: RecordingSimulation) -> list[_Drawn]:
