@@ -11,7 +11,7 @@ from tomr_fault_diag.diagnosis.offline import diagnose
 from tomr_fault_diag.diagnosis.pipeline import Pipeline
 from tomr_fault_diag.diagnosis.settings import DiagnosisSettings
 from tomr_fault_diag.residuals.settings import BandSettings
-from tomr_power_model.recordings import open_recording
+from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import shipped_robot
 
 BAG = Path(__file__).resolve().parents[3] / "bags" / "square"
@@ -107,3 +107,18 @@ def test_the_accelerometer_is_seen_with_its_bands(healthy: Observed) -> None:
     assert (y.residual, y.modelled, y.unit, y.code) == (-0.7, 1.0, "m/s^2", -1)
     # 0.15 of 3 m/s^2, and 0.3 of the 1 m/s^2 by which it moved; along y the least.
     assert np.isclose([item.band for item in second], [0.75, 0.3]).all()
+
+
+def test_nothing_is_seen_by_an_imu_that_is_not_as_described(tmp_path: Path) -> None:
+    lying = tmp_path / "lying"
+    with open_recording(BAG) as recording, RecordingWriter(lying) as writer:
+        for topic, type_name, message, receive_ns in recording.messages():
+            if topic.endswith("imu/data"):
+                for values in (message.angular_velocity, message.linear_acceleration):
+                    values.y, values.z = values.z, -values.y
+            writer.write(topic, type_name, message, receive_ns)
+    robot, settings = shipped_robot("reference"), DiagnosisSettings.of({}, "")
+    found = observe(lying, "lying", robot, settings)
+    assert np.isnan(found.yaw).all()
+    assert np.isnan(found.along).all()
+    assert np.isfinite(found.residual).any()

@@ -118,3 +118,15 @@ def test_ice_is_no_mistake(share: float) -> None:
 
     assert drive(watch, slides) == []
     assert watch.mistake == ""
+
+
+def test_driving_round_shows_it_as_well() -> None:
+    """At one speed: what it feels is that it turns."""
+    watch = MountingWatch(ROBOT)
+    for sample in range(1000):
+        time = 0.01 * sample
+        turning = math.sin(0.7 * time)
+        felt = turned(np.array([0.0, 0.0, turning, 0.0, 0.8 * turning, GRAVITY]))
+        watch.add(START + to_ns(time), felt.tolist())
+        watch.look(START + to_ns(time), np.array([0.8, 0.0, turning]))
+    assert watch.mistake.endswith("write robot.imu_rpy: [0, 0, 1.5708]")
