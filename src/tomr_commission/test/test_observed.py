@@ -110,15 +110,16 @@ def test_the_accelerometer_is_seen_with_its_bands(healthy: Observed) -> None:
 
 
 def test_nothing_is_seen_by_an_imu_that_is_not_as_described(tmp_path: Path) -> None:
-    lying = tmp_path / "lying"
-    with open_recording(BAG) as recording, RecordingWriter(lying) as writer:
+    """From the first on, though it was believed until it was seen."""
+    turned = tmp_path / "turned"
+    with open_recording(BAG) as recording, RecordingWriter(turned) as writer:
         for topic, type_name, message, receive_ns in recording.messages():
             if topic.endswith("imu/data"):
                 for values in (message.angular_velocity, message.linear_acceleration):
-                    values.y, values.z = values.z, -values.y
+                    values.x, values.y = -values.x, -values.y
             writer.write(topic, type_name, message, receive_ns)
     robot, settings = shipped_robot("reference"), DiagnosisSettings.of({}, "")
-    found = observe(lying, "lying", robot, settings)
+    found = observe(turned, "turned", robot, settings)
     assert np.isnan(found.yaw).all()
     assert np.isnan(found.along).all()
     assert np.isfinite(found.residual).any()

@@ -10,6 +10,7 @@ import pytest
 from odometry_drives import ROBOT, START, Recorded, contained, drive, ice, off, play
 
 from tomr_odometry.belief import Belief
+from tomr_odometry.estimator import SlipOdometry
 from tomr_odometry.settings import OdometrySettings
 from tomr_odometry.topics import estimate_messages
 
@@ -80,3 +81,10 @@ def test_the_pose_of_the_wheels_goes_on_where_the_robot_is() -> None:
     assert belief.pose == pytest.approx(
         (1.0 - 0.3 * math.sin(0.05), 2.5 + 0.3 * math.cos(0.05), math.pi / 2.0 + 0.1), abs=1e-3
     )
+
+
+def test_after_a_leap_the_wheels_go_on_where_the_robot_is() -> None:
+    core = SlipOdometry(ROBOT)
+    core._x[:3] = (1.0, 2.0, 0.5)
+    core._start_afresh(START)
+    assert core._belief.pose == pytest.approx((1.0, 2.0, 0.5))
