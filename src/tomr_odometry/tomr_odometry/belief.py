@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomr_odometry.stuck import StuckImu
+from tomr_power_model.drive.mounting import MountingWatch
 from tomr_power_model.geometry.poses import moved
-from tomr_power_model.model.mounting import MountingWatch
 from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]

@@ -8,7 +8,6 @@ import pytest
 from attrs import evolve
 
 from tomr_power_model.drive.clean import check_duration, cleaned
-from tomr_power_model.drive.inertial import felt_in
 from tomr_power_model.drive.motion import wheel_motion
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
@@ -120,12 +119,3 @@ def test_one_that_is_not_is_left_out_and_noted(drive: Drive) -> None:
     )
     assert len(found.imu_time) == len(found.yaw_rate) == 0
     assert len(found.power) == len(drive.power)
-
-
-def test_what_the_wheels_show_is_what_an_imu_feels(drive: Drive) -> None:
-    """In curves as well."""
-    felt = felt_in(with_imu(drive, (0.0, 0.0, 0.0)), ROBOT)
-    known = np.isfinite(felt.force).all(axis=1) & np.isfinite(felt.acceleration).all(axis=1)
-    off = felt.force[known, :2] - felt.acceleration[known]
-    assert np.sqrt(np.mean(off**2)) < 0.05
-    assert len(off) > 200

@@ -15,10 +15,10 @@ from tomr_fault_diag.residuals.frame import (
 )
 from tomr_fault_diag.residuals.gyro import GyroWatch
 from tomr_fault_diag.residuals.settings import BandSettings
+from tomr_power_model.drive.mounting import MountingWatch
 from tomr_power_model.messages.intake import Triple
 from tomr_power_model.model.continuity import POWER_TOLERANCE, Continuity
 from tomr_power_model.model.input_health import InputState
-from tomr_power_model.model.mounting import MountingWatch
 from tomr_power_model.model.ticks import Arrival
 from tomr_power_model.robot import Robot
 

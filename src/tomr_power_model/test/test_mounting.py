@@ -8,8 +8,8 @@ import pytest
 from attrs import evolve
 from numpy.typing import NDArray
 
+from tomr_power_model.drive.mounting import MountingWatch
 from tomr_power_model.messages.inertial import rotation
-from tomr_power_model.model.mounting import MountingWatch
 from tomr_power_model.model.ticks import to_ns
 from tomr_power_model.robot import GRAVITY, shipped_robot
 

@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tomr_power_model.drive.imu_mistakes import Felt, imu_mistake
-from tomr_power_model.model.ticks import to_ns
+from tomr_power_model.messages.plain import NANOSECONDS
 from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
 
-_SLOT = to_ns(0.1)  # over which what is measured is averaged
-_LONGEST = to_ns(0.3)  # of a slot: the wheels were not known in between
-_EVERY = to_ns(1.0)  # between two looks
+SLOT = NANOSECONDS // 10  # over which what is measured is averaged
+_LONGEST = 3 * SLOT  # the wheels were not known in between
+_EVERY = NANOSECONDS  # between two looks
 _KEPT = 600  # slots of driving
 _MOVES = 0.02  # m/s, rad/s
 _MOST = 1024  # samples, should nobody look
@@ -48,7 +48,7 @@ class MountingWatch:
     def look(self, stamp_ns: int, twist: Array) -> bool:
         """Hold what was measured against the twist that the wheels show at a time [m/s, m/s,
         rad/s], (3,), NaN where unknown; returns whether a mistake is found now."""
-        if self._before is not None and 0 <= stamp_ns - self._before[0] < _SLOT:
+        if self._before is not None and 0 <= stamp_ns - self._before[0] < SLOT:
             return False
         before, self._before = self._before, (stamp_ns, np.array(twist))
         if before is not None and 0 < stamp_ns - before[0] < _LONGEST:
