@@ -15,6 +15,7 @@ from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
 from tomr_reality_gap.alignment.simulation import RecordingSimulation
+from tomr_reality_gap.fit import window
 from tomr_reality_gap.fit.window import WINDOW, window_of
 from tomr_reality_gap.prepared import prepared
 from tomr_reality_gap.request import Request
@@ -79,6 +80,15 @@ def test_averages_are_found(true: RecordingSimulation, samples: int) -> None:
     assert window_of(noisy) == pytest.approx(found, abs=0.02)
 
 
+def test_no_window_is_longer_than_any_that_was_tried(
+    true: RecordingSimulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The longest is what a description may have: 1 s, here 0.4."""
+    assert window._TRIED[-1] == 1.0
+    monkeypatch.setattr(window, "_TRIED", tuple(np.geomspace(0.02, 0.4, 16)))
+    assert window_of(_measured(true, _mean_of(21))) == 0.4
+
+
 @pytest.mark.parametrize(
     "sensor", [_late_by(10), _lagging(0.1), _lagging(0.3)], ids=["late", "lags", "lags long"]
 )
@@ -131,6 +141,12 @@ def test_what_is_found_is_taken_and_said(tmp_path: Path) -> None:
     assert said.startswith("what power sensors say is averaged over 0.")
     span = {float(item.span[0]) for item in ready.real[0].channels if item.kind == "power"}
     assert span == {ready.robot.sensors.power_window}
+    # The user's simulation has the sensors that are described.
+    given = prepared(Request("reference", (averaged,), sim=SQUARE))
+    (simulated,) = given.simulations
+    assert {float(item.span[0]) for item in simulated.channels if item.kind == "power"} == {
+        ROBOT.sensors.power_window
+    }
     plain = prepared(Request("reference", (SQUARE,)))
     assert plain.robot.sensors.power_window == ROBOT.sensors.power_window
     assert not any(WINDOW in note for note in plain.notes)

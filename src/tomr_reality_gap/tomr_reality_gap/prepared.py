@@ -68,15 +68,16 @@ def prepared(request: Request) -> Prepared:
     sim = _read_all((request.sim,), request, robot) if request.sim else ()
     _check_same_commands(real, sim)
     values[INTEGRATOR] = integrator_of(_simulation((*sim, *real)[0], robot))
-    robot = robot_from_parameters(values, place)
+    described = robot = robot_from_parameters(values, place)
     window = window_of(_simulation(real[0], robot))
     if window is not None:
         values[WINDOW] = window
         robot = robot_from_parameters(values, place)
     base = per_wheel(values, robot.wheel_names, place)
-    recordings, held_out, simulations = (
-        tuple(_simulation(item, robot) for item in group) for group in (real, held, sim)
+    recordings, held_out = (
+        tuple(_simulation(item, robot) for item in group) for group in (real, held)
     )
+    simulations = tuple(_simulation(item, described) for item in sim)  # whose sensors are so
     runs = tuple(item.run(base.robot) for item in recordings)
     for item, run in zip(recordings, runs, strict=True):
         for found in (not_following, other_radii):

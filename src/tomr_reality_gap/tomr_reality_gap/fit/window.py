@@ -70,7 +70,7 @@ def window_of(simulation: RecordingSimulation) -> float | None:
     lagging, _ = least(_TRIED, lambda item, one: item.left(given, lag=one))
     if averaged > _BETTER * described or averaged > _CLEARER * min(late, lagging):
         return None
-    fine = window * np.linspace(0.85, 1.15, 31)
+    fine = np.minimum(window * np.linspace(0.85, 1.15, 31), _TRIED[-1])
     return round(float(least(fine, lambda item, one: item.left(one))[1]), _DIGITS)
 
 
