@@ -11,7 +11,6 @@ from tomr_power_model.messages.intake import header_stamp_ns
 from tomr_power_model.messages.plain import NANOSECONDS
 
 _APART = NANOSECONDS  # stamps of two inputs that have no time in common
-_PAUSE = NANOSECONDS // 2
 _FEW = 5  # commands
 _OUT_OF_STEP = 0.1  # s, between commands and encoders, of which diagnoses suffer
 
@@ -26,7 +25,7 @@ class Stream:
     first_ns: int = 0  # receive stamps
     last_ns: int = 0
     silence_ns: int = 0  # longest time without a message
-    pauses: int = 0  # times without one that are longer than commands are usually held
+    pauses: int = 0  # times without one in which a command would end
 
     @property
     def stamps_ns(self) -> tuple[int, int] | None:
@@ -46,8 +45,9 @@ class Stream:
 
 @define
 class Heard:
-    """All inputs of a recording."""
+    """All inputs of a recording, in which commands end after a timeout [ns]; 0: they do not."""
 
+    timeout_ns: int = 0
     streams: dict[str, Stream] = field(factory=dict)
 
     def note(self, topic: str, message: Any, receive_ns: int) -> None:
@@ -60,7 +60,7 @@ class Heard:
         silence = receive_ns - stream.last_ns
         if silence > stream.silence_ns:
             stream.silence_ns = silence
-        stream.pauses += silence > _PAUSE
+        stream.pauses += 0 < self.timeout_ns < silence
         stream.last_ns = receive_ns
         stream.last = message
 
@@ -133,17 +133,14 @@ def _commands_out_of_step(heard: Heard) -> str:
     )
 
 
-def rare_commands(heard: Heard, timeout_s: float) -> str:
-    """What to see to where commands come on a change only, and end after a timeout; empty where
-    they do not."""
+def rare_commands(heard: Heard) -> str:
+    """What to see to where most commands end before the next comes; empty where they do not."""
     commands = heard.streams.get("cmd_vel")
-    if commands is None or not timeout_s or commands.count < _FEW:
-        return ""
-    if 2 * commands.pauses < commands.count:
+    if commands is None or commands.count < _FEW or 2 * commands.pauses < commands.count:
         return ""
     return (
-        f"cmd_vel mostly pauses for longer than {1e-9 * _PAUSE:g} s between two messages, and a "
-        f"command is taken to end after command_timeout = {timeout_s:g} s: set "
+        "cmd_vel mostly pauses for longer than "
+        f"command_timeout = {1e-9 * heard.timeout_ns:g} s, after which a command ends: set "
         "command_timeout: 0 if this robot holds each until the next"
     )
 

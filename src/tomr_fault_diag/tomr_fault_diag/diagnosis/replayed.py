@@ -127,7 +127,7 @@ def replay_one(task: Task, progress: Progress | None = None) -> Replayed:
         _Listener(Pipeline(robot, task.settings.at_phase(share)), task.page is not None)
         for share in shares
     ]
-    heard = Heard()
+    heard = Heard(task.settings.model.command_timeout)
     with open_recording(task.bag) as recording:
         _run(recording, task, listeners, heard, progress)
         warning, start_ns, end_ns = recording.warning, recording.start_ns, recording.end_ns
@@ -139,8 +139,7 @@ def replay_one(task: Task, progress: Progress | None = None) -> Replayed:
     if not any(phase.summary.is_decided(lacking) for phase in phases):
         wanted = [item.topic for item in first.inputs]
         undecided = why_undecided(heard, wanted, complaints, phases[0].summary)
-    rare = rare_commands(heard, 1e-9 * task.settings.model.command_timeout)
-    said = warning, _outdated(task, robot), *first.misdescribed(), rare
+    said = warning, _outdated(task, robot), *first.misdescribed(), rare_commands(heard)
     notes = tuple(filter(None, (*said, "" if undecided else clocks)))
     for stream in heard.streams.values():
         stream.first = stream.last = None  # messages need not travel between processes
