@@ -9,7 +9,6 @@ from attrs import evolve
 from tomr_fault_diag.residuals.frame import (
     IMU_MISTAKEN,
     RESIDUALS,
-    UNKNOWN_FORCE,
     Residual,
     ResidualFrame,
 )
@@ -66,4 +65,3 @@ def test_one_that_is_not_is_left_out_and_why_is_said(turned: float) -> None:
     assert "is mounted otherwise than described: write robot.imu_rpy: [0, 0, " in words
     # Wheels that are not as described show no IMU.
     assert said(watch, "the order of the wheels is wrong") == (Level.OK, "as it should be")
-    assert UNKNOWN_FORCE.missing != IMU_MISTAKEN

@@ -1,4 +1,7 @@
-"""What an IMU's messages say in base_link, however it is mounted."""
+"""What an IMU's messages say in base_link, however it is mounted.
+
+Nodes run without scipy, which has rotations as well: two functions of it are here.
+"""
 
 import math
 from collections.abc import Sequence
