@@ -20,6 +20,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
 import yaml
 from pool import each
 
@@ -107,64 +108,32 @@ def _rewired(
 
 
 @_rewired
-def one_encoder_counts_backwards(topic: str, message: Any) -> Iterator[Part]:
-    if topic.endswith("joint_states"):
-        message.position = message.position * [1.0, -1.0, 1.0]
-        message.velocity = message.velocity * [1.0, -1.0, 1.0]
-    yield topic, message
-
-
-@_rewired
-def all_encoders_count_backwards(topic: str, message: Any) -> Iterator[Part]:
-    if topic.endswith("joint_states"):
-        message.position = -message.position
-        message.velocity = -message.velocity
-    yield topic, message
-
-
-@_rewired
 def wheels_in_another_order(topic: str, message: Any) -> Iterator[Part]:
     if topic.endswith("joint_states"):
         message.name = [*message.name[1:], message.name[0]]
     yield topic, message
 
 
-@_rewired
-def encoders_count_on_shafts_of_motors(topic: str, message: Any) -> Iterator[Part]:
+def _wheels_times(angles: Any, speeds: Any, topic: str, message: Any) -> Iterator[Part]:
+    """Encoders that show so many times as much; no angles where there is no factor."""
     if topic.endswith("joint_states"):
-        message.position = message.position * 15.0
-        message.velocity = message.velocity * 15.0
+        position = message.position
+        message.position = position[:0] if angles is None else position * angles
+        message.velocity = message.velocity * speeds
     yield topic, message
 
 
-@_rewired
-def speeds_alone_in_revolutions_per_minute(topic: str, message: Any) -> Iterator[Part]:
-    if topic.endswith("joint_states"):
-        message.position = message.position[:0]
-        message.velocity = message.velocity * (30.0 / math.pi)
-    yield topic, message
-
-
-@_rewired
-def speeds_in_revolutions_per_minute_beside_angles(topic: str, message: Any) -> Iterator[Part]:
-    if topic.endswith("joint_states"):
-        message.velocity = message.velocity * (30.0 / math.pi)
-    yield topic, message
-
-
-@_rewired
-def angles_and_speeds_in_degrees(topic: str, message: Any) -> Iterator[Part]:
-    if topic.endswith("joint_states"):
-        message.position = message.position * (180.0 / math.pi)
-        message.velocity = message.velocity * (180.0 / math.pi)
-    yield topic, message
-
-
-@_rewired
-def angles_in_revolutions(topic: str, message: Any) -> Iterator[Part]:
-    if topic.endswith("joint_states"):
-        message.position = message.position * (0.5 / math.pi)
-    yield topic, message
+_BACKWARDS, _DEGREES, _RPM = np.array([1.0, -1.0, 1.0]), 180.0 / math.pi, 30.0 / math.pi
+_GEAR, _TURNS = 15.0, 0.5 / math.pi
+REWIRED |= {
+    "one encoder counts backwards": partial(_wheels_times, _BACKWARDS, _BACKWARDS),
+    "all encoders count backwards": partial(_wheels_times, -1.0, -1.0),
+    "encoders count on shafts of motors": partial(_wheels_times, _GEAR, _GEAR),
+    "speeds alone in revolutions per minute": partial(_wheels_times, None, _RPM),
+    "speeds in revolutions per minute beside angles": partial(_wheels_times, 1.0, _RPM),
+    "angles and speeds in degrees": partial(_wheels_times, _DEGREES, _DEGREES),
+    "angles in revolutions": partial(_wheels_times, _TURNS, 1.0),
+}
 
 
 @_rewired
@@ -200,7 +169,7 @@ def gyro_turns_the_other_way(topic: str, message: Any) -> Iterator[Part]:
 def imu_in_degrees_and_g(topic: str, message: Any) -> Iterator[Part]:
     if topic.endswith("imu/data"):
         for values, unit in (
-            (message.angular_velocity, math.pi / 180.0),
+            (message.angular_velocity, 1.0 / _DEGREES),
             (message.linear_acceleration, 9.80665),
         ):
             values.x, values.y, values.z = values.x / unit, values.y / unit, values.z / unit

@@ -1,7 +1,7 @@
 """Drives as other sensors would have recorded them: how much do these matter?"""
 
-from collections import Counter
-from collections.abc import Callable
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from attrs import frozen
 from tomr_power_model.recordings import RecordingWriter, open_recording
 
 _LOST = 0.02
+_AVERAGED = 25  # samples
 _CURRENT, _NOISE, _VOLTAGE = 0.1, 0.03, 0.1  # A, A, V
 Random = np.random.Generator
 
@@ -23,6 +24,7 @@ class Message:
     topic: str
     content: Any
     number: int
+    lately: Sequence[float] = ()  # currents of the last samples on it, and of this one [A]
 
     @property
     def is_encoder(self) -> bool:
@@ -61,6 +63,14 @@ def encoders_20_hz(message: Message, _: Random) -> bool:
 def encoders_10_hz(message: Message, _: Random) -> bool:
     """Encoders at 10 Hz: every tenth message that came."""
     return not message.is_encoder or message.number % 10 == 0
+
+
+@_sensors
+def averaging(message: Message, _: Random) -> bool:
+    """Sensors of power that average over 25 samples, half a second."""
+    if message.is_power:
+        message.content.current = sum(message.lately) / len(message.lately)
+    return True
 
 
 @_sensors
@@ -132,10 +142,14 @@ def record(bag: Path, kind: str, new: Path) -> None:
     if new.exists():
         return
     change, seen = SENSORS[kind], Counter[str]()
+    currents: dict[str, deque[float]] = {}
     random = np.random.default_rng(5)
     with open_recording(bag) as recording, RecordingWriter(new) as writer:
         for topic, type_name, content, receive_ns in recording.messages():
-            if change(Message(topic, content, seen[topic]), random):
+            lately = currents.setdefault(topic, deque(maxlen=_AVERAGED))
+            if hasattr(content, "current"):
+                lately.append(content.current)
+            if change(Message(topic, content, seen[topic], tuple(lately)), random):
                 writer.write(topic, type_name, content, receive_ns)
             seen[topic] += 1
 

@@ -33,6 +33,7 @@ _SENSORS = (
     "slow",
     "encoders-20-hz",
     "encoders-10-hz",
+    "averaging",
     "coarse-currents",
     "coarse-everywhere",
     "motor-encoders",
