@@ -59,8 +59,10 @@ def ice(begin: float, end: float) -> Event:
     return Event("floor_slippery", begin, end, (("severity", 0.95),))
 
 
-def drive(*events: Event, moving_from: float = 1.0, length: float = 9.0) -> Recorded:
-    """Forth until 4 s and back until 8 s, a tenth of it to the side."""
+def drive(
+    *events: Event, moving_from: float = 1.0, length: float = 9.0, turning: float = 0.0
+) -> Recorded:
+    """Forth until 4 s and back until 8 s, a tenth of it to the side, `turning` so many rad a m."""
     simulation, found, truth = Simulation(ROBOT, 3, start_ns=START), [], []
     for count in range(round(20.0 * length)):
         time = 0.05 * count
@@ -71,8 +73,8 @@ def drive(*events: Event, moving_from: float = 1.0, length: float = 9.0) -> Reco
             if abs(time - event.end) < 1e-6:
                 simulation.set_fault(event.fault, severity=0.0)
         speed = 0.5 if moving_from <= time < 4.0 else -0.3 if 4.0 < time < 8.0 else 0.0
-        sample = command_sample(stamp, speed, 0.1 * speed, 0.0)
-        simulation.command(speed, 0.1 * speed, 0.0, stamp_ns=stamp)
+        sample = command_sample(stamp, speed, 0.1 * speed, turning * speed)
+        simulation.command(speed, 0.1 * speed, turning * speed, stamp_ns=stamp)
         found.append((time, sample.topic, to_bag(sample.message)))
         for item in simulation.step_to(stamp + 50_000_000):
             message, seconds = to_bag(item.message), 1e-9 * (item.stamp_ns - START)

@@ -62,6 +62,21 @@ def test_one_that_is_mounted_otherwise_is_left_out(gripping: Recorded, change: C
     assert [status.fields["message"] for status in report.fields["status"]] == [words]
 
 
+def in_degrees(message: Any) -> None:
+    message.angular_velocity.z *= 180.0 / math.pi
+
+
+def test_nothing_of_one_that_is_left_out_moves_the_robot_on() -> None:
+    """Nor do samples that came before that was known and had not been used yet."""
+    round_about = drive(turning=2.0)
+    items = list(play(round_about, changed(in_degrees)))
+    found = [item for item in items if "imu/data" in item.missing]
+    assert "degrees per second" in found[-1].words
+    assert max(abs(item.twist[2]) for item in found) < 1.2  # 1 rad/s is asked for
+    assert off(round_about, items[-1]) < 0.02
+    assert items[-1].pose[2] == pytest.approx(round_about.pose[-1, 2], abs=0.02)
+
+
 def test_ice_does_not_make_an_imu_wrong() -> None:
     slippery = drive(ice(1.5, 8.0))
     items = list(play(slippery))

@@ -225,6 +225,7 @@ class SlipOdometry:
         for place, off in enumerate(was[: WZ + 1] - self._x[: WZ + 1]):
             self._P[place, place] += off**2
         self._heard["imu"] -= _FRESH_NS
+        self._inertial = []  # not what came since the last step, either
         self._is_aided = False
 
     def _step(self, time: int, ways: Array) -> None:
