@@ -3,7 +3,7 @@
     .venv/bin/python bench/descriptions.py BAG... --robot robot.yaml
         [--live | --wrong | --rewired | --odometry]
 
-Counts the recordings in which `other_radii` finds something as described; with --live those in
+Counts the recordings that show other radii or another ramp than described; with --live those in
 which `inputs: robot.yaml` ever warns, or the IMU is said to be otherwise.
 --wrong diagnoses the first with one value off at a time, --rewired as a robot that is wired or
 reports otherwise would have recorded it; both say what is named and noted then. --odometry asks
@@ -33,8 +33,8 @@ from tomr_odometry.offline import estimates
 from tomr_odometry.settings import OdometrySettings
 from tomr_power_model.calibration.following import expected_speed
 from tomr_power_model.cli import EXIT_OK, run_main
+from tomr_power_model.drive.astray import other_radii, other_ramp
 from tomr_power_model.drive.clean import cleaned
-from tomr_power_model.drive.quality import other_radii
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.errors import InputError
 from tomr_power_model.messages.bag import bag_header, bag_message
@@ -49,11 +49,14 @@ from tomr_power_model.topics.inputs import Complaints
 # By how much each value is off: factors, but of the offset radians.
 WRONG: Sequence[Mapping[str, float]] = (
     {},
-    {"wheel_radius": 1.03},
-    {"wheel_radius": 1.08},
-    {"robot_radius": 1.08},
-    {"wheel_offset": 0.0349},
-    {"wheel_radius": 1.08, "robot_radius": 0.967},
+    {"robot.wheel_radius": 1.03},
+    {"robot.wheel_radius": 1.08},
+    {"robot.robot_radius": 1.08},
+    {"robot.wheel_offset": 0.0349},
+    {"robot.wheel_radius": 1.08, "robot.robot_radius": 0.967},
+    {"controller.acceleration_limit": 0.0},
+    {"controller.acceleration_limit": 0.5},
+    {"controller.acceleration_limit": 2.0},
 )
 
 
@@ -65,7 +68,10 @@ def found(bag: Path, robot: str) -> str | None:
     except InputError:
         return None
     time, expected = expected_speed(drive, described)
-    return "; ".join(map(str, other_radii(drive, described, time, expected)))
+    checks = (other_ramp, other_radii)
+    return "; ".join(
+        str(item) for check in checks for item in check(drive, described, time, expected)
+    )
 
 
 def warned(bag: Path, robot: str) -> str | None:
@@ -89,8 +95,9 @@ def warned(bag: Path, robot: str) -> str | None:
 def changed(robot: str, wrong: Mapping[str, float], path: Path) -> str:
     """A file with a robot some of whose values are off."""
     tree: dict[str, Any] = yaml.safe_load(robot_file(robot).read_text(encoding="utf-8"))
-    values = tree["/**"]["ros__parameters"]["robot"]
-    for key, off in wrong.items():
+    for place, off in wrong.items():
+        group, key = place.split(".")
+        values = tree["/**"]["ros__parameters"][group]
         values[key] = values[key] + off if key == "wheel_offset" else values[key] * off
     path.write_text(yaml.safe_dump(tree), encoding="utf-8")
     return str(path)

@@ -11,7 +11,7 @@ from attrs import evolve
 from tomr_power_model.calibration.following import lost_wheels
 from tomr_power_model.drive.cut import measured_when, without
 from tomr_power_model.drive.excitation import check_excitation
-from tomr_power_model.drive.quality import Finding, not_following, refuse, sensor_faults
+from tomr_power_model.drive.quality import Finding, refuse, sensor_faults
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.errors import InputError
 from tomr_power_model.geometry.kinematics import twist_to_wheels
@@ -213,27 +213,6 @@ def test_one_speed_and_heading_show_nothing(make_drive: MakeDrive) -> None:
     with pytest.raises(InputError, match=r"tour: the wheels turn at one speed .* 100 % of the"):
         check_excitation([creep], ROBOT)
     check_excitation([creep, other], ROBOT)
-
-
-def test_wheels_are_held_against_any_expectation(make_drive: MakeDrive) -> None:
-    """A fifth of a second late is a slow loop, for an explanation to say; backwards is a fault."""
-    drive = make_drive(ROBOT, 1)
-    time = drive.encoder_time[::5]
-    expected = drive.velocity[::5]
-    assert list(not_following(drive, ROBOT, time, expected)) == []
-    late = np.roll(expected, 4, axis=0)
-    assert list(not_following(drive, ROBOT, time, late)) == []
-    found = list(not_following(drive, ROBOT, time, expected * np.array([1.0, -1.0, 1.0])))
-    assert {item.where for item in found} == {"wheel_2_joint"}
-    unknown = np.full_like(expected, np.nan)
-    assert list(not_following(drive, ROBOT, time, unknown)) == []
-    two = list(not_following(drive, ROBOT, time, expected * np.array([1.0, 0.2, 0.2])))
-    assert {item.where for item in two} == {"wheel_2_joint", "wheel_3_joint"}
-    late_now_and_then = np.where((time % 2.0 < 0.9)[:, None], 0.0, expected)
-    assert list(not_following(drive, ROBOT, time, late_now_and_then)) == []
-    (every,) = not_following(drive, ROBOT, time, 0.2 * expected)
-    assert every.where == "all wheels"
-    assert "controller.proportional" in every.remedy
 
 
 def test_readings_alike_on_either_side_of_a_gap_are_no_stuck_sensor(make_drive: MakeDrive) -> None:

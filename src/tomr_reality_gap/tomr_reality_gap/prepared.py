@@ -7,11 +7,12 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
+from tomr_power_model.drive.astray import not_following, other_radii
 from tomr_power_model.drive.clean import check_duration, cleaned
 from tomr_power_model.drive.commands import shift_between
 from tomr_power_model.drive.cut import names_of, without
 from tomr_power_model.drive.excitation import check_excitation
-from tomr_power_model.drive.quality import not_following, other_radii, refuse, sensor_faults
+from tomr_power_model.drive.quality import Finding, refuse, sensor_faults
 from tomr_power_model.drive.read import read_drive
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.effects.scales import Scales
@@ -22,6 +23,7 @@ from tomr_power_model.recordings import open_recording, resolve_topic
 from tomr_power_model.robot import Robot, read_description, robot_from_parameters
 from tomr_reality_gap.alignment.channels import DRAWN_KINDS, channels_of
 from tomr_reality_gap.alignment.motion import motion_in
+from tomr_reality_gap.alignment.response import answering, controller_alternatives
 from tomr_reality_gap.alignment.simulation import RecordingSimulation, Run
 from tomr_reality_gap.fit.integrator import INTEGRATOR, WAYS, summed_otherwise
 from tomr_reality_gap.fit.learnt import with_terms
@@ -79,9 +81,7 @@ def prepared(request: Request) -> Prepared:
     )
     simulations = tuple(_simulation(item, described) for item in sim)  # whose sensors are so
     runs = tuple(item.run(base.robot) for item in recordings)
-    for item, run in zip(recordings, runs, strict=True):
-        for found in (not_following, other_radii):
-            refuse(found(item.recorded, robot, item.timeline.middle, run.speed))
+    _check_commands(recordings, runs, robot)
     scales = _scales(recordings, runs, robot)
     discrepancy = discrepancy_torques(simulations, base.robot, scales.torque)
     notes = [note for item in (*real, *held) for note in item.notes]
@@ -208,6 +208,29 @@ def integrator_of(simulation: RecordingSimulation) -> str:
             if channel.kind == "speed":
                 errors[way] += float(np.mean(np.abs(channel.value - value[part])))
     return min(WAYS, key=errors.__getitem__)
+
+
+def _check_commands(
+    recordings: Sequence[RecordingSimulation], runs: Sequence[Run], robot: Robot
+) -> None:
+    """Wheels have to turn as commands make them, by drivers as described or as they show to be."""
+    found = _astray(recordings, runs)
+    if not found:
+        return
+    shown = controller_alternatives(recordings, robot)
+    if shown:
+        other = answering(robot, shown)
+        found = _astray(recordings, [item.run(other) for item in recordings])
+    refuse(found)
+
+
+def _astray(recordings: Sequence[RecordingSimulation], runs: Sequence[Run]) -> list[Finding]:
+    return [
+        found
+        for item, run in zip(recordings, runs, strict=True)
+        for check in (not_following, other_radii)
+        for found in check(item.recorded, item.robot, item.timeline.middle, run.speed)
+    ]
 
 
 def _check_same_commands(real: tuple[Drive, ...], sim: tuple[Drive, ...]) -> None:

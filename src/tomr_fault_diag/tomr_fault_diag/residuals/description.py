@@ -11,6 +11,7 @@ from tomr_fault_diag.residuals.frame import Residual, measured_speed
 from tomr_power_model.drive.exchanged import exchange_words, exchanged
 from tomr_power_model.drive.mistakes import gross_mistake
 from tomr_power_model.drive.radii import answer, misdescribed
+from tomr_power_model.drive.ramp import misdescribed_ramp, ramp_shown
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.messages.plain import Level
 from tomr_power_model.model.input_health import Remark
@@ -90,8 +91,13 @@ def _exchanged(driving: _Driving, robot: Robot) -> Said:
     return _NOTHING if order is None else exchange_words(order, robot)
 
 
+def _ramped(driving: _Driving, robot: Robot) -> Said:
+    found = ramp_shown(driving.time, driving.speed, driving.asked, robot)
+    return misdescribed_ramp(found, robot)
+
+
 # What no fault looks like: residuals mean nothing until it is mended.
-_GROSS: Sequence[Callable[[_Driving, Robot], Said]] = (_mistaken, _reversed, _exchanged)
+_GROSS: Sequence[Callable[[_Driving, Robot], Said]] = (_mistaken, _reversed, _exchanged, _ramped)
 
 
 def _sentence(said: Said) -> str:

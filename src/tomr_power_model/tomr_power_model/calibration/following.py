@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from tomr_power_model.drive.astray import otherwise_than_commanded
 from tomr_power_model.drive.motion import measured_speed
-from tomr_power_model.drive.quality import Finding, not_following, other_radii
+from tomr_power_model.drive.quality import Finding
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.geometry.kinematics import wheels_to_twist
 from tomr_power_model.model.commanded import CommandPath, CommandTiming, Seen
@@ -21,11 +22,10 @@ _TICK = 0.05  # s
 
 
 def lost_wheels(drive: Drive, robot: Robot) -> Iterator[Finding]:
-    """Wheels that do not turn as the commands make them, or by other radii."""
+    """Wheels that do not turn as the commands make them, or by other radii or another ramp."""
     if len(drive.command_time):
         time, expected = expected_speed(drive, robot)
-        yield from not_following(drive, robot, time, expected)
-        yield from other_radii(drive, robot, time, expected)
+        yield from otherwise_than_commanded(drive, robot, time, expected)
 
 
 def expected_speed(drive: Drive, robot: Robot) -> tuple[Array, Array]:

@@ -9,14 +9,12 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from tomr_power_model.drive.exchanged import draws_by, exchange_words, exchanged
 from tomr_power_model.drive.mistakes import gross_mistake
-from tomr_power_model.drive.motion import measured_speed, median_period, wheel_motion
+from tomr_power_model.drive.motion import measured_speed, median_period
 from tomr_power_model.drive.plausible import PowerLimits
 from tomr_power_model.drive.quantum import quantum_of
-from tomr_power_model.drive.radii import SPAN, answer, misdescribed
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.drive.sources import PowerReading
 from tomr_power_model.errors import InputError
@@ -32,12 +30,7 @@ _GAP = 5.0  # usual periods between two samples
 _CLIPPED_RUN, _CLIPPED_COUNT = 3, 6  # readings at one and the same peak
 _HIDDEN = 2.0  # quanta by which readings would pass the peak, were it no limit
 _FROZEN = 0.4  # s
-_SPAN = 0.1  # s, of the fit to the encoders
-_COMPARED = 0.4  # s, width of the bell over which a wheel's speed is held against its command
-_LOST = 1.5  # s: a wheel that does not follow for a shorter time may be slow
-_ASTRAY = 0.65  # rms difference over rms of what is expected or measured
-_NOTABLE = 1.5  # rad/s, rms of what is expected or measured
-_MOSTLY = 0.5  # of the time in which wheels turn: no fault, the description
+_NOTABLE = 1.5  # rad/s that a wheel is asked for
 _MUCH = 90.0  # percentile of what moving motors draw
 _CUT = "leave it out with --skip {name}={start:.1f}:{end:.1f}"
 
@@ -101,70 +94,6 @@ def sensor_faults(drive: Drive, robot: Robot) -> Iterator[Finding]:
         yield from check(drive, robot)
 
 
-def not_following(drive: Drive, robot: Robot, time: Array, expected: Array) -> Iterator[Finding]:
-    """Wheels that do not turn as the commands make them: a lost driver or encoder.
-
-    Args:
-        drive: the recording.
-        robot: its description.
-        time: evenly spaced [s], (n,).
-        expected: wheel speeds that a simulation gives then [rad/s], (n, 3), NaN where unknown.
-    """
-    if len(time) < 2:
-        return
-    motion = wheel_motion(drive.encoder_time, drive.position, drive.velocity, time, _SPAN)
-    known = np.isfinite(expected) & np.isfinite(motion.speed)
-    expected, speed = (np.where(known, values, 0.0) for values in (expected, motion.speed))
-    width = _COMPARED / median_period(time)
-    error = gaussian_filter1d((speed - expected) ** 2, width, axis=0)
-    level = gaussian_filter1d(np.maximum(expected**2, speed**2), width, axis=0)
-    notable = level > _NOTABLE**2
-    off = (error > _ASTRAY**2 * level) & notable
-    mostly = (off.sum(axis=0) > _MOSTLY * notable.sum(axis=0)).all()
-    found = list(_astray(drive, robot, time, off, (speed, expected)))
-    if mostly and {item.where for item in found} == set(robot.wheel_names):
-        found = [_other_controller(drive, time)]
-    yield from found
-
-
-def other_radii(drive: Drive, robot: Robot, time: Array, expected: Array) -> Iterator[Finding]:
-    """Other radii, or places of wheels, than the drivers go by; as `not_following`."""
-    if len(time) < 2:
-        return
-    motion = wheel_motion(drive.encoder_time, drive.position, drive.velocity, time, SPAN)
-    seen, remedy = misdescribed(answer(time, motion.speed, expected, robot), robot)
-    if seen:
-        yield Finding(drive.name, "all wheels", float(time[0]), float(time[-1]), seen, remedy)
-
-
-def _astray(
-    drive: Drive, robot: Robot, time: Array, off: Mask, speeds: tuple[Array, Array]
-) -> Iterator[Finding]:
-    """Each time that a wheel is `off` (n, 3); speeds: as measured and as expected, (n, 3)."""
-    for wheel, name in enumerate(robot.wheel_names):
-        for first, last in runs(off[:, wheel], time, _LOST, bridge=_COMPARED):
-            rows = slice(first, last + 1)
-            seen, wanted = (float(np.sqrt(np.mean(values[rows, wheel] ** 2))) for values in speeds)
-            what = (
-                f"it does not follow its command: it turns at {seen:.1f} rad/s rms, {wanted:.1f} "
-                "rad/s is expected: a fault, lost commands or another robot's description"
-            )
-            yield _found(drive, name, rows, time, what)
-
-
-def _other_controller(drive: Drive, time: Array) -> Finding:
-    return Finding(
-        drive.name,
-        "all wheels",
-        float(time[0]),
-        float(time[-1]),
-        "they turn otherwise than commanded for most of the drive",
-        "mend controller.proportional and controller.integral, which are per rad/s and rad of the "
-        "wheel (a gain at the motor times motor.gear_ratio), or motor.gear_ratio and "
-        "robot.wheel_radius; or it is another robot's description, or most commands are lost",
-    )
-
-
 def _geometry(item: Drive, robot: Robot) -> Iterator[Finding]:
     """Wheels that answer to other headings than their places in robot.yaml say."""
     if len(item.command_time) < 2:
@@ -226,7 +155,7 @@ def _frozen_encoder(item: Drive, robot: Robot) -> Iterator[Finding]:
             if drawn > idle + 0.5 * max(usual - idle, 1e-9) and drawn > 1.5 * idle:
                 unit = "A" if robot.measurement.quantity == "motor_current" else "W"
                 seen = f"its encoder stands still while it draws {drawn:.1f} {unit}"
-                yield _found(item, name, rows, time, seen)
+                yield found_in(item, name, rows, time, seen)
 
 
 def _stuck_power(item: Drive, robot: Robot) -> Iterator[Finding]:
@@ -247,7 +176,7 @@ def _stuck_power(item: Drive, robot: Robot) -> Iterator[Finding]:
             noisy = usual < 0.5 and np.median(np.abs(speed[rows])) > _MOVING
             if last - first + 1 >= _STUCK_COUNT and equal.all() and (changes or noisy):
                 seen = f"its power sensor repeats {reading[first]:.3g} while the wheel turns"
-                yield _found(item, name, rows, time, seen)
+                yield found_in(item, name, rows, time, seen)
 
 
 def _saturated_power(item: Drive, robot: Robot) -> Iterator[Finding]:
@@ -269,7 +198,7 @@ def _saturated_power(item: Drive, robot: Robot) -> Iterator[Finding]:
                     f"its power sensor is saturated: it never passes {top:.3g}, which it reads "
                     f"{np.count_nonzero(at_top)} times"
                 )
-                yield _found(item, name, rows, time, seen)
+                yield found_in(item, name, rows, time, seen)
 
 
 def _passes(time: Array, reading: Array, speed: Array, at_top: Mask, way: float) -> bool:
@@ -371,7 +300,8 @@ def _of_wheel(item: Drive, wheel: int) -> tuple[Array, Array, Array]:
     return time, item.reading[known, wheel], np.interp(time, item.encoder_time, speed)
 
 
-def _found(item: Drive, name: str, rows: slice, time: Array, seen: str) -> Finding:
+def found_in(item: Drive, name: str, rows: slice, time: Array, seen: str) -> Finding:
+    """What was found in some rows, which may be left out."""
     start, end = float(time[rows][0]), float(time[rows][-1])
     remedy = _CUT.format(name=item.name, start=max(0.0, start - 1.0), end=end + 1.0)
     return Finding(item.name, name, start, end, seen, f"{remedy}, or record it again")

@@ -1,4 +1,4 @@
-"""How the drivers answer to commands, from wheel speeds alone: how late, and with which loop."""
+"""How drivers answer to commands, from wheel speeds alone: how late, with which ramp and loop."""
 
 from collections.abc import Mapping, Sequence
 
@@ -6,6 +6,8 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
+from tomr_power_model.drive.motion import wheel_motion
+from tomr_power_model.drive.ramp import ramp_shown
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import Channel
@@ -14,12 +16,15 @@ from tomr_reality_gap.alignment.simulation import RecordingSimulation, predict_a
 Array = NDArray[np.float64]
 
 DELAY, INTEGRAL = "controller.delay", "controller.integral"
+ACCELERATION = "controller.acceleration_limit"
 
 _LATER = np.arange(-0.2, 0.41, 0.02)  # s, beyond the described delay
 _FINER = np.arange(-0.018, 0.019, 0.002)  # s, around the best of these
 _BELIEVED = 0.01  # s: what is less is known no better than stamps are
 _USUAL = 10.0  # 1/s, of an integral gain over the proportional one
 _GAIN = 50.0  # of log likelihood: what is called better
+_SPAN = 0.1  # s, of the fit to the encoders that shows a ramp
+_NEARER = np.arange(0.8, 1.26, 0.05)  # of the limit that it shows
 
 
 def controller_alternatives(
@@ -27,8 +32,9 @@ def controller_alternatives(
 ) -> Mapping[str, float]:
     """Values of the controller, by key, with which wheels turn much more as they were seen to.
 
-    Both are far off or right: a late command shows for as long as it is late, which no derivative
-    at the described delay shows; a loop without an integral leaves an error, with any none.
+    All are far off or right: a late command shows for as long as it is late, which no derivative
+    at the described delay shows; a loop without an integral leaves an error, with any none; a ramp
+    that is not described shows for as long as it takes.
     """
     seen = [
         evolve(item, channels=tuple(_early(c) for c in item.channels if c.kind == "speed"))
@@ -37,10 +43,15 @@ def controller_alternatives(
     if not any(item.channels for item in seen):
         return {}
     value = np.concatenate([c.value for item in seen for c in item.channels])
+    found = {}
+    limit = _ramp(seen, value, robot)
+    if limit is not None:
+        found[ACCELERATION] = limit
+        robot = answering(robot, found)
     proportional = robot.controller.proportional
     other = 0.0 if robot.controller.integral else _USUAL * proportional
     loops = {robot.controller.integral: robot}
-    loops[other] = evolve(robot, controller=evolve(robot.controller, integral=other))
+    loops[other] = answering(robot, {INTEGRAL: other})
     delays = _LATER[_LATER + robot.controller.delay >= 0.0]
     delays = np.concatenate([[0.0], delays[np.abs(delays) > 0.5 * _BELIEVED]])
     rows = {
@@ -49,7 +60,6 @@ def controller_alternatives(
     }
     likely = {integral: _likely(value, item).max() for integral, item in rows.items()}
     best = max(likely, key=lambda integral: float(likely[integral]))
-    found = {}
     if likely[best] > likely[robot.controller.integral] + _GAIN:
         found[INTEGRAL] = best
     answers = _answers(seen, value, rows[best])
@@ -60,6 +70,40 @@ def controller_alternatives(
         late = float(finer[np.argmax(_answers(seen, value, closer))])
         found[DELAY] = robot.controller.delay + late
     return found
+
+
+def answering(robot: Robot, alternatives: Mapping[str, float]) -> Robot:
+    """A robot whose drivers are as `controller_alternatives` has them."""
+    controller = robot.controller
+    return evolve(
+        robot,
+        controller=evolve(
+            controller,
+            acceleration_limit=alternatives.get(ACCELERATION, controller.acceleration_limit),
+            integral=alternatives.get(INTEGRAL, controller.integral),
+            delay=alternatives.get(DELAY, controller.delay),
+        ),
+    )
+
+
+def _ramp(seen: Sequence[RecordingSimulation], value: Array, robot: Robot) -> float | None:
+    """The limit with which wheels turn most as they were seen to."""
+    limits = [limit for item in seen if (limit := _ramp_in(item, robot)) is not None]
+    if not limits:
+        return None
+    tried = float(np.median(limits)) * _NEARER
+    others = [answering(robot, {ACCELERATION: float(limit)}) for limit in tried]
+    rows = predict_all(seen, [robot, *others])
+    described, *likely = _likely(value, rows)
+    best = int(np.argmax(likely))
+    return float(tried[best]) if likely[best] > described + _GAIN else None
+
+
+def _ramp_in(simulation: RecordingSimulation, robot: Robot) -> float | None:
+    """Limit of the acceleration [m/s^2] that a recording shows where it is none of the robot's."""
+    drive, time = simulation.recorded, simulation.timeline.middle
+    motion = wheel_motion(drive.encoder_time, drive.position, drive.velocity, time, _SPAN)
+    return ramp_shown(time, motion.speed, simulation.run(robot).speed, robot)
 
 
 def _answers(seen: Sequence[RecordingSimulation], value: Array, simulated: Array) -> Array:

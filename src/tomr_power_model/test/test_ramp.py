@@ -1,0 +1,125 @@
+"""Drivers that ramp what they are commanded otherwise than described."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from tomr_power_model.drive.ramp import misdescribed_ramp, ramp_shown
+from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.robot import Robot, shipped_robot
+
+ROBOT = shipped_robot("reference")
+Array = np.ndarray
+PERIOD = 0.05  # s
+
+
+def described(limit: float) -> Robot:
+    return evolve(ROBOT, controller=evolve(ROBOT.controller, acceleration_limit=limit))
+
+
+def legs(seconds: float = 60.0) -> tuple[Array, Array]:
+    """Times [s] and velocities that are commanded [m/s]: legs of 3 s in several directions."""
+    time = np.arange(0.0, seconds, PERIOD)
+    steps = np.array([0.5, -0.3 + 0.4j, -0.5j, 0.0, -0.4, 0.2 - 0.3j])
+    return time, steps[(time // 3.0).astype(int) % len(steps)]
+
+
+def ramped(velocity: Array, limit: float) -> Array:
+    """By a limit of the acceleration [m/s^2], 0: none; then lagged as by a loop."""
+    now, found = 0j, []
+    for wanted in velocity:
+        step = wanted - now
+        size = abs(step)
+        now += step * min(1.0, limit * PERIOD / size) if limit and size else step
+        found.append(now)
+    lagged = [found[0]]
+    for value in found[1:]:
+        lagged.append(lagged[-1] + 0.5 * (value - lagged[-1]))
+    return np.array(lagged)
+
+
+def wheels(velocity: Array, turned: float = 0.0) -> Array:
+    """Speeds of the wheels [rad/s], of velocities that are turned by an angle [rad]."""
+    turning = velocity * np.exp(1j * turned)
+    twist = np.column_stack([turning.real, turning.imag, np.zeros(len(velocity))])
+    return twist @ twist_to_wheels(ROBOT).T
+
+
+@pytest.mark.parametrize("turned", [0.0, np.pi / 3.0])
+@pytest.mark.parametrize(("limit", "true"), [(0.0, 1.0), (2.5, 1.0), (0.5, 1.0), (0.5, 0.3)])
+def test_the_limit_that_drivers_keep_to_is_what_to_write(
+    limit: float, true: float, turned: float
+) -> None:
+    time, commanded = legs()
+    measured = wheels(ramped(commanded, true), turned)
+    measured += 0.02 * np.random.default_rng(1).standard_normal(measured.shape)
+    expected = wheels(ramped(commanded, limit), turned)
+    found = ramp_shown(time, measured, expected, described(limit))
+    assert found == pytest.approx(true, rel=0.15)
+    seen, remedy = misdescribed_ramp(found, described(limit))
+    assert (f"{limit:g} is described" if limit else "no limit is described") in seen
+    assert remedy == f"write controller.acceleration_limit: {found:.2g}"
+
+
+def _late(commanded: Array) -> Array:
+    return np.roll(ramped(commanded, 1.0), 4)
+
+
+def _swings(commanded: Array) -> Array:
+    """A loop with other gains, that comes near slowly."""
+    slow = [0j]
+    for wanted in commanded:
+        slow.append(slow[-1] + 0.08 * (wanted - slow[-1]))
+    return np.array(slow[1:])
+
+
+def _half(commanded: Array) -> Array:
+    return 0.5 * ramped(commanded, 1.0)
+
+
+def _stops(commanded: Array) -> Array:
+    """Held for 1.5 s of every 3 s."""
+    held = np.arange(len(commanded)) % 60 < 30
+    return np.where(held, 0.0, ramped(commanded, 1.0))
+
+
+@pytest.mark.parametrize("change", [_late, _swings, _half, _stops])
+@pytest.mark.parametrize("limit", [1.0, 0.0])
+def test_what_else_makes_wheels_slow_is_no_ramp(
+    change: Callable[[Array], Array], limit: float
+) -> None:
+    time, commanded = legs()
+    expected = wheels(ramped(commanded, limit))
+    if limit == 0.0 and change is not _swings:
+        expected = wheels(ramped(commanded, 1.0))  # so are the drivers: what differs is the rest
+    assert ramp_shown(time, wheels(change(commanded)), expected, described(limit)) is None
+
+
+def test_as_described_nothing_is_said() -> None:
+    time, commanded = legs()
+    speeds = wheels(ramped(commanded, 1.0))
+    assert ramp_shown(time, speeds, speeds, described(1.0)) is None
+    unknown = np.full_like(speeds, np.nan)
+    assert ramp_shown(time, unknown, speeds, described(1.0)) is None
+    assert ramp_shown(time[:1], speeds[:1], speeds[:1], described(1.0)) is None
+    assert misdescribed_ramp(None, ROBOT) == ("", "")
+
+
+def test_moments_that_are_left_out_are_no_ramp() -> None:
+    """Ticks in which nothing is commanded are not looked at: what is before and after belongs
+    together as little as two drives."""
+    time, commanded = legs()
+    measured, expected = wheels(ramped(commanded, 1.0)), wheels(ramped(commanded, 0.0))
+    moving = np.abs(expected).max(axis=1) > 0.3
+    found = ramp_shown(time[moving], measured[moving], expected[moving], described(0.0))
+    assert found == pytest.approx(1.0, rel=0.15)
+
+
+def test_one_slow_start_is_not_enough() -> None:
+    """It may have been a fault, a kerb or a hand."""
+    time, commanded = legs(24.0)
+    measured, expected = wheels(ramped(commanded, 1.0)), wheels(ramped(commanded, 0.0))
+    measured[120:] = expected[120:]
+    assert ramp_shown(time, measured, expected, described(0.0)) is None

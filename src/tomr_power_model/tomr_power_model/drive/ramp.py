@@ -1,0 +1,113 @@
+"""Whether drivers ramp the velocity that is commanded as the description says.
+
+Where it has no ramp, or a steeper one, the measured velocity is the simulated one ramped once more;
+where it has a gentler one, the simulated velocity is the measured one ramped. No fault looks like
+that: a wheel that is weak, held or slides goes somewhere else, and not at one pace each time. Loops
+with other gains do come later or sooner, but as a lag does.
+"""
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tomr_power_model.drive.motion import median_period
+from tomr_power_model.geometry.kinematics import twist_to_wheels
+from tomr_power_model.robot import Robot
+
+Array = NDArray[np.float64]
+Plane = NDArray[np.complex128]  # velocities in the plane of the floor, x + i y
+
+_NOTABLE = 0.08  # of the root mean square speed, that the two differ by: healthy robots by 0.02
+_APART = 0.25  # of that speed: a sample in which the drivers ramp
+_TIMES = 5  # how often they have to
+_PACE = 90.0  # percentile of the acceleration meanwhile: much of it is the begin or the end
+_PARTS = (0.5, 0.6, 0.75, 1.0, 1.25)  # of the pace: wheels swing, without a ramp the most
+_LAGS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s
+_RAMPED = 0.45  # part of the difference that is left with a ramp
+_RATHER = 1.25  # times what is left with a lag: loops blur a ramp
+_LEAST = 0.03  # m/s^2
+
+
+def ramp_shown(time: Array, measured: Array, expected: Array, robot: Robot) -> float | None:
+    """Acceleration [m/s^2] that drivers keep to and the description does not; None where it does,
+    or where that does not show.
+
+    Args:
+        time: of samples, evenly spaced but for what is left out [s], (n,).
+        measured: wheel speeds then [rad/s], (n, 3), NaN where unknown.
+        expected: those of the description's simulation [rad/s], (n, 3), the same.
+        robot: the description.
+    """
+    to_twist = np.linalg.inv(twist_to_wheels(robot, nominal=True)).T
+    seen, asked = ((speeds @ to_twist)[:, :2] @ (1.0, 1.0j) for speeds in (measured, expected))
+    known = np.isfinite(seen) & np.isfinite(asked)
+    if np.count_nonzero(known) < 2:
+        return None
+    time, seen, asked = time[known], seen[known], asked[known]
+    off, size = np.abs(seen - asked), float(np.sqrt(np.mean(np.abs(asked) ** 2)))
+    apart = off > _APART * size
+    begins = np.count_nonzero(np.diff(apart.astype(int)) > 0)
+    if begins < _TIMES or np.mean(off**2) < (_NOTABLE * size) ** 2:
+        return None
+    period = median_period(time)
+    steps = np.diff(time)
+    goes_on = steps < 1.5 * period
+    pace = float(np.percentile((np.abs(np.diff(seen)) / steps)[apart[1:] & goes_on], _PACE))
+    if pace < _LEAST:
+        return None
+    limit = robot.controller.acceleration_limit
+    starts = [0, *(np.flatnonzero(~goes_on) + 1), len(time)]
+    stretches = [slice(first, last) for first, last in pairwise(starts)]
+    is_faster = 0.0 < limit < pace
+    fast, slow, usual = (seen, asked, limit) if is_faster else (asked, seen, pace)
+    ramps = [_ramp(part * usual * period) for part in _PARTS]
+    lags = [_lag(seconds / period) for seconds in _LAGS]
+    left = min(_left(fast, slow, stretches, follow) for follow in ramps)
+    if left > _RAMPED**2 * np.sum(off**2):
+        return None
+    lagged = min(_left(fast, slow, stretches, follow) for follow in lags)
+    return pace if left < _RATHER * lagged else None
+
+
+def _ramp(step: float) -> Callable[[complex], complex]:
+    """What of a change is done in a sample, by the most that a velocity changes in it [m/s]."""
+
+    def done(change: complex) -> complex:
+        length = abs(change)
+        return change if length <= step else change * (step / length)
+
+    return done
+
+
+def _lag(periods: float) -> Callable[[complex], complex]:
+    share = 1.0 / (1.0 + periods)
+    return lambda change: share * change
+
+
+def _left(
+    fast: Plane, slow: Plane, stretches: list[slice], follow: Callable[[complex], complex]
+) -> float:
+    """Sum of squares by which one velocity is not what follows the other, from the begin of each
+    stretch on."""
+    left = 0.0
+    for stretch in stretches:
+        wanted, there = fast[stretch].tolist(), slow[stretch].tolist()
+        now = there[0]
+        for goal, seen in zip(wanted[1:], there[1:], strict=True):
+            now += follow(goal - now)
+            left += abs(now - seen) ** 2
+    return left
+
+
+def misdescribed_ramp(found: float | None, robot: Robot) -> tuple[str, str]:
+    """What is seen where drivers ramp otherwise than described, and what to write; else empty."""
+    if found is None:
+        return "", ""
+    limit = robot.controller.acceleration_limit
+    described = f"{limit:g} is described" if limit else "no limit is described"
+    return (
+        f"the drivers let the velocity change by about {found:.2g} m/s^2, {described}",
+        f"write controller.acceleration_limit: {found:.2g}",
+    )
