@@ -15,12 +15,20 @@ ROWS = 400
 
 
 def _made(
-    *off: tuple[float, float, float], noise: float = 0.1, duration: float = 60.0
+    *off: tuple[float, float, float],
+    noise: float = 0.1,
+    duration: float = 60.0,
+    named: tuple[float, ...] = (),
 ) -> tuple[object, object]:
-    """A dataset whose recordings' robots are off by such shares of mass, constant and friction."""
+    """A dataset whose recordings' robots are off by such shares of mass, constant and friction.
+
+    `named`: how much of each recording's mass a finding explains beside its own tolerance.
+    """
     random = np.random.default_rng(2)
     parameters = tuple(Parameter(key, (key,), "", 0.01 * VALUES[key]) for key in KEYS)
     matrix = random.standard_normal((ROWS * len(off), 4))  # and one sensor nuisance
+    if named:
+        matrix = np.column_stack([matrix, np.repeat(named, ROWS) * matrix[:, 0]])
     offsets = np.repeat([[part / 0.01 for part in parts] for parts in off], ROWS, axis=0)
     value = (matrix[:, :3] * offsets).sum(axis=1) + noise * random.standard_normal(len(matrix))
     simulations = tuple(
@@ -34,7 +42,7 @@ def _made(
         matrix=matrix,
         nuisance=slice(0, 3),
         sensors=slice(3, 4),
-        kept=4,
+        kept=matrix.shape[1],
         own=(),
         value=np.zeros(len(matrix)),
         model=model,
@@ -72,3 +80,11 @@ def test_what_a_recording_hardly_shows_is_not_held_against_it() -> None:
 def test_short_drives_show_the_floor_under_them() -> None:
     """One straight each, in directions of their own."""
     check_same_robot(*_made((0.0, 0.0, 0.0), (0.3, 0.0, 0.0), duration=18.0))  # type: ignore[arg-type]
+
+
+def test_a_mass_that_is_found_wrong_takes_nothing_from_its_tolerance() -> None:
+    """Each recording would divide what it asks for between the two as it likes."""
+    named = (200.0, 1.0)  # the same, in other units, as the finding's response has it
+    check_same_robot(*_made((0.3, 0.0, 0.0), (0.3, 0.0, 0.0), named=named))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"robot\.mass that lie 30 % apart"):
+        check_same_robot(*_made((0.3, 0.0, 0.0), (0.0, 0.0, 0.0), named=named))  # type: ignore[arg-type]

@@ -19,6 +19,7 @@ _BEYOND = 10.0  # tolerances that a recording by itself may move a parameter
 _LONG = 30.0  # s: a short drive is one motion, and shows the floor under it, not the robot
 _APART = 0.15  # of a value: two recordings that differ more ...
 _SURE = 6.0  # ... by so many standard deviations are of different robots
+_SAME = 0.2  # of a finding's response that is none of these parameters': less is theirs
 
 
 @frozen
@@ -60,15 +61,30 @@ def _estimates(dataset: Dataset, last: Round, number: int) -> dict[str, _Estimat
     kept = jacobian.kept
     matrix = jacobian.matrix[rows, :kept].astype(np.float64)
     matrix[:, jacobian.nuisance] *= _BEYOND
+    values = jacobian.model.described.values
+    lasting = {
+        row: (item.keys[0], _BEYOND * item.prior_std / abs(value))
+        for row, item in enumerate(jacobian.model.nuisances)
+        if item.keys[0].endswith(_LASTING) and isinstance(value := values[item.keys[0]], float)
+    }
+    matrix[:, _doubles(matrix * weight[rows, None], [*lasting], jacobian.sensors.stop)] = 0.0
     residual = dataset.value[rows] - jacobian.value[rows]
     solution = solve(Gram.of(matrix, residual, weight[rows]), range(kept))
-    values = jacobian.model.described.values
-    found = {}
-    for row, parameter in enumerate(jacobian.model.nuisances):
-        key = parameter.keys[0]
-        value = values[key]
-        if key.endswith(_LASTING) and isinstance(value, float):
-            unit = _BEYOND * parameter.prior_std / abs(value)
-            deviation = float(np.sqrt(solution.covariance[row, row]))
-            found[key] = _Estimate(unit * float(solution.mean[row]), unit * deviation)
-    return found
+    return {
+        key: _Estimate(
+            unit * float(solution.mean[row]), unit * float(np.sqrt(solution.covariance[row, row]))
+        )
+        for row, (key, unit) in lasting.items()
+    }
+
+
+def _doubles(matrix: Array, lasting: list[int], first: int) -> list[int]:
+    """Columns from the first finding's on that respond as parameters that last do: a wrong mass and
+    the tolerance of the mass could be anything together, but for what they are in all."""
+    own = matrix[:, first:]
+    if not lasting or not own.size:
+        return []
+    theirs = matrix[:, lasting]
+    left = own - theirs @ np.linalg.lstsq(theirs, own, rcond=None)[0]
+    sizes = np.linalg.norm(own, axis=0)
+    return [int(first + at) for at in np.flatnonzero(np.linalg.norm(left, axis=0) < _SAME * sizes)]
