@@ -115,6 +115,35 @@ def test_gross_mistakes_are_named(matrix: np.ndarray, words: str) -> None:
     assert watch.words().startswith("wheels and commands: ")
 
 
+def _ramped(legs: np.ndarray, limit: float) -> np.ndarray:
+    """Twists every 5 ms by a limit of the acceleration [m/s^2], as means of 0.05 s."""
+    now, found = np.zeros(3), []
+    for wanted in np.repeat(legs, 10, axis=0):
+        step = wanted - now
+        now = now + step * min(1.0, 0.005 * limit / max(float(np.linalg.norm(step)), 1e-9))
+        found.append(now)
+    return np.reshape(found, (-1, 10, 3)).mean(axis=1)
+
+
+def test_a_ramp_that_is_not_described_is_named() -> None:
+    """The reference robot's description has 2 m/s^2; this one's drivers keep to 0.5."""
+    watch = DescriptionWatch(ROBOT, to_ns(0.05))
+    legs = np.array([LEGS[number // 60 % 2] for number in range(960)])  # ahead and aside
+    nothing = [Residual(math.nan, math.nan, math.nan, "rad/s")] * 3
+    asked, turns = (_ramped(legs, limit) @ DESCRIBED.T for limit in (2.0, 0.5))
+    for number, (models, speeds) in enumerate(zip(asked, turns, strict=True), start=1):
+        residuals = [
+            Residual(math.copysign(1.0, model) * (speed - model), 0.1, model, "rad/s")
+            for model, speed in zip(models, speeds, strict=True)
+        ]
+        watch.take(to_ns(0.05 * number), residuals, nothing)
+    remark = watch.remark()
+    assert remark.level is Level.WARN
+    assert "let the velocity change by about 0.5 m/s^2, 2 is described" in remark.message
+    assert ": write controller.acceleration_limit: 0.5, or" in remark.message
+    assert watch.mistake == remark.message
+
+
 @pytest.mark.parametrize("matrix", [DESCRIBED, DESCRIBED * [[1.0], [0.0], [1.0]]])
 def test_a_robot_as_described_and_one_with_a_dead_wheel_are_not_mistaken(
     matrix: np.ndarray,

@@ -11,10 +11,11 @@ from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot, shipped_robot
 from tomr_reality_gap.alignment.channels import channels_of
-from tomr_reality_gap.alignment.response import controller_alternatives
+from tomr_reality_gap.alignment.response import answering, controller_alternatives
 from tomr_reality_gap.alignment.simulation import RecordingSimulation, predict_all
 from tomr_reality_gap.explain import explain
 from tomr_reality_gap.explanation import Explanation
+from tomr_reality_gap.prepared import check_commands
 from tomr_reality_gap.request import Request
 from tomr_sim_bridge.importers.dataset import choose, default_dataset, import_files, open_dataset
 from tomr_sim_bridge.importers.robotino import Drive as RobotinoDrive
@@ -129,6 +130,27 @@ def test_delay_and_loop_are_seen_in_wheel_speeds(robotino: Robot, integral: floa
     found = controller_alternatives([wrong], wrong.robot)
     assert found["controller.integral"] == pytest.approx(integral)
     assert found["controller.delay"] == pytest.approx(0.1, abs=0.02)
+
+
+@pytest.mark.parametrize("described", [0.0, 0.8, 3.2])
+def test_another_ramp_is_seen_in_wheel_speeds(described: float) -> None:
+    """Whether none, a gentler or a steeper one is described; and such a drive is not refused."""
+    robot = shipped_robot("reference")
+    controller = evolve(robot.controller, acceleration_limit=1.6)
+    simulation = _forward(robot, np.concatenate([_to_and_fro(0.3, 0.6), _to_and_fro(1.9, 0.5)]))
+    value = simulation.predict([evolve(robot, controller=controller)])[0]
+    value = value + 0.05 * np.random.default_rng(1).standard_normal(len(value))
+    channels = as_recorded(simulation, value).channels
+    speeds = [channel.value for channel in channels if channel.kind == "speed"]
+    recorded = evolve(simulation.recorded, velocity=np.stack(speeds, axis=1))
+    other = evolve(robot, controller=evolve(controller, acceleration_limit=described))
+    made = RecordingSimulation.of(recorded, other, channels)
+    found = controller_alternatives([made], other)
+    assert found["controller.acceleration_limit"] == pytest.approx(1.6, rel=0.05)
+    assert answering(other, found).controller.acceleration_limit == pytest.approx(1.6, rel=0.05)
+    check_commands([made], [made.run(other)], other)
+    right = RecordingSimulation.of(recorded, evolve(robot, controller=controller), channels)
+    assert controller_alternatives([right], right.robot) == {}
 
 
 def _written(path: Path, robot: Robot, command: np.ndarray, seed: int) -> Path:

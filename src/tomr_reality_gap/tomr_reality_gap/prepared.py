@@ -81,7 +81,7 @@ def prepared(request: Request) -> Prepared:
     )
     simulations = tuple(_simulation(item, described) for item in sim)  # whose sensors are so
     runs = tuple(item.run(base.robot) for item in recordings)
-    _check_commands(recordings, runs, robot)
+    check_commands(recordings, runs, robot)
     scales = _scales(recordings, runs, robot)
     discrepancy = discrepancy_torques(simulations, base.robot, scales.torque)
     notes = [note for item in (*real, *held) for note in item.notes]
@@ -210,10 +210,11 @@ def integrator_of(simulation: RecordingSimulation) -> str:
     return min(WAYS, key=errors.__getitem__)
 
 
-def _check_commands(
+def check_commands(
     recordings: Sequence[RecordingSimulation], runs: Sequence[Run], robot: Robot
 ) -> None:
-    """Wheels have to turn as commands make them, by drivers as described or as they show to be."""
+    """Raise InputError where wheels do not turn as the commands make them, neither by drivers as
+    described nor as `controller_alternatives` has them, which is for an explanation to say."""
     found = _astray(recordings, runs)
     if not found:
         return

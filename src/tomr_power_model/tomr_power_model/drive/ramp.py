@@ -6,10 +6,11 @@ that: a wheel that is weak, held or slides goes somewhere else, and not at one p
 with other gains do come later or sooner, but as a lag does.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
+from attrs import frozen
 from numpy.typing import NDArray
 
 from tomr_power_model.drive.motion import median_period
@@ -17,6 +18,7 @@ from tomr_power_model.geometry.kinematics import twist_to_wheels
 from tomr_power_model.robot import Robot
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 Plane = NDArray[np.complex128]  # velocities in the plane of the floor, x + i y
 
 _NOTABLE = 0.08  # of the root mean square speed, that the two differ by: healthy robots by 0.02
@@ -28,6 +30,10 @@ _LAGS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s
 _RAMPED = 0.45  # part of the difference that is left with a ramp
 _RATHER = 1.25  # times what is left with a lag: loops blur a ramp
 _LEAST = 0.03  # m/s^2
+_BREAK = 1.5  # periods between two samples that do not go together
+_AROUND = 0.5  # s before and after a ramp, in which loops settle
+_SETTLED, _MUCH = 0.1, 0.5  # of that speed: how far apart the two are then; what a ramp changes
+_WHOLE = 3  # ramps that show how steep they are
 
 
 def ramp_shown(time: Array, measured: Array, expected: Array, robot: Robot) -> float | None:
@@ -40,35 +46,85 @@ def ramp_shown(time: Array, measured: Array, expected: Array, robot: Robot) -> f
         expected: those of the description's simulation [rad/s], (n, 3), the same.
         robot: the description.
     """
+    found = _velocities(time, measured, expected, robot)
+    if found is None:
+        return None
+    off, period, seen, asked = found.off, found.period, found.seen, found.asked
+    apart = off > _APART * found.size
+    begins = np.count_nonzero(np.diff(apart.astype(int)) > 0)
+    if begins < _TIMES or np.mean(off**2) < (_NOTABLE * found.size) ** 2:
+        return None
+    steps = np.diff(found.time)
+    within = apart[1:] & (steps < _BREAK * period)
+    pace = float(np.percentile((np.abs(np.diff(seen)) / steps)[within], _PACE))
+    if pace < _LEAST:
+        return None
+    limit = robot.controller.acceleration_limit
+    is_faster = 0.0 < limit < pace
+    fast, slow, usual = (seen, asked, limit) if is_faster else (asked, seen, pace)
+    ramps = [_ramp(part * usual * period) for part in _PARTS]
+    lags = [_lag(seconds / period) for seconds in _LAGS]
+    left = min(_left(fast, slow, found.stretches, follow) for follow in ramps)
+    if left > _RAMPED**2 * np.sum(off**2):
+        return None
+    lagged = min(_left(fast, slow, found.stretches, follow) for follow in lags)
+    return (_limit(found, apart, limit) or pace) if left < _RATHER * lagged else None
+
+
+@frozen
+class _Velocities:
+    """What is measured and what is simulated, in the samples in which both are known, (n,)."""
+
+    time: Array  # s
+    seen: Plane  # m/s
+    asked: Plane  # m/s
+    period: float  # s
+    size: float  # root mean square of what is simulated [m/s]
+    stretches: tuple[slice, ...]  # without a gap
+
+    @property
+    def off(self) -> Array:
+        """How far the two are apart [m/s], (n,)."""
+        return np.abs(self.seen - self.asked)
+
+
+def _velocities(time: Array, measured: Array, expected: Array, robot: Robot) -> _Velocities | None:
     to_twist = np.linalg.inv(twist_to_wheels(robot, nominal=True)).T
     seen, asked = ((speeds @ to_twist)[:, :2] @ (1.0, 1.0j) for speeds in (measured, expected))
     known = np.isfinite(seen) & np.isfinite(asked)
     if np.count_nonzero(known) < 2:
         return None
     time, seen, asked = time[known], seen[known], asked[known]
-    off, size = np.abs(seen - asked), float(np.sqrt(np.mean(np.abs(asked) ** 2)))
-    apart = off > _APART * size
-    begins = np.count_nonzero(np.diff(apart.astype(int)) > 0)
-    if begins < _TIMES or np.mean(off**2) < (_NOTABLE * size) ** 2:
-        return None
     period = median_period(time)
-    steps = np.diff(time)
-    goes_on = steps < 1.5 * period
-    pace = float(np.percentile((np.abs(np.diff(seen)) / steps)[apart[1:] & goes_on], _PACE))
-    if pace < _LEAST:
+    breaks = np.flatnonzero(np.diff(time) >= _BREAK * period) + 1
+    stretches = tuple(slice(*ends) for ends in pairwise([0, *breaks.tolist(), len(time)]))
+    size = float(np.sqrt(np.mean(np.abs(asked) ** 2)))
+    return _Velocities(time, seen, asked, period, size, stretches)
+
+
+def _limit(found: _Velocities, apart: Mask, described: float) -> float | None:
+    """The limit [m/s^2], from the way by which each whole ramp falls behind; None with too few.
+
+    A change of velocity D by a ramp of a falls D^2 / (2 a) behind one at once. How the loop swings
+    and lags cancels, for it is the same behind both ramps.
+    """
+    around, slower = round(_AROUND / found.period), []
+    for stretch in found.stretches:
+        index = np.flatnonzero(apart[stretch]) + stretch.start
+        for run in np.split(index, np.flatnonzero(np.diff(index) > around) + 1):
+            if not len(run) or run[0] - around < stretch.start or run[-1] + around >= stretch.stop:
+                continue
+            rows = slice(run[0] - around, run[-1] + around + 1)
+            behind = (found.asked - found.seen)[rows]
+            change = complex(found.asked[rows][-1] - found.asked[rows][0])
+            is_whole = max(abs(behind[0]), abs(behind[-1])) < _SETTLED * found.size
+            if is_whole and abs(change) > _MUCH * found.size:
+                way = float((behind * change.conjugate()).real.sum()) * found.period
+                slower.append(2.0 * way / abs(change) ** 3)
+    if len(slower) < _WHOLE:
         return None
-    limit = robot.controller.acceleration_limit
-    starts = [0, *(np.flatnonzero(~goes_on) + 1), len(time)]
-    stretches = [slice(first, last) for first, last in pairwise(starts)]
-    is_faster = 0.0 < limit < pace
-    fast, slow, usual = (seen, asked, limit) if is_faster else (asked, seen, pace)
-    ramps = [_ramp(part * usual * period) for part in _PARTS]
-    lags = [_lag(seconds / period) for seconds in _LAGS]
-    left = min(_left(fast, slow, stretches, follow) for follow in ramps)
-    if left > _RAMPED**2 * np.sum(off**2):
-        return None
-    lagged = min(_left(fast, slow, stretches, follow) for follow in lags)
-    return pace if left < _RATHER * lagged else None
+    inverse = (1.0 / described if described else 0.0) + float(np.median(slower))
+    return 1.0 / inverse if inverse > 0.0 else None
 
 
 def _ramp(step: float) -> Callable[[complex], complex]:
@@ -87,7 +143,7 @@ def _lag(periods: float) -> Callable[[complex], complex]:
 
 
 def _left(
-    fast: Plane, slow: Plane, stretches: list[slice], follow: Callable[[complex], complex]
+    fast: Plane, slow: Plane, stretches: Sequence[slice], follow: Callable[[complex], complex]
 ) -> float:
     """Sum of squares by which one velocity is not what follows the other, from the begin of each
     stretch on."""
@@ -109,5 +165,5 @@ def misdescribed_ramp(found: float | None, robot: Robot) -> tuple[str, str]:
     described = f"{limit:g} is described" if limit else "no limit is described"
     return (
         f"the drivers let the velocity change by about {found:.2g} m/s^2, {described}",
-        f"write controller.acceleration_limit: {found:.2g}",
+        f"write controller.acceleration_limit: {found:.2g}, or have tomr_gap explain find it",
     )
