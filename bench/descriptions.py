@@ -1,14 +1,15 @@
 """Whether a robot that is not as described, or not wired so, is found, and a right one left alone.
 
     .venv/bin/python bench/descriptions.py BAG... --robot robot.yaml
-        [--live | --wrong | --rewired | --odometry]
+        [--live | --wrong | --explain | --rewired | --odometry]
 
 Counts the recordings that show other radii or another ramp than described; with --live those in
 which `inputs: robot.yaml` ever warns, or the IMU is said to be otherwise.
 --wrong diagnoses the first with one value off at a time, --rewired as a robot that is wired or
 reports otherwise would have recorded it; both say what is named and noted then. --odometry asks
 `tomr_odometry` where the first ends with its IMU otherwise, beside where the wheels alone have it,
-which is right where none slides.
+which is right where none slides. --explain asks `tomr_gap explain`, with the last held out, what it
+makes of values that are far off.
 """
 
 import argparse
@@ -45,6 +46,10 @@ from tomr_power_model.recordings import RecordingWriter, open_recording
 from tomr_power_model.robot import load_robot
 from tomr_power_model.robot.files import robot_file
 from tomr_power_model.topics.inputs import Complaints
+from tomr_reality_gap.explain import explain
+from tomr_reality_gap.request import Request
+
+_TOLERANCE = 0.05  # of values, for an explanation
 
 # By how much each value is off: factors, but of the offset radians.
 WRONG: Sequence[Mapping[str, float]] = (
@@ -57,6 +62,26 @@ WRONG: Sequence[Mapping[str, float]] = (
     {"controller.acceleration_limit": 0.0},
     {"controller.acceleration_limit": 0.5},
     {"controller.acceleration_limit": 2.0},
+)
+
+
+# What owners know least of, or mistake, by factors.
+FAR_OFF: Sequence[Mapping[str, float]] = (
+    {},
+    {"controller.acceleration_limit": 0.0},
+    {"controller.acceleration_limit": 0.5},
+    {"controller.acceleration_limit": 2.0},
+    {"controller.integral": 0.0},
+    {"controller.integral": 1.0 / 3.0},
+    {"controller.integral": 3.0},
+    {"controller.proportional": 0.5},
+    {"controller.proportional": 2.0},
+    {"controller.proportional": 1.0 / 3.0, "controller.integral": 1.0 / 3.0},
+    {"controller.proportional": 2.0, "controller.integral": 2.0},
+    {"motor.resistance": 1.3},
+    {"motor.torque_constant": 0.85},
+    {"robot.mass": 0.7},
+    {"robot.mass": 1.4},
 )
 
 
@@ -228,6 +253,35 @@ def recorded(bag: Path, change: Callable[[str, Any], Iterator[Part]], new: Path)
                 writer.write(place, type_name, part, receive_ns)
 
 
+def explained(robot: str, bags: Sequence[Path]) -> str:
+    """Cells of a table: what is named, and the error of the held-out drive before and after."""
+    request = Request(robot, tuple(bags[:-1]), holdout=tuple(bags[-1:]), tolerance=_TOLERANCE)
+    try:
+        made = explain(request)
+    except InputError as error:
+        return f"refused: {error} | -"
+    names = [
+        f"{item.effect} {', '.join(f'{value.value:.4g}' for value in item.parameters.values())}"
+        for item in made.findings
+    ]
+    score = made.score
+    fit = f"{score.nrmse_before:.3f} -> {score.nrmse_after:.3f}" if score else "-"
+    return f"{'; '.join(names) or made.verdict} | {fit}"
+
+
+def _explanations(bags: Sequence[Path], robot: str) -> Iterator[str]:
+    yield "| changed | named | NRMSE, held out |"
+    yield "|---|---|---|"
+    with TemporaryDirectory() as name:
+        robots = [
+            changed(robot, wrong, Path(name) / f"{number}.yaml")
+            for number, wrong in enumerate(FAR_OFF)
+        ]
+        cells = each(partial(explained, bags=bags), robots)
+        for wrong, row in zip(FAR_OFF, cells, strict=True):
+            yield f"| {dict(wrong) or 'nothing'} | {row} |"
+
+
 def _rows(names: Sequence[str], tasks: Sequence[Task]) -> Iterator[str]:
     """A table of what is named and noted."""
     yield "| otherwise | named | noted |"
@@ -295,11 +349,15 @@ def _main(arguments: Sequence[str] | None) -> int:
         "--live", action="store_true", help="as nodes say it while the robot drives"
     )
     parser.add_argument("--wrong", action="store_true", help="put values wrong, one at a time")
+    parser.add_argument("--explain", action="store_true", help="what tomr_gap makes of values")
     parser.add_argument("--rewired", action="store_true", help="wire the robot otherwise")
     parser.add_argument("--odometry", action="store_true", help="where the odometry ends then")
     options = parser.parse_args(arguments)
     if options.odometry:
         print("\n".join(_ends(options.bags[0], options.robot)))
+        return EXIT_OK
+    if options.explain:
+        print("\n".join(_explanations(options.bags, options.robot)))
         return EXIT_OK
     if options.wrong or options.rewired:
         print("\n".join(_table(options)))

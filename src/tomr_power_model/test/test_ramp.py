@@ -122,3 +122,19 @@ def test_one_slow_start_is_not_enough() -> None:
     measured, expected = wheels(ramped(commanded, 1.0)), wheels(ramped(commanded, 0.0))
     measured[120:] = expected[120:]
     assert ramp_shown(time, measured, expected, described(0.0)) is None
+
+
+def test_a_few_slow_starts_in_a_long_drive_are_not_enough() -> None:
+    time, commanded = legs(600.0)
+    measured, expected = wheels(ramped(commanded, 1.0)), wheels(ramped(commanded, 0.0))
+    measured[600:] = expected[600:]
+    assert ramp_shown(time, measured, expected, described(0.0)) is None
+
+
+def test_half_a_ramp_does_not_say_how_steep_it_is() -> None:
+    """Where the next command comes before the last is reached, the pace has to do."""
+    time, commanded = legs()
+    quick = commanded[(time * 6.0 % 60.0 / PERIOD).astype(int) % len(commanded)]  # legs of 0.5 s
+    expected = wheels(ramped(quick, 0.0))
+    found = ramp_shown(time, wheels(ramped(quick, 1.5)), expected, described(0.0))
+    assert found == pytest.approx(1.5, rel=0.05)
