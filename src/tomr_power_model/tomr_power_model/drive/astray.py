@@ -63,20 +63,25 @@ def otherwise_than_commanded(
 
 def other_ramp(drive: Drive, robot: Robot, time: Array, expected: Array) -> Iterator[Finding]:
     """Another ramp of the commands than described; as `not_following`."""
-    if len(time) < 2:
-        return
-    motion = wheel_motion(drive.encoder_time, drive.position, drive.velocity, time, _SPAN)
-    seen, remedy = misdescribed_ramp(ramp_shown(time, motion.speed, expected, robot), robot)
-    if seen:
-        yield Finding(drive.name, "all wheels", float(time[0]), float(time[-1]), seen, remedy)
+    if len(time) > 1:
+        shown = ramp_shown(time, _speed(drive, time, _SPAN), expected, robot)
+        yield from _throughout(drive, time, misdescribed_ramp(shown, robot))
 
 
 def other_radii(drive: Drive, robot: Robot, time: Array, expected: Array) -> Iterator[Finding]:
     """Other radii, or places of wheels, than the drivers go by; as `not_following`."""
-    if len(time) < 2:
-        return
-    motion = wheel_motion(drive.encoder_time, drive.position, drive.velocity, time, SPAN)
-    seen, remedy = misdescribed(answer(time, motion.speed, expected, robot), robot)
+    if len(time) > 1:
+        shown = answer(time, _speed(drive, time, SPAN), expected, robot)
+        yield from _throughout(drive, time, misdescribed(shown, robot))
+
+
+def _speed(drive: Drive, time: Array, span: float) -> Array:
+    return wheel_motion(drive.encoder_time, drive.position, drive.velocity, time, span).speed
+
+
+def _throughout(drive: Drive, time: Array, said: tuple[str, str]) -> Iterator[Finding]:
+    """What is seen of all wheels in the whole drive and what to write, empty where nothing."""
+    seen, remedy = said
     if seen:
         yield Finding(drive.name, "all wheels", float(time[0]), float(time[-1]), seen, remedy)
 
