@@ -138,3 +138,12 @@ def test_half_a_ramp_does_not_say_how_steep_it_is() -> None:
     expected = wheels(ramped(quick, 0.0))
     found = ramp_shown(time, wheels(ramped(quick, 1.5)), expected, described(0.0))
     assert found == pytest.approx(1.5, rel=0.05)
+
+
+def test_what_is_apart_after_gaps_alone_shows_nothing() -> None:
+    """No acceleration is known there."""
+    block, number = np.divmod(np.arange(200), 5)
+    time = PERIOD * (8.0 * block + number)
+    velocity = np.full(len(time), 0.5 + 0.0j)
+    seen = np.where(number == 0, 0.0, velocity)
+    assert ramp_shown(time, wheels(seen), wheels(velocity), described(0.0)) is None

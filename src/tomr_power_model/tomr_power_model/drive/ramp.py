@@ -56,6 +56,8 @@ def ramp_shown(time: Array, measured: Array, expected: Array, robot: Robot) -> f
         return None
     steps = np.diff(found.time)
     within = apart[1:] & (steps < _BREAK * period)
+    if not within.any():
+        return None
     pace = float(np.percentile((np.abs(np.diff(seen)) / steps)[within], _PACE))
     if pace < _LEAST:
         return None
