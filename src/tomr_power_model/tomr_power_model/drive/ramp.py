@@ -24,16 +24,15 @@ Plane = NDArray[np.complex128]  # velocities in the plane of the floor, x + i y
 _NOTABLE = 0.08  # of the root mean square speed, that the two differ by: healthy robots by 0.02
 _APART = 0.25  # of that speed: a sample in which the drivers ramp
 _TIMES = 5  # how often they have to
-_PACE = 90.0  # percentile of the acceleration meanwhile: much of it is the begin or the end
-_PARTS = (0.5, 0.6, 0.75, 1.0, 1.25)  # of the pace: wheels swing, without a ramp the most
+_PARTS = (0.5, 0.6, 0.75, 0.9, 1.0)  # of the limit: wheels swing, without a ramp the most
 _LAGS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s
 _RAMPED = 0.45  # part of the difference that is left with a ramp
 _RATHER = 1.25  # times what is left with a lag: loops blur a ramp
-_LEAST = 0.03  # m/s^2
 _BREAK = 1.5  # periods between two samples that do not go together
 _AROUND = 0.5  # s before and after a ramp, in which loops settle
 _SETTLED, _MUCH = 0.1, 0.5  # of that speed: how far apart the two are then; what a ramp changes
 _WHOLE = 3  # ramps that show how steep they are
+_MOSTLY = 90.0  # percentile of the acceleration, where there are fewer
 
 
 def ramp_shown(time: Array, measured: Array, expected: Array, robot: Robot) -> float | None:
@@ -49,28 +48,27 @@ def ramp_shown(time: Array, measured: Array, expected: Array, robot: Robot) -> f
     found = _velocities(time, measured, expected, robot)
     if found is None:
         return None
-    off, period, seen, asked = found.off, found.period, found.seen, found.asked
-    apart = off > _APART * found.size
+    apart = found.off > _APART * found.size
     begins = np.count_nonzero(np.diff(apart.astype(int)) > 0)
-    if begins < _TIMES or np.mean(off**2) < (_NOTABLE * found.size) ** 2:
+    total = float(np.sum(found.off**2))
+    if begins < _TIMES or total < len(apart) * (_NOTABLE * found.size) ** 2:
         return None
-    steps = np.diff(found.time)
-    within = apart[1:] & (steps < _BREAK * period)
-    if not within.any():
+    described = robot.controller.acceleration_limit
+    limit = _limit(found, apart, described) or _pace(found, apart)
+    if not limit:
         return None
-    pace = float(np.percentile((np.abs(np.diff(seen)) / steps)[within], _PACE))
-    if pace < _LEAST:
+    is_steeper = 0.0 < described < limit
+    fast, slow = (found.seen, found.asked) if is_steeper else (found.asked, found.seen)
+    step = (described if is_steeper else limit) * found.period
+
+    def left(follow: Callable[[complex], complex]) -> float:
+        return _left(fast, slow, found.stretches, follow)
+
+    ramped = min(left(_ramp(part * step)) for part in _PARTS)
+    if ramped > _RAMPED**2 * total:
         return None
-    limit = robot.controller.acceleration_limit
-    is_faster = 0.0 < limit < pace
-    fast, slow, usual = (seen, asked, limit) if is_faster else (asked, seen, pace)
-    ramps = [_ramp(part * usual * period) for part in _PARTS]
-    lags = [_lag(seconds / period) for seconds in _LAGS]
-    left = min(_left(fast, slow, found.stretches, follow) for follow in ramps)
-    if left > _RAMPED**2 * np.sum(off**2):
-        return None
-    lagged = min(_left(fast, slow, found.stretches, follow) for follow in lags)
-    return (_limit(found, apart, limit) or pace) if left < _RATHER * lagged else None
+    lagged = min(left(_lag(seconds / found.period)) for seconds in _LAGS)
+    return limit if ramped < _RATHER * lagged else None
 
 
 @frozen
@@ -127,6 +125,16 @@ def _limit(found: _Velocities, apart: Mask, described: float) -> float | None:
         return None
     inverse = (1.0 / described if described else 0.0) + float(np.median(slower))
     return 1.0 / inverse if inverse > 0.0 else None
+
+
+def _pace(found: _Velocities, apart: Mask) -> float:
+    """The acceleration where no ramp is whole [m/s^2], of which much is a begin or an end; 0 where
+    none is known."""
+    steps = np.diff(found.time)
+    within = apart[1:] & (steps < _BREAK * found.period)
+    if not within.any():
+        return 0.0
+    return float(np.percentile((np.abs(np.diff(found.seen)) / steps)[within], _MOSTLY))
 
 
 def _ramp(step: float) -> Callable[[complex], complex]:
