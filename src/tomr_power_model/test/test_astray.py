@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from attrs import evolve
 
+from tomr_power_model.calibration.following import lost_wheels
 from tomr_power_model.drive.astray import not_following, otherwise_than_commanded
 from tomr_power_model.drive.record import Drive
 from tomr_power_model.geometry.kinematics import twist_to_wheels
@@ -54,3 +55,23 @@ def test_another_ramp_is_one_finding_and_not_what_follows_from_it(make_drive: Ma
     (found,) = otherwise_than_commanded(drive, robot, time, expected)
     assert found.where == "all wheels"
     assert found.remedy.startswith("write controller.acceleration_limit: 0.6,")
+
+
+def test_what_calibration_says_of_a_ramp_is_what_to_write(make_drive: MakeDrive) -> None:
+    """The reference robot has 2 m/s^2, these wheels 0.6."""
+    time, now, seen = np.arange(0.0, 40.0, 0.05), 0.0, []
+    asked = 0.7 * np.where(time % 8.0 < 4.0, 1.0, -1.0)
+    for wanted in asked:
+        before, now = now, now + float(np.clip(wanted - now, -0.03, 0.03))
+        seen.append(0.5 * (before + now))
+    drive = evolve(
+        make_drive(ROBOT, 1),
+        encoder_time=time,
+        position=np.full((len(time), 3), np.nan),
+        velocity=np.outer(seen, twist_to_wheels(ROBOT)[:, 0]),
+        command_time=time,
+        command=np.outer(asked, (1.0, 0.0, 0.0)),
+    )
+    (found,) = lost_wheels(drive, ROBOT)
+    assert "2 is described" in found.seen
+    assert found.remedy.startswith("write controller.acceleration_limit: 0.6")

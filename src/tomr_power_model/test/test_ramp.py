@@ -147,3 +147,14 @@ def test_what_is_apart_after_gaps_alone_shows_nothing() -> None:
     velocity = np.full(len(time), 0.5 + 0.0j)
     seen = np.where(number == 0, 0.0, velocity)
     assert ramp_shown(time, wheels(seen), wheels(velocity), described(0.0)) is None
+
+
+def test_ramps_that_are_turned_back_say_nothing_of_a_whole_ones_way() -> None:
+    """Commands of 0.6 s, each fourth of 2.5 s: where 1 m/s^2 takes 1.2 s."""
+    spans = [50 if number % 4 == 0 else 12 for number in range(40)]
+    speeds = np.where(np.arange(40) % 2, 0.6, -0.6) + 0.0j
+    commanded = np.repeat(speeds, spans)
+    time = PERIOD * np.arange(len(commanded))
+    measured, expected = wheels(ramped(commanded, 1.0)), wheels(ramped(commanded, 0.0))
+    found = ramp_shown(time, measured, expected, described(0.0))
+    assert found == pytest.approx(1.0, rel=0.04)
