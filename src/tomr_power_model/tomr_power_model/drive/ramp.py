@@ -30,8 +30,8 @@ _RAMPED = 0.45  # part of the difference that is left with a ramp
 _RATHER = 1.25  # times what is left with a lag: loops blur a ramp
 _BREAK = 1.5  # periods between two samples that do not go together
 _AROUND = 0.5  # s before and after a ramp, in which loops settle
-_SETTLED, _MUCH = 0.1, 0.5  # of that speed: how far apart the two are then; what a ramp changes
-_WHOLE = 3  # ramps that show how steep they are
+_MUCH = 0.5  # of that speed, that a ramp changes
+_ENOUGH = 3  # ramps that show how steep they are: the median leaves out those cut short
 _MOSTLY = 90.0  # percentile of the acceleration, where there are fewer
 
 
@@ -103,7 +103,7 @@ def _velocities(time: Array, measured: Array, expected: Array, robot: Robot) -> 
 
 
 def _limit(found: _Velocities, apart: Mask, described: float) -> float | None:
-    """The limit [m/s^2], from the way by which each whole ramp falls behind; None with too few.
+    """The limit [m/s^2], from the way by which ramps fall behind; None with too few.
 
     A change of velocity D by a ramp of a falls D^2 / (2 a) behind one at once. How the loop swings
     and lags cancels, for it is the same behind both ramps.
@@ -117,19 +117,18 @@ def _limit(found: _Velocities, apart: Mask, described: float) -> float | None:
             rows = slice(run[0] - around, run[-1] + around + 1)
             behind = (found.asked - found.seen)[rows]
             change = complex(found.asked[rows][-1] - found.asked[rows][0])
-            is_whole = max(abs(behind[0]), abs(behind[-1])) < _SETTLED * found.size
-            if is_whole and abs(change) > _MUCH * found.size:
+            if abs(change) > _MUCH * found.size:
                 way = float((behind * change.conjugate()).real.sum()) * found.period
                 slower.append(2.0 * way / abs(change) ** 3)
-    if len(slower) < _WHOLE:
+    if len(slower) < _ENOUGH:
         return None
     inverse = (1.0 / described if described else 0.0) + float(np.median(slower))
     return 1.0 / inverse if inverse > 0.0 else None
 
 
 def _pace(found: _Velocities, apart: Mask) -> float:
-    """The acceleration where no ramp is whole [m/s^2], of which much is a begin or an end; 0 where
-    none is known."""
+    """The acceleration where too few ramps are whole [m/s^2], of which much is a begin or an end;
+    0 where none is known."""
     steps = np.diff(found.time)
     within = apart[1:] & (steps < _BREAK * found.period)
     if not within.any():
