@@ -158,3 +158,13 @@ def test_ramps_that_are_turned_back_say_nothing_of_a_whole_ones_way() -> None:
     measured, expected = wheels(ramped(commanded, 1.0)), wheels(ramped(commanded, 0.0))
     found = ramp_shown(time, measured, expected, described(0.0))
     assert found == pytest.approx(1.0, rel=0.04)
+
+
+def test_legs_from_rest_are_ramps_of_their_own() -> None:
+    """To and fro with a stop between, of which nothing is asked: none goes on where one ended."""
+    time = np.arange(0.0, 60.0, PERIOD)
+    commanded = np.array([0.5, 0.0, -0.5, 0.0])[(time // 2.0).astype(int) % 4] + 0.0j
+    measured, expected = wheels(ramped(commanded, 1.0)), wheels(ramped(commanded, 0.0))
+    moves = commanded != 0.0
+    found = ramp_shown(time[moves], measured[moves], expected[moves], described(0.0))
+    assert found == pytest.approx(1.0, rel=0.05)
