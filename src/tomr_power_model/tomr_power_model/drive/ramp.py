@@ -3,7 +3,7 @@
 Where it has no ramp, or a steeper one, the measured velocity is the simulated one ramped once more;
 where it has a gentler one, the simulated velocity is the measured one ramped. No fault looks like
 that: a wheel that is weak, held or slides goes somewhere else, and not at one pace each time. Loops
-with other gains do come later or sooner, but as a lag does.
+with other gains do come later or sooner, but as a lag does; commands that are late by a time.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,7 +25,7 @@ _NOTABLE = 0.08  # of the root mean square speed, that the two differ by: health
 _APART = 0.25  # of that speed: a sample in which the drivers ramp
 _TIMES = 5  # how often they have to
 _PARTS = (0.5, 0.6, 0.75, 0.9, 1.0)  # of the limit: wheels swing, without a ramp the most
-_LAGS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s
+_LAGS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s, of a loop, or by which commands are late
 _RAMPED = 0.45  # part of the difference that is left with a ramp
 _RATHER = 1.25  # times what is left with a lag: loops blur a ramp
 _BREAK = 1.5  # periods between two samples that do not go together
@@ -68,7 +68,11 @@ def ramp_shown(time: Array, measured: Array, expected: Array, robot: Robot) -> f
     if ramped > _RAMPED**2 * total:
         return None
     lagged = min(left(_lag(seconds / found.period)) for seconds in _LAGS)
-    return limit if ramped < _RATHER * lagged else None
+    late = min(
+        _left_late(fast, slow, found.stretches, max(1, round(seconds / found.period)))
+        for seconds in _LAGS
+    )
+    return limit if ramped < min(_RATHER * lagged, late) else None
 
 
 @frozen
@@ -163,6 +167,16 @@ def _left(
         for goal, seen in zip(wanted[1:], there[1:], strict=True):
             now += follow(goal - now)
             left += abs(now - seen) ** 2
+    return left
+
+
+def _left_late(fast: Plane, slow: Plane, stretches: Sequence[slice], late: int) -> float:
+    """As `_left`, by which it is not the other so many samples later."""
+    left = 0.0
+    for stretch in stretches:
+        wanted, there = fast[stretch], slow[stretch]
+        late_by = np.concatenate([np.full(min(late, len(there)), there[0]), wanted[:-late]])
+        left += float(np.sum(np.abs(late_by - there) ** 2))
     return left
 
 
