@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from tomr_power_model.drive.motion import median_period, wheel_motion
+from tomr_power_model.drive.motion import LEAST_PERIODS, median_period, wheel_motion
 from tomr_power_model.drive.quality import Finding, found_in, runs
 from tomr_power_model.drive.radii import SPAN, answer, misdescribed
 from tomr_power_model.drive.ramp import misdescribed_ramp, ramp_shown
@@ -63,9 +63,25 @@ def otherwise_than_commanded(
 
 def other_ramp(drive: Drive, robot: Robot, time: Array, expected: Array) -> Iterator[Finding]:
     """Another ramp of the commands than described; as `not_following`."""
-    if len(time) > 1:
-        shown = ramp_shown(time, _speed(drive, time, _SPAN), expected, robot)
-        yield from _throughout(drive, time, misdescribed_ramp(shown, robot))
+    shown = ramp_in(drive, robot, time, expected)
+    yield from _throughout(drive, time, misdescribed_ramp(shown, robot))
+
+
+def ramp_in(drive: Drive, robot: Robot, time: Array, expected: Array) -> float | None:
+    """Limit of the acceleration [m/s^2] that a recording shows and the robot has not, else None; as
+    `not_following`.
+
+    What is expected is blurred as the fit to the encoders blurs what is measured, by a variance of
+    a quarter of half its span squared: a step that is blurred and late looks like a ramp.
+    """
+    if len(time) < 2:
+        return None
+    period = median_period(time)
+    span = max(_SPAN, LEAST_PERIODS * median_period(drive.encoder_time))
+    variance = (0.5 * span) ** 2 / 4.0 - period**2 / 12.0  # means of periods are blurred as well
+    width = float(np.sqrt(max(variance, 0.0))) / period
+    blurred = gaussian_filter1d(expected, width, axis=0) if width > 0.0 else expected
+    return ramp_shown(time, _speed(drive, time, span), blurred, robot)
 
 
 def other_radii(drive: Drive, robot: Robot, time: Array, expected: Array) -> Iterator[Finding]:

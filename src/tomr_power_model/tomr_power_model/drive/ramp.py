@@ -25,7 +25,8 @@ _NOTABLE = 0.08  # of the root mean square speed, that the two differ by: health
 _APART = 0.25  # of that speed: a sample in which the drivers ramp
 _TIMES = 5  # how often they have to
 _PARTS = (0.5, 0.6, 0.75, 0.9, 1.0)  # of the limit: wheels swing, without a ramp the most
-_LAGS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s, of a loop, or by which commands are late
+_LAGS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s
+_LATE = np.arange(0.02, 0.62, 0.02)  # s
 _RAMPED = 0.45  # part of the difference that is left with a ramp
 _RATHER = 1.25  # times what is left with a lag: loops blur a ramp
 _BREAK = 1.5  # periods between two samples that do not go together
@@ -68,10 +69,7 @@ def ramp_shown(time: Array, measured: Array, expected: Array, robot: Robot) -> f
     if ramped > _RAMPED**2 * total:
         return None
     lagged = min(left(_lag(seconds / found.period)) for seconds in _LAGS)
-    late = min(
-        _left_late(fast, slow, found.stretches, max(1, round(seconds / found.period)))
-        for seconds in _LAGS
-    )
+    late = min(_left_late(fast, slow, found.stretches, seconds / found.period) for seconds in _LATE)
     return limit if ramped < min(_RATHER * lagged, late) else None
 
 
@@ -170,13 +168,13 @@ def _left(
     return left
 
 
-def _left_late(fast: Plane, slow: Plane, stretches: Sequence[slice], late: int) -> float:
+def _left_late(fast: Plane, slow: Plane, stretches: Sequence[slice], late: float) -> float:
     """As `_left`, by which it is not the other so many samples later."""
     left = 0.0
     for stretch in stretches:
-        wanted, there = fast[stretch], slow[stretch]
-        late_by = np.concatenate([np.full(min(late, len(there)), there[0]), wanted[:-late]])
-        left += float(np.sum(np.abs(late_by - there) ** 2))
+        row = np.arange(stretch.stop - stretch.start)
+        shifted = np.interp(row - late, row, fast[stretch])
+        left += float(np.sum(np.abs(shifted - slow[stretch]) ** 2))
     return left
 
 

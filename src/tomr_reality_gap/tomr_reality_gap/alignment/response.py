@@ -6,8 +6,7 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
-from tomr_power_model.drive.motion import wheel_motion
-from tomr_power_model.drive.ramp import ramp_shown
+from tomr_power_model.drive.astray import ramp_in
 from tomr_power_model.estimation.noise import rows_of
 from tomr_power_model.robot import Robot
 from tomr_reality_gap.alignment.channels import Channel
@@ -23,7 +22,6 @@ _FINER = np.arange(-0.018, 0.019, 0.002)  # s, around the best of these
 _BELIEVED = 0.01  # s: what is less is known no better than stamps are
 _USUAL = 10.0  # 1/s, of an integral gain over the proportional one
 _GAIN = 50.0  # of log likelihood: what is called better
-_SPAN = 0.1  # s, of the fit to the encoders that shows a ramp
 _NEARER = np.arange(0.8, 1.26, 0.05)  # of the limit that it shows
 
 
@@ -88,7 +86,10 @@ def answering(robot: Robot, alternatives: Mapping[str, float]) -> Robot:
 
 def _ramp(seen: Sequence[RecordingSimulation], value: Array, robot: Robot) -> float | None:
     """The limit with which wheels turn most as they were seen to."""
-    limits = [limit for item in seen if (limit := _ramp_in(item, robot)) is not None]
+    shown = [
+        ramp_in(item.recorded, robot, item.timeline.middle, item.run(robot).speed) for item in seen
+    ]
+    limits = [limit for limit in shown if limit is not None]
     if not limits:
         return None
     tried = float(np.median(limits)) * _NEARER
@@ -97,13 +98,6 @@ def _ramp(seen: Sequence[RecordingSimulation], value: Array, robot: Robot) -> fl
     described, *likely = _likely(value, rows)
     best = int(np.argmax(likely))
     return float(tried[best]) if likely[best] > described + _GAIN else None
-
-
-def _ramp_in(simulation: RecordingSimulation, robot: Robot) -> float | None:
-    """Limit of the acceleration [m/s^2] that a recording shows where it is none of the robot's."""
-    drive, time = simulation.recorded, simulation.timeline.middle
-    motion = wheel_motion(drive.encoder_time, drive.position, drive.velocity, time, _SPAN)
-    return ramp_shown(time, motion.speed, simulation.run(robot).speed, robot)
 
 
 def _answers(seen: Sequence[RecordingSimulation], value: Array, simulated: Array) -> Array:
